@@ -1,0 +1,1 @@
+"""The same bicycle in each engine."""

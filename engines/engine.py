@@ -1,0 +1,182 @@
+"""What every engine takes and gives: `Problem` in, `Trajectory` out.
+
+An engine is any object that satisfies `Engine` and is announced under the entry-point group
+``velodrome.engines``; the suite never names one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Protocol
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from reference.bicycle import Bicycle
+from reference.surface import Surface
+
+ENTRY_POINT_GROUP = "velodrome.engines"
+REFERENCE = "reference"
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A bicycle on a surface, started from a state that satisfies its constraints.
+
+    Attributes
+    ----------
+    bicycle : Bicycle
+    surface : Surface
+    q, qd : ndarray, shape (9,)
+        Generalised coordinates and rates at the start, wheel angles and yaw included.
+    times : ndarray, shape (n,)
+        Output times, rising from 0 [s].
+    """
+
+    bicycle: Bicycle
+    surface: Surface
+    q: np.ndarray
+    qd: np.ndarray
+    times: np.ndarray
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What an engine computed. What it cannot give is None, never made up.
+
+    Attributes
+    ----------
+    engine, version : str
+        Name and version of the engine.
+    settings : dict
+        The settings it ran with, JSON values.
+    time : ndarray, shape (n,)
+        Output times [s]: those of the problem, or fewer where the run ended early.
+    q, qd : ndarray, shape (n, 9)
+        Generalised coordinates and rates.
+    body_position : ndarray, shape (n, 4, 3)
+        Centres of mass, in the order of `reference.bicycle.BODIES` [m].
+    body_quaternion : ndarray, shape (n, 4, 4)
+        Orientations (w, x, y, z), body to inertial axes.
+    contact_point : ndarray or None, shape (n, 2, 3)
+        Contact points of the rear and the front wheel [m].
+    contact_force : ndarray or None, shape (n, 2, 3)
+        Force of the ground on each wheel, inertial axes [N].
+    gap : ndarray or None, shape (n, 2)
+        Distance of each rim from the surface [m].
+    slip : ndarray or None, shape (n, 2, 2)
+        Lateral and forward material velocity of each contact [m/s].
+    kinetic_energy, potential_energy : ndarray or None, shape (n,)
+        Energies, the potential's datum at z = 0 [J].
+    steps : int
+        Integration steps taken.
+    cpu_time : float
+        Process CPU time of the integration alone [s].
+    ended : str or None
+        Why the run ended before the problem's last time; None if it did not.
+    """
+
+    engine: str
+    version: str
+    settings: dict[str, Any]
+    time: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    body_position: np.ndarray
+    body_quaternion: np.ndarray
+    contact_point: np.ndarray | None
+    contact_force: np.ndarray | None
+    gap: np.ndarray | None
+    slip: np.ndarray | None
+    kinetic_energy: np.ndarray | None
+    potential_energy: np.ndarray | None
+    steps: int
+    cpu_time: float
+    ended: str | None = None
+
+
+class Settings(BaseModel):
+    """Base of an engine's settings: unknown names are refused, values are checked, nothing changes later."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Engine(Protocol):
+    """A multibody engine that rides the bicycle."""
+
+    @property
+    def name(self) -> str:
+        """Name in tables, files and on the command line."""
+        ...
+
+    @property
+    def version(self) -> str:
+        """Version of the library behind it."""
+        ...
+
+    @property
+    def gives(self) -> tuple[str, ...]:
+        """The optional fields of `Trajectory` that it fills."""
+        ...
+
+    @property
+    def settings(self) -> type[Settings]:
+        """The model of its settings; every field has a default."""
+        ...
+
+    def step_noise(self, settings: Any) -> float:
+        """Relative error that one step may add beyond its method: round-off and unconverged iterations."""
+        ...
+
+    def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
+        """Run a problem.
+
+        Parameters
+        ----------
+        problem : Problem
+        settings : Settings
+            An instance of this engine's `settings`.
+        progress : callable
+            To be called now and then with the simulated time reached [s].
+
+        Returns
+        -------
+        Trajectory
+
+        Raises
+        ------
+        EngineError
+            If not even the first sample could be computed.
+        """
+        ...
+
+
+class EngineError(RuntimeError):
+    """An engine could not run a problem at all."""
+
+
+def _announced() -> dict[str, EntryPoint]:
+    return {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP)}
+
+
+def engine_names() -> list[str]:
+    """Names of all installed engines, the reference first."""
+    return sorted(_announced(), key=lambda name: (name != REFERENCE, name))
+
+
+def load_engine(name: str) -> Engine:
+    """Load an engine by name.
+
+    Raises
+    ------
+    ValueError
+        If no engine of that name is installed.
+    """
+    points = _announced()
+    if name not in points:
+        raise ValueError(f"engine {name!r} is not installed; there are {', '.join(engine_names())}")
+    return points[name].load()

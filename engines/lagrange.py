@@ -1,0 +1,78 @@
+"""The reference as an engine: the paper's equations, integrated precisely or as the paper does."""
+
+from __future__ import annotations
+
+import time
+from importlib.metadata import version
+from typing import Literal
+
+from pydantic import Field
+
+from reference.contact import observe
+from reference.kinematics import body_positions, quaternions, rotations
+from reference.simulate import simulate, simulate_modified_euler
+
+from .engine import REFERENCE, EngineError, Problem, Progress, Settings, Trajectory
+
+
+class LagrangeSettings(Settings):
+    """Settings of the reference."""
+
+    integrator: Literal["dop853", "modified-euler"] = Field(
+        "dop853", description="adaptive order 8 with projection, or the paper's own method"
+    )
+    tolerance: float = Field(1e-13, ge=1e-15, le=1e-3, description="error of a step of dop853, relative to 1 + |state|")
+    step: float = Field(1e-3, gt=0, le=0.1, description="step of modified-euler [s]")
+
+
+class LagrangeEngine:
+    """Lagrange's equations of the first kind with six multipliers."""
+
+    name = REFERENCE
+    gives = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
+    settings = LagrangeSettings
+
+    @property
+    def version(self) -> str:
+        """Version of this suite."""
+        return version("velodrome")
+
+    def step_noise(self, settings: LagrangeSettings) -> float:
+        """Relative error that a step may add beyond its method: the tolerance itself, or round-off."""
+        return settings.tolerance if settings.integrator == "dop853" else 2.0**-52
+
+    def simulate(self, problem: Problem, settings: LagrangeSettings, progress: Progress) -> Trajectory:
+        """Run a problem; see `engines.engine.Engine`."""
+        where = (problem.bicycle, problem.surface)
+        state = (problem.q, problem.qd, problem.times)
+        begin = time.process_time()
+        if settings.integrator == "dop853":
+            motion = simulate(*where, *state, tolerance=settings.tolerance, progress=progress)
+        else:
+            motion = simulate_modified_euler(*where, *state, step=settings.step)
+        cpu_time = time.process_time() - begin
+        if len(motion.time) == 0:
+            raise EngineError(motion.ended)
+        seen = observe(*where, motion.q, motion.qd)
+        return Trajectory(
+            engine=self.name,
+            version=self.version,
+            settings=settings.model_dump(),
+            time=motion.time,
+            q=motion.q,
+            qd=motion.qd,
+            body_position=body_positions(problem.bicycle, motion.q),
+            body_quaternion=quaternions(rotations(problem.bicycle, motion.q)),
+            contact_point=seen.point,
+            contact_force=motion.force,
+            gap=seen.gap,
+            slip=seen.slip,
+            kinetic_energy=seen.kinetic_energy,
+            potential_energy=seen.potential_energy,
+            steps=motion.steps,
+            cpu_time=cpu_time,
+            ended=motion.ended,
+        )
+
+
+ENGINE = LagrangeEngine()

@@ -1,0 +1,98 @@
+"""Trajectories as Parquet files: one column a quantity, units with the columns, the rest in the schema."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from reference.bicycle import BODIES
+from reference.kinematics import COORDINATES, WHEELS
+
+from .engine import Trajectory
+
+METADATA_KEY = b"velodrome"
+
+
+def _coordinate_columns() -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+    units = ["m"] * 3 + ["rad"] * 6
+    positions = [(str(name), unit) for name, unit in zip(COORDINATES, units, strict=True)]
+    return positions, [(f"{name}_rate", f"{unit}/s") for name, unit in positions]
+
+
+def columns() -> Iterator[tuple[str, list[tuple[str, str]]]]:
+    """Fields of a trajectory with their columns: (field, [(column, unit), ...]), flattened in C order."""
+    positions, rates = _coordinate_columns()
+    yield "time", [("time", "s")]
+    yield "q", positions
+    yield "qd", rates
+    yield "contact_point", [(f"{w}_contact_{a}", "m") for w in WHEELS for a in "xyz"]
+    yield "contact_force", [(f"{w}_force_{a}", "N") for w in WHEELS for a in "xyz"]
+    yield "gap", [(f"{w}_gap", "m") for w in WHEELS]
+    yield "slip", [(f"{w}_slip_{d}", "m/s") for w in WHEELS for d in ("lateral", "forward")]
+    yield "kinetic_energy", [("kinetic_energy", "J")]
+    yield "potential_energy", [("potential_energy", "J")]
+    yield "body_position", [(f"{b}_{a}", "m") for b in BODIES for a in "xyz"]
+    yield "body_quaternion", [(f"{b}_q{a}", "1") for b in BODIES for a in "wxyz"]
+
+
+SHAPES = {
+    "contact_point": (2, 3),
+    "contact_force": (2, 3),
+    "slip": (2, 2),
+    "body_position": (4, 3),
+    "body_quaternion": (4, 4),
+}
+VECTORS = ("time", "kinetic_energy", "potential_energy")
+
+
+def write_trajectory(trajectory: Trajectory, path: Path) -> None:
+    """Write a trajectory to ``path``, whole or not at all."""
+    fields, arrays = [], []
+    for name, names in columns():
+        value = getattr(trajectory, name)
+        if value is None:
+            continue
+        flat = np.asarray(value, float).reshape(len(trajectory.time), len(names))
+        for j, (column, unit) in enumerate(names):
+            fields.append(pa.field(column, pa.float64(), nullable=False, metadata={b"unit": unit.encode()}))
+            arrays.append(pa.array(np.ascontiguousarray(flat[:, j])))
+    facts = {key: getattr(trajectory, key) for key in ("engine", "version", "settings", "steps", "cpu_time", "ended")}
+    schema = pa.schema(fields, metadata={METADATA_KEY: json.dumps(facts).encode()})
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        pq.write_table(pa.Table.from_arrays(arrays, schema=schema), partial)
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def read_trajectory(path: Path) -> Trajectory:
+    """Read a trajectory back.
+
+    Raises
+    ------
+    ValueError
+        If the file is not a trajectory.
+    """
+    try:
+        table = pq.read_table(path)
+    except (OSError, pa.ArrowInvalid) as error:
+        raise ValueError(f"{path} cannot be read as a trajectory: {error}") from error
+    metadata = (table.schema.metadata or {}).get(METADATA_KEY)
+    if metadata is None or "time" not in table.column_names:
+        raise ValueError(f"{path} is not a trajectory: its schema has no velodrome metadata")
+    values: dict[str, np.ndarray | None] = {}
+    present = set(table.column_names)
+    for name, names in columns():
+        if not present.issuperset(column for column, _ in names):
+            values[name] = None
+            continue
+        flat = np.column_stack([table.column(column).to_numpy() for column, _ in names])
+        values[name] = flat[:, 0] if name in VECTORS else flat.reshape(-1, *SHAPES.get(name, (len(names),)))
+    return Trajectory(**json.loads(metadata), **values)  # pyright: ignore[reportArgumentType]

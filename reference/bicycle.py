@@ -1,0 +1,129 @@
+"""The benchmark bicycle: 25 parameters of four rigid bodies, and gravity."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+BODIES = ("rear_frame", "front_frame", "rear_wheel", "front_wheel")
+
+
+@dataclass(frozen=True)
+class Bicycle:
+    """Geometry and mass distribution of the Whipple bicycle.
+
+    The 25 parameters of Meijaard et al. (2007), Table 1, written for axes x forward, y left and
+    **z up** with the origin in the rear contact point of the upright bicycle: heights and the
+    products of inertia have the opposite sign of the table's. The defaults are the table's values.
+
+    Parameters
+    ----------
+    wheelbase, trail : float
+        Distance between the contact points, and trail [m].
+    steer_axis_tilt : float
+        Tilt of the steering axis from the vertical, backwards [rad].
+    gravity : float
+        Gravitational acceleration [m/s^2].
+    rear_wheel_radius, front_wheel_radius : float
+        Radii of the knife edges [m].
+    rear_wheel_mass, rear_frame_mass, front_frame_mass, front_wheel_mass : float
+        Masses [kg].
+    rear_wheel_Ixx, rear_wheel_Iyy, front_wheel_Ixx, front_wheel_Iyy : float
+        Moments of inertia about a diameter and about the axle [kg m^2].
+    rear_frame_x, rear_frame_z, front_frame_x, front_frame_z : float
+        Centres of mass [m].
+    rear_frame_Ixx, ..., front_frame_Ixz : float
+        Entries of the inertia tensors about the centres of mass [kg m^2].
+
+    Raises
+    ------
+    ValueError
+        If a parameter is not finite, a length or a mass is not positive, or an inertia is not
+        that of a rigid body (positive definite, triangle inequality).
+    """
+
+    wheelbase: float = 1.02
+    trail: float = 0.08
+    steer_axis_tilt: float = math.pi / 10
+    gravity: float = 9.81
+    rear_wheel_radius: float = 0.3
+    rear_wheel_mass: float = 2.0
+    rear_wheel_Ixx: float = 0.0603
+    rear_wheel_Iyy: float = 0.12
+    rear_frame_x: float = 0.3
+    rear_frame_z: float = 0.9
+    rear_frame_mass: float = 85.0
+    rear_frame_Ixx: float = 9.2
+    rear_frame_Iyy: float = 11.0
+    rear_frame_Izz: float = 2.8
+    rear_frame_Ixz: float = -2.4
+    front_frame_x: float = 0.9
+    front_frame_z: float = 0.7
+    front_frame_mass: float = 4.0
+    front_frame_Ixx: float = 0.05892
+    front_frame_Iyy: float = 0.06
+    front_frame_Izz: float = 0.00708
+    front_frame_Ixz: float = 0.00756
+    front_wheel_radius: float = 0.35
+    front_wheel_mass: float = 3.0
+    front_wheel_Ixx: float = 0.1405
+    front_wheel_Iyy: float = 0.28
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+                raise ValueError(f"bicycle parameter {field.name} is {value!r}; it must be a finite number")
+        positive = ["wheelbase", "gravity", "rear_wheel_radius", "front_wheel_radius"]
+        positive += [f"{body}_mass" for body in BODIES]
+        for name in positive:
+            if getattr(self, name) <= 0:
+                raise ValueError(f"bicycle parameter {name} is {getattr(self, name)!r}; it must be positive")
+        if abs(self.steer_axis_tilt) >= math.pi / 2:
+            raise ValueError(f"bicycle parameter steer_axis_tilt is {self.steer_axis_tilt!r}; it must be within +-pi/2")
+        for body in BODIES:
+            # Round-off only: a thin ring meets the triangle inequality with equality.
+            principal = np.linalg.eigvalsh(self.inertia(body))
+            if principal[0] <= 0 or principal[0] + principal[1] < principal[2] * (1 - 1e-12):
+                raise ValueError(
+                    f"bicycle parameters {body}_I*: principal moments {principal.tolist()} are not those of a rigid "
+                    "body; they must be positive and none larger than the sum of the other two"
+                )
+
+    @property
+    def mass(self) -> float:
+        """Total mass [kg]."""
+        return self.rear_wheel_mass + self.rear_frame_mass + self.front_frame_mass + self.front_wheel_mass
+
+    @property
+    def reference_point(self) -> np.ndarray:
+        """Point D at rest, shape (3,) [m]: on the steering axis at the height of the front wheel's centre."""
+        height = self.front_wheel_radius
+        return np.array([self.wheelbase + self.trail - height * math.tan(self.steer_axis_tilt), 0.0, height])
+
+    @property
+    def steer_axis(self) -> np.ndarray:
+        """Unit vector along the steering axis at rest, upwards, shape (3,)."""
+        return np.array([-math.sin(self.steer_axis_tilt), 0.0, math.cos(self.steer_axis_tilt)])
+
+    def body_mass(self, body: str) -> float:
+        """Mass of a body named in `BODIES` [kg]."""
+        return getattr(self, f"{body}_mass")
+
+    def centre(self, body: str) -> np.ndarray:
+        """Centre of mass of a body at rest, shape (3,) [m], origin in the rear contact point."""
+        if body == "rear_wheel":
+            return np.array([0.0, 0.0, self.rear_wheel_radius])
+        if body == "front_wheel":
+            return np.array([self.wheelbase, 0.0, self.front_wheel_radius])
+        return np.array([getattr(self, f"{body}_x"), 0.0, getattr(self, f"{body}_z")])
+
+    def inertia(self, body: str) -> np.ndarray:
+        """Inertia tensor of a body about its centre of mass at rest, shape (3, 3) [kg m^2]."""
+        ixx, iyy = getattr(self, f"{body}_Ixx"), getattr(self, f"{body}_Iyy")
+        izz, ixz = ixx, 0.0
+        if body.endswith("frame"):
+            izz, ixz = getattr(self, f"{body}_Izz"), getattr(self, f"{body}_Ixz")
+        return np.array([[ixx, 0.0, ixz], [0.0, iyy, 0.0], [ixz, 0.0, izz]])

@@ -1,0 +1,188 @@
+"""One circular motion: 21 constants (Xiong et al. 2020, Eqs. 9-14)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .bicycle import Bicycle
+from .kernels import steady as kernel
+from .kinematics import constants
+from .surface import Surface
+
+LEAN, PITCH, STEER, YAW_SPEED, REAR_SPEED, FRONT_SPEED, SIGMA = range(3, 10)
+CONTACT, FORCE = slice(10, 16), slice(16, 22)
+
+
+@dataclass(frozen=True)
+class CircularMotion:
+    """A hands-free circular motion in the heading frame.
+
+    Attributes
+    ----------
+    position : ndarray, shape (3,)
+        D [m].
+    lean, pitch, steer : float
+        Angles [rad].
+    yaw_rate, rear_rate, front_rate : float
+        Rates [rad/s].
+    contact : ndarray, shape (2, 3)
+        Contact parameters (xi, eta, rim angle) of the rear and the front wheel.
+    force : ndarray, shape (2, 3)
+        Contact forces on the wheels [N].
+    residual : float
+        Largest of the 21 equations: forces in weights, lengths in m, rolling speeds as fractions of
+        the root of the sum of the squared rates.
+    """
+
+    position: np.ndarray
+    lean: float
+    pitch: float
+    steer: float
+    yaw_rate: float
+    rear_rate: float
+    front_rate: float
+    contact: np.ndarray
+    force: np.ndarray
+    residual: float
+
+    def state(self) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates and rates at yaw 0 and wheel angles 0, shapes (9,)."""
+        x, y, z = self.position
+        q = np.array([x, y, z, 0.0, self.lean, self.pitch, self.steer, 0.0, 0.0])
+        w = self.yaw_rate
+        return q, np.array([-w * y, w * x, 0.0, w, 0.0, 0.0, 0.0, self.rear_rate, self.front_rate])
+
+
+@dataclass(frozen=True)
+class Steady:
+    """The equations of circular motions of one bicycle on one surface of revolution."""
+
+    bicycle: Bicycle
+    surface: Surface
+
+    def residual(self, unknowns: np.ndarray) -> np.ndarray:
+        """Residual of the 21 equations and the normalisation of the speeds, shape (22,)."""
+        out, function = np.empty(kernel.UNKNOWNS), self.surface.function.real
+        kernel.steady_residual(unknowns, function, self.surface.parameters, constants(self.bicycle), out)
+        return out
+
+    def jacobian(self, unknowns: np.ndarray) -> np.ndarray:
+        """Its Jacobian, shape (22, 22), rank 21: power balance makes one equation redundant."""
+        out = np.empty((kernel.UNKNOWNS, kernel.UNKNOWNS))
+        function = self.surface.function.complex
+        kernel.steady_jacobian(unknowns, function, self.surface.parameters, constants(self.bicycle), out)
+        return out
+
+    def motion(self, unknowns: np.ndarray) -> CircularMotion:
+        """The motion behind a solution, run so that the rear wheel rolls forward.
+
+        Raises
+        ------
+        ValueError
+            If the solution is no motion (sigma < 0).
+        """
+        u = unknowns
+        if u[SIGMA] < 0:
+            raise ValueError(f"no motion: the squared speed is {u[SIGMA]!r}")
+        speed = np.sqrt(kernel.SIGMA_UNIT * u[SIGMA]) * (-1.0 if u[REAR_SPEED] < 0 else 1.0)
+        yaw_rate, rear_rate, front_rate = (float(speed * u[i]) for i in (YAW_SPEED, REAR_SPEED, FRONT_SPEED))
+        weight = self.bicycle.mass * self.bicycle.gravity
+        return CircularMotion(
+            position=u[:3].copy(),
+            lean=float(u[LEAN]),
+            pitch=float(u[PITCH]),
+            steer=float(u[STEER]),
+            yaw_rate=yaw_rate,
+            rear_rate=rear_rate,
+            front_rate=front_rate,
+            contact=u[CONTACT].reshape(2, 3).copy(),
+            force=weight * u[FORCE].reshape(2, 3),
+            residual=float(np.abs(self.residual(u)[:21]).max()),
+        )
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One more equation, value = 0, that picks a point of a family: its value and gradient."""
+
+    value: float
+    gradient: np.ndarray
+
+
+def rear_rate_condition(rear_rate: float):
+    """Condition of a given rear-wheel rate: sigma b^2 = rate^2, in units of the rate's square or of 1."""
+    scale = kernel.SIGMA_UNIT / max(rear_rate**2, 1.0)
+
+    def condition(u: np.ndarray) -> Condition:
+        gradient = np.zeros(kernel.UNKNOWNS)
+        gradient[SIGMA] = scale * u[REAR_SPEED] ** 2
+        gradient[REAR_SPEED] = 2 * scale * u[SIGMA] * u[REAR_SPEED]
+        return Condition(scale * (u[SIGMA] * u[REAR_SPEED] ** 2 - rear_rate**2 / kernel.SIGMA_UNIT), gradient)
+
+    return condition
+
+
+def unknown_condition(index: int, value: float):
+    """Condition that one unknown has a given value."""
+
+    def condition(u: np.ndarray) -> Condition:
+        gradient = np.zeros(kernel.UNKNOWNS)
+        gradient[index] = 1.0
+        return Condition(float(u[index]) - value, gradient)
+
+    return condition
+
+
+def nearest_condition():
+    """No condition: least squares takes the guess to the nearest point of the curve."""
+    return lambda u: Condition(0.0, np.zeros(kernel.UNKNOWNS))
+
+
+def plane_condition(start: np.ndarray, tangent: np.ndarray, distance: float):
+    """Condition of pseudo-arclength: at ``distance`` from ``start`` along ``tangent`` (a weighted covector)."""
+
+    def condition(u: np.ndarray) -> Condition:
+        return Condition(float(tangent @ (u - start)) - distance, tangent)
+
+    return condition
+
+
+def newton(equations: Steady, unknowns: np.ndarray, condition, most: int = 12) -> tuple[np.ndarray, int]:
+    """Solve the equations and one condition by Newton's method, least squares for the redundant row.
+
+    Parameters
+    ----------
+    equations : Steady
+    unknowns : ndarray, shape (22,)
+        Guess.
+    condition : callable
+        Maps the unknowns to a `Condition`.
+    most : int
+        Iterations allowed.
+
+    Returns
+    -------
+    unknowns : ndarray, shape (22,)
+    iterations : int
+
+    Raises
+    ------
+    ValueError
+        If it does not converge.
+    """
+    u = unknowns.copy()
+    for iteration in range(1, most + 1):
+        extra = condition(u)
+        values = np.append(equations.residual(u), extra.value)
+        matrix = np.vstack([equations.jacobian(u), extra.gradient])
+        if not (np.all(np.isfinite(values)) and np.all(np.isfinite(matrix))):
+            break
+        # Redundant by power balance on the solution only: the cut keeps that row from blowing up.
+        step = np.linalg.lstsq(matrix, -values, rcond=1e-11)[0]
+        size = float(np.abs(step / (1 + np.abs(u))).max())
+        u = u + step * min(1.0, 0.5 / size if size > 0 else 1.0)
+        if size < 1e-9:  # quadratic: what is left is round-off
+            return u, iteration
+    raise ValueError("Newton's method finds no circular motion there")

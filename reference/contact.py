@@ -1,0 +1,59 @@
+"""Contact points, gaps and slip of both wheels along a trajectory (Xiong et al. 2020, Eqs. 1-7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .bicycle import Bicycle
+from .kernels import dynamics as kernel
+from .kinematics import constants
+from .surface import Surface
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What a trajectory looks like at its contacts; wheels in the order rear, front.
+
+    Attributes
+    ----------
+    point, normal : ndarray, shape (n, 2, 3)
+        Rim point of closest approach [m] and unit normal of the surface there.
+    gap : ndarray, shape (n, 2)
+        Signed distance of that point from the surface along the normal [m].
+    slip : ndarray, shape (n, 2, 2)
+        Lateral and forward material velocity of that point [m/s].
+    kinetic_energy, potential_energy : ndarray, shape (n,)
+        Energies, the potential's datum at z = 0 [J].
+    found : bool
+        False where a closest approach could not be computed.
+    """
+
+    point: np.ndarray
+    normal: np.ndarray
+    gap: np.ndarray
+    slip: np.ndarray
+    kinetic_energy: np.ndarray
+    potential_energy: np.ndarray
+    found: bool
+
+
+def observe(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> Observation:
+    """Measure contacts and energies of a trajectory from its coordinates (n, 9) and rates (n, 9)."""
+    n = len(q)
+    point, normal, gap = np.empty((n, 2, 3)), np.empty((n, 2, 3)), np.empty((n, 2))
+    slip, energy = np.empty((n, 2, 2)), np.empty((n, 2))
+    found = kernel.observe(
+        np.ascontiguousarray(q, float),
+        np.ascontiguousarray(qd, float),
+        surface.function.real,
+        surface.parameters,
+        constants(bicycle),
+        point,
+        normal,
+        gap,
+        slip,
+        energy,
+    )
+    return Observation(point, normal, gap, slip, energy[:, 0].copy(), energy[:, 1].copy(), bool(found))

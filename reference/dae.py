@@ -1,0 +1,167 @@
+"""The differential-algebraic equations of motion (Xiong et al. 2020, Eqs. 6-8)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .bicycle import Bicycle
+from .kernels import dynamics as kernel
+from .kinematics import LEAN, REAR_ANGLE, STEER, constants
+from .surface import Surface, evaluate
+
+
+@dataclass(frozen=True)
+class Dynamics:
+    """Accelerations and multipliers of one state.
+
+    Attributes
+    ----------
+    acceleration : ndarray, shape (9,)
+        Second derivatives of the generalised coordinates [m/s^2, rad/s^2].
+    force : ndarray, shape (2, 3)
+        The six Lagrange multipliers: force of the ground on the rear and the front wheel, inertial
+        axes [N].
+    contact : ndarray, shape (2, 3)
+        Contact parameters (xi, eta, rim angle) of both wheels [m, m, rad].
+    contact_rate : ndarray, shape (2, 3)
+        Their time derivatives.
+    """
+
+    acceleration: np.ndarray
+    force: np.ndarray
+    contact: np.ndarray
+    contact_rate: np.ndarray
+
+
+def contact_parameters(bicycle: Bicycle, surface: Surface, q: np.ndarray) -> np.ndarray:
+    """Solve the contact equations (Eq. 4) at coordinates (9,); returns (6,) [m, m, rad per wheel].
+
+    Raises
+    ------
+    ValueError
+        If a wheel has no closest approach that Newton's method finds.
+    """
+    p = np.empty(6, q.dtype)
+    function = surface.function.complex if np.iscomplexobj(q) else surface.function.real
+    kernel.guess_contacts(q, p, function, surface.parameters, constants(bicycle))
+    if not kernel.find_contacts(q, p, function, surface.parameters, constants(bicycle)):
+        raise ValueError(f"no contact point found at q = {q.tolist()}")
+    return p
+
+
+def dynamics(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> Dynamics:
+    """Accelerations and contact forces of a state that satisfies the constraints.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    surface : Surface
+    q, qd : ndarray, shape (9,)
+        Generalised coordinates and rates.
+
+    Returns
+    -------
+    Dynamics
+
+    Raises
+    ------
+    ValueError
+        If a wheel has no contact point.
+    """
+    p = contact_parameters(bicycle, surface, q)
+    qdd, force, rate = np.empty(9), np.empty(6), np.empty(6)
+    function, parameters = surface.function.real, surface.parameters
+    kernel.accelerations(q, qd, p, function, parameters, constants(bicycle), qdd, force, rate)
+    return Dynamics(qdd, force.reshape(2, 3), p.reshape(2, 3), rate.reshape(2, 3))
+
+
+def mass_matrix(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
+    """Mass matrix of the free four-body tree at coordinates (9,), shape (9, 9)."""
+    mass, bias = np.empty((9, 9)), np.empty(9)
+    kernel.mass_and_bias(q, np.zeros(9), constants(bicycle), mass, bias)
+    return mass
+
+
+def residual(
+    bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, p: np.ndarray, force: np.ndarray
+) -> np.ndarray:
+    """Residual of all 21 equations (Eq. 8).
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    surface : Surface
+    q, qd, qdd : ndarray, shape (9,)
+        Coordinates, rates, accelerations.
+    p : ndarray, shape (6,)
+        Contact parameters of the rear, then the front wheel.
+    force : ndarray, shape (6,)
+        Contact forces on the rear, then the front wheel, inertial axes [N].
+
+    Returns
+    -------
+    ndarray, shape (21,)
+        Nine equations of motion in units of the weight, six contact equations [m, m, -], two gaps
+        [m], four rolling constraints [m/s].
+    """
+    out = np.empty(21, q.dtype)
+    function = surface.function.complex if np.iscomplexobj(q) else surface.function.real
+    kernel.residual(q, qd, qdd, p, force, function, surface.parameters, constants(bicycle), out)
+    return out
+
+
+def consistent_state(
+    bicycle: Bicycle,
+    surface: Surface,
+    position: tuple[float, float],
+    lean: float,
+    steer: float,
+    rates: tuple[float, float, float],
+    yaw: float = 0.0,
+    guess: tuple[float, float] | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """State on all constraints from the seven independent variables x, y, lean, steer and three rates.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    surface : Surface
+    position : tuple of float
+        x and y of D [m].
+    lean, steer : float
+        Angles [rad].
+    rates : tuple of float
+        Lean, steer and rear-wheel rate [rad/s].
+    yaw : float
+        Heading [rad].
+    guess : tuple of float, optional
+        Height of D [m] and pitch [rad] to start Newton's method from.
+
+    Returns
+    -------
+    q, qd : ndarray, shape (9,)
+
+    Raises
+    ------
+    ValueError
+        If both wheels cannot touch the ground at these values, or the rolling constraints leave the
+        remaining speeds undetermined.
+    """
+    x, y = position
+    if guess is None:
+        guess = (float(evaluate(surface, np.array(x), np.array(y))[0]) + bicycle.front_wheel_radius * np.cos(lean), 0.0)
+    q = np.array([x, y, guess[0], yaw, lean, guess[1], steer, 0.0, 0.0])
+    qd = np.zeros(9)
+    qd[[LEAN, STEER, REAR_ANGLE]] = rates
+    p, c = np.empty(6), constants(bicycle)
+    function, parameters = surface.function.real, surface.parameters
+    kernel.guess_contacts(q, p, function, parameters, c)
+    if not kernel.settle(q, p, function, parameters, c) or not np.all(np.isfinite(q)):
+        where = f"x = {x!r}, y = {y!r}, lean = {lean!r}, steer = {steer!r}"
+        raise ValueError(f"both wheels cannot touch the ground at {where}")
+    kernel.complete_velocity(q, qd, p, function, parameters, c)
+    if not np.all(np.isfinite(qd)) or np.abs(qd).max() > 1e9:
+        raise ValueError(f"the rolling constraints do not determine the speeds at lean = {lean!r}, steer = {steer!r}")
+    return q, qd

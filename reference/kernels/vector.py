@@ -1,0 +1,43 @@
+"""Three-vectors as tuples: they live in registers, so a kernel allocates nothing for them."""
+
+from __future__ import annotations
+
+import numba as nb
+
+jit = nb.njit(cache=True, error_model="numpy")
+
+
+@jit
+def add(a, b):
+    """Sum a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@jit
+def subtract(a, b):
+    """Difference a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@jit
+def scale(s, a):
+    """Product s a."""
+    return s * a[0], s * a[1], s * a[2]
+
+
+@jit
+def combine(s, a, t, b):
+    """Linear combination s a + t b."""
+    return s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2]
+
+
+@jit
+def dot(a, b):
+    """Scalar product a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@jit
+def cross(a, b):
+    """Vector product a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -1,0 +1,176 @@
+"""Integration of the equations of motion: the precise one, and the paper's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import DOP853
+
+from .bicycle import Bicycle
+from .dae import contact_parameters
+from .kernels import integrate as kernel
+from .kinematics import constants
+from .surface import Surface
+
+# Coefficients as data, from the library that everybody checks them against.
+_TABLEAU = tuple(
+    np.ascontiguousarray(table, float) for table in (DOP853.A, DOP853.B, DOP853.E3, DOP853.E5, DOP853.A_EXTRA, DOP853.D)
+)
+_STEPS_A_CALL = 200  # between two reports of progress; a step takes some 50 us
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A computed motion; the arrays end early where the integration did.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+    q, qd : ndarray, shape (n, 9)
+    contact : ndarray, shape (n, 2, 3)
+        Contact parameters (xi, eta, rim angle).
+    force : ndarray, shape (n, 2, 3)
+        Contact forces on the wheels, inertial axes [N].
+    steps, evaluations : int
+        Integration steps and evaluations of the right-hand side.
+    ended : str or None
+        Why the integration ended early.
+    """
+
+    time: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    contact: np.ndarray
+    force: np.ndarray
+    steps: int
+    evaluations: int
+    ended: str | None
+
+
+def _motion(
+    bicycle: Bicycle,
+    surface: Surface,
+    times: np.ndarray,
+    rows: np.ndarray,
+    steps: int,
+    evaluations: int,
+    ended: str | None,
+) -> Motion:
+    n = len(rows)
+    q, qd, p = (np.ascontiguousarray(part) for part in (rows[:, :9], rows[:, 9:18], rows[:, 18:]))
+    force = np.empty((n, 6))
+    kernel.contact_forces(q, qd, p, surface.function.real, surface.parameters, constants(bicycle), force)
+    return Motion(times[:n].copy(), q, qd, p.reshape(n, 2, 3), force.reshape(n, 2, 3), steps, evaluations, ended)
+
+
+def simulate(
+    bicycle: Bicycle,
+    surface: Surface,
+    q: np.ndarray,
+    qd: np.ndarray,
+    times: np.ndarray,
+    tolerance: float = 1e-13,
+    progress: Callable[[float], None] | None = None,
+) -> Motion:
+    """Integrate precisely: Dormand-Prince 8(5,3), adaptive, projected on all constraints.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    surface : Surface
+    q, qd : ndarray, shape (9,)
+        Start, on the constraints.
+    times : ndarray, shape (n,)
+        Output times, not falling, the first >= 0 [s].
+    tolerance : float
+        Of a step's error, relative to 1 + |state|.
+    progress : callable, optional
+        Called with the time reached.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    ValueError
+        If a wheel has no contact at the start.
+    """
+    times = np.ascontiguousarray(times, float)
+    y = np.concatenate([q, qd, contact_parameters(bicycle, surface, np.asarray(q, float))])
+    out = np.empty((len(times), kernel.SIZE))
+    index, t, h, steps, evaluations = 0, 0.0, 1e-3, 0, 0
+    status = kernel.MORE
+    while status == kernel.MORE:
+        status, index, t, h, more, count = kernel.dop853(
+            *(y, times, index, t, h, tolerance, _STEPS_A_CALL, _TABLEAU),
+            *(surface.function.real, surface.parameters, constants(bicycle), out),
+        )
+        steps, evaluations = steps + more, evaluations + count
+        if progress is not None:
+            progress(min(t, float(times[-1])))
+    ended = None
+    if status != kernel.DONE:
+        ended = f"no solution beyond t = {t:.6g} s: the equations of motion become singular"
+    return _motion(bicycle, surface, times, out[:index], steps, evaluations, ended)
+
+
+def simulate_modified_euler(
+    bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, times: np.ndarray, step: float = 1e-3
+) -> Motion:
+    """Integrate as the paper does (section 4.2): modified Euler with a fixed step, nothing projected.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    surface : Surface
+    q, qd : ndarray, shape (9,)
+        Start, on the constraints.
+    times : ndarray, shape (n,)
+        Output times, a uniform grid from 0 whose spacing is a multiple of ``step`` [s].
+    step : float
+        Step [s]; the paper's is 1 ms.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    ValueError
+        If ``times`` are no such grid.
+    """
+    stride = steps_per_output(times, step)
+    y = np.concatenate([q, qd, contact_parameters(bicycle, surface, np.asarray(q, float))])
+    out = np.empty((len(times), kernel.SIZE))
+    out[0] = y
+    count = stride * (len(times) - 1)
+    rows = 1 + kernel.modified_euler(
+        y, step, count, stride, surface.function.real, surface.parameters, constants(bicycle), out[1:]
+    )
+    ended = None if rows == len(times) else f"the state is no longer finite after t = {times[rows - 1]:.6g} s"
+    return _motion(bicycle, surface, times, out[:rows], (rows - 1) * stride, 2 * (rows - 1) * stride, ended)
+
+
+def steps_per_output(times: np.ndarray, step: float) -> int:
+    """Number of fixed steps between two outputs.
+
+    Raises
+    ------
+    ValueError
+        If the times are not a uniform grid from 0 or its spacing is no multiple of the step.
+    """
+    if len(times) < 2 or times[0] != 0:
+        raise ValueError("output times must be a grid of two or more that starts at 0")
+    spacing = float(times[-1]) / (len(times) - 1)
+    if not np.allclose(times, spacing * np.arange(len(times)), rtol=0, atol=1e-9 * spacing):
+        raise ValueError("output times must be evenly spaced for an engine of fixed step")
+    stride = round(spacing / step)
+    if stride < 1 or abs(stride * step - spacing) > 1e-9 * spacing:
+        raise ValueError(
+            f"step {step!r} s does not divide the output interval {spacing!r} s; "
+            f"{spacing / max(1, np.ceil(spacing / step)):.6g} s would"
+        )
+    return stride

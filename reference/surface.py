@@ -1,0 +1,156 @@
+"""Surfaces z = f(x, y): what the kernels need of the ground is its height, gradient and Hessian.
+
+A surface is a pair of compiled functions (real, and complex for the complex step) and an array of
+parameters, so a kernel is compiled once and takes any surface as data.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numba import cfunc, types
+
+from .kernels.vector import jit
+
+_PARAMETERS = types.Array(types.float64, 1, "C")
+
+
+def _signature(scalar: Any) -> Any:
+    return types.UniTuple(scalar, 6)(scalar, scalar, _PARAMETERS)
+
+
+@dataclass(frozen=True)
+class SurfaceFunction:
+    """A height function compiled for real and for complex arguments."""
+
+    real: Any
+    complex: Any
+
+
+def surface_function(function: Callable[..., tuple]) -> SurfaceFunction:
+    """Compile ``function(x, y, parameters) -> (f, fx, fy, fxx, fxy, fyy)`` for the kernels.
+
+    All six results must be of the type of ``x`` (write ``0 * x`` for a zero), and the function must be
+    analytic: no `abs`, no comparison of ``x`` or ``y`` other than through its real part.
+
+    Parameters
+    ----------
+    function : callable
+        Height [m], gradient [-] and Hessian [1/m] at (x, y) [m], in numba's subset of Python.
+
+    Returns
+    -------
+    SurfaceFunction
+    """
+    return SurfaceFunction(
+        cfunc(_signature(types.float64), cache=True)(function),
+        cfunc(_signature(types.complex128), cache=True)(function),
+    )
+
+
+class Surface(Protocol):
+    """Any smooth ground z = f(x, y) of gravity's half space."""
+
+    @property
+    def function(self) -> SurfaceFunction:
+        """The compiled height function."""
+        ...
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Its parameters, shape (k,), float64."""
+        ...
+
+
+@surface_function
+def _paraboloid(x, y, parameters):
+    alpha = parameters[0]
+    curvature = 2 * alpha + 0 * x
+    return alpha * (x * x + y * y), 2 * alpha * x, 2 * alpha * y, curvature, 0 * x, curvature
+
+
+@surface_function
+def _plane(x, y, parameters):
+    zero = 0 * x
+    return zero, zero, zero, zero, zero, zero
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The horizontal plane z = 0."""
+
+    @property
+    def function(self) -> SurfaceFunction:
+        """The compiled height function."""
+        return _plane
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """No parameters; one unused entry, shape (1,)."""
+        return np.zeros(1)
+
+
+@dataclass(frozen=True)
+class Paraboloid:
+    """The bowl z = alpha (x^2 + y^2) of Xiong et al. (2020), section 3.1.
+
+    Parameters
+    ----------
+    alpha : float
+        Shape parameter [1/m]; 0 gives the plane.
+
+    Raises
+    ------
+    ValueError
+        If alpha is negative or not finite.
+    """
+
+    alpha: float
+
+    def __post_init__(self) -> None:
+        number = isinstance(self.alpha, int | float) and not isinstance(self.alpha, bool)
+        if not (number and math.isfinite(self.alpha) and self.alpha >= 0):
+            raise ValueError(f"alpha is {self.alpha!r}; it must be a finite number >= 0")
+
+    @property
+    def function(self) -> SurfaceFunction:
+        """The compiled height function."""
+        return _paraboloid
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Array of alpha, shape (1,)."""
+        return np.array([float(self.alpha)])
+
+
+@jit
+def _evaluate(function, parameters, x, y):
+    out = np.empty((x.size, 6))
+    for i in range(x.size):
+        f, fx, fy, fxx, fxy, fyy = function(x[i], y[i], parameters)
+        out[i, 0], out[i, 1], out[i, 2] = f, fx, fy
+        out[i, 3], out[i, 4], out[i, 5] = fxx, fxy, fyy
+    return out
+
+
+def evaluate(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Height, gradient and Hessian at points.
+
+    Parameters
+    ----------
+    surface : Surface
+    x, y : ndarray
+        Coordinates of any common shape (...) [m].
+
+    Returns
+    -------
+    ndarray, shape (..., 6)
+        f [m], fx, fy [-], fxx, fxy, fyy [1/m].
+    """
+    x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+    flat = _evaluate(surface.function.real, surface.parameters, x.ravel(), y.ravel())
+    return flat.reshape(*x.shape, 6)

@@ -1,0 +1,1 @@
+"""What to run: declared scenarios, the runner and the command."""

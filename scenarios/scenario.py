@@ -1,0 +1,219 @@
+"""The schema of a scenario file: TOML in, validated data out."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from reference.bicycle import Bicycle
+
+LIBRARY = files("scenarios") / "library"
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class PlaneTable(_Table):
+    """Level ground."""
+
+    kind: Literal["plane"]
+
+
+class ParaboloidTable(_Table):
+    """The bowl z = alpha (x^2 + y^2)."""
+
+    kind: Literal["paraboloid"]
+    alpha: float = Field(ge=0, description="shape [1/m]")
+
+
+class Near(_Table):
+    """Angles that a circular motion is near to."""
+
+    lean: float
+    steer: float
+
+
+class CircularTable(_Table):
+    """A circular motion to start from."""
+
+    kind: Literal["circular"] = "circular"
+    rear_rate: float = Field(gt=0, description="rear-wheel rate [rad/s]")
+    family: Literal[1, 2, 3, 4] | None = None
+    near: Near | None = None
+
+    @model_validator(mode="after")
+    def _determined(self) -> CircularTable:
+        if self.family is None and self.near is None:
+            raise ValueError("a circular motion needs family = 1 to 4, near = { lean, steer }, or both")
+        return self
+
+
+class UprightTable(_Table):
+    """A straight upright start along x, the rear contact in the origin."""
+
+    kind: Literal["upright"]
+    speed: float = Field(gt=0, description="forward speed [m/s]")
+
+
+class Perturbation(_Table):
+    """Added to the independent variables of the start; the rest is solved."""
+
+    x: float = 0.0
+    y: float = 0.0
+    lean: float = 0.0
+    steer: float = 0.0
+    lean_rate: float = 0.0
+    steer_rate: float = 0.0
+    rear_rate: float = 0.0
+
+
+class Simulation(_Table):
+    """How long, and how often to report."""
+
+    duration: float = Field(gt=0, le=1e5, description="[s]")
+    output_rate: float = Field(100.0, gt=0, le=1e5, description="[1/s]")
+
+    @model_validator(mode="after")
+    def _whole_samples(self) -> Simulation:
+        samples = self.duration * self.output_rate
+        if samples > 5e6:
+            raise ValueError(f"duration x output_rate is {samples:.3g} samples; at most 5e6 fit a run folder")
+        if samples < 0.999 or abs(samples - round(samples)) > 1e-6 * samples:
+            raise ValueError(
+                f"duration {self.duration!r} s is no whole number of output intervals of {1 / self.output_rate!r} s"
+            )
+        return self
+
+
+class Criterion(_Table):
+    """A verdict that a benchmark asks of every engine."""
+
+    energy_variation: float = Field(gt=0, description="limit of 100 (Emax - Emin) / E(0) [percent]")
+
+
+class Scenario(_Table):
+    """A scenario as its file declares it."""
+
+    title: str = Field(min_length=1)
+    tags: tuple[str, ...] = ()
+    surface: Annotated[PlaneTable | ParaboloidTable, Field(discriminator="kind")]
+    motion: Annotated[CircularTable | UprightTable, Field(discriminator="kind")]
+    perturbation: Perturbation = Perturbation()
+    simulation: Simulation
+    criterion: Criterion | None = None
+    bicycle: dict[str, float] = {}
+    engines: dict[str, dict[str, Any]] = {}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _circular_by_default(cls, data: Any) -> Any:
+        if isinstance(data, Mapping) and isinstance(data.get("motion"), Mapping) and "kind" not in data["motion"]:
+            return {**data, "motion": {"kind": "circular", **data["motion"]}}
+        return data
+
+    @model_validator(mode="after")
+    def _bicycle_exists(self) -> Scenario:
+        self.make_bicycle()
+        return self
+
+    def make_bicycle(self) -> Bicycle:
+        """Build the benchmark bicycle with this scenario's overrides.
+
+        Raises
+        ------
+        ValueError
+            If a name is unknown or a value is not possible.
+        """
+        unknown = sorted(set(self.bicycle) - set(Bicycle.__dataclass_fields__))
+        if unknown:
+            names = ", ".join(Bicycle.__dataclass_fields__)
+            raise ValueError(f"bicycle parameter {unknown[0]!r} is unknown; there are {names}")
+        return Bicycle(**self.bicycle)
+
+
+class ScenarioError(ValueError):
+    """A scenario that cannot be used: one line that says what, where and what would be right."""
+
+
+def library_names() -> list[str]:
+    """Names of the library's scenarios, sorted."""
+    return sorted(entry.name.removesuffix(".toml") for entry in LIBRARY.iterdir() if entry.name.endswith(".toml"))
+
+
+def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tuple[str, Scenario]:
+    """Read a scenario by library name or by path, apply changes, validate.
+
+    Parameters
+    ----------
+    source : str
+        A library name, or a path to a TOML file.
+    changes : mapping, optional
+        Dotted key to value, e.g. ``{"simulation.duration": 5.0}``.
+
+    Returns
+    -------
+    name : str
+        The library name or the file's stem.
+    scenario : Scenario
+
+    Raises
+    ------
+    ScenarioError
+        With one line.
+    """
+    if source in library_names():
+        name, text = source, (LIBRARY / f"{source}.toml").read_text(encoding="utf-8")
+    else:
+        path = Path(source)
+        if path.suffix != ".toml":
+            raise ScenarioError(
+                f"no scenario {source!r} in the library; there are {', '.join(library_names())}, "
+                "or give a path to a .toml file"
+            )
+        try:
+            name, text = path.stem, path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+            raise ScenarioError(f"{source}: cannot be read: {reason}") from error
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{source}: not valid TOML: {error}") from error
+    for key, value in (changes or {}).items():
+        _put(data, key, value)
+    return name, validate(data, source)
+
+
+def validate(data: Mapping[str, Any], source: str) -> Scenario:
+    """Validate a scenario's data; the first thing wrong makes the one line of a `ScenarioError`."""
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError as error:
+        raise ScenarioError(f"{source}: {one_line(error)}") from error
+
+
+def one_line(error: ValidationError) -> str:
+    """Say the first thing wrong in one line: where, what, what came."""
+    first = error.errors()[0]
+    # Discriminator values appear in the location of a union's member: they are no keys of the file.
+    where = ".".join(str(part) for part in first["loc"] if part not in ("circular", "upright", "plane", "paraboloid"))
+    message = first["msg"].removeprefix("Value error, ").replace("\n", " ")
+    came = first.get("input")
+    shown = "" if isinstance(came, Mapping | BaseModel) or first["type"] == "missing" else f" (it is {came!r})"
+    more = len(error.errors()) - 1
+    return f"{where}: {message}{shown}".lstrip(": ") + (f"; and {more} more" if more else "")
+
+
+def _put(data: dict[str, Any], key: str, value: Any) -> None:
+    *tables, last = key.split(".")
+    for table in tables:
+        data = data.setdefault(table, {})
+        if not isinstance(data, dict):
+            raise ScenarioError(f"--set {key}: {table} is no table")
+    data[last] = value

@@ -1,0 +1,102 @@
+"""From a scenario to a problem: the motion is computed, disturbed and put on the constraints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from engines.engine import Problem
+from reference.bicycle import Bicycle
+from reference.circular import CircularMotion
+from reference.dae import consistent_state
+from reference.families import find_motion
+from reference.kinematics import LEAN, REAR_ANGLE, STEER, YAW
+from reference.stability import growth_rate, linearise
+from reference.surface import Paraboloid, Plane, Surface
+
+from .scenario import CircularTable, ParaboloidTable, Scenario, ScenarioError
+
+
+@dataclass(frozen=True)
+class Start:
+    """A problem with what is known of the motion that it starts from.
+
+    Attributes
+    ----------
+    problem : Problem
+    family : int or None
+        Family of the circular motion; None for an upright start.
+    motion : CircularMotion or None
+    growth_rate : float
+        Largest real part of the motion's eigenvalues that symmetry does not fix [1/s].
+    size : float
+        Radius of the circle of D, or the wheelbase for a straight start [m].
+    """
+
+    problem: Problem
+    family: int | None
+    motion: CircularMotion | None
+    growth_rate: float
+    size: float
+
+
+def make_surface(scenario: Scenario) -> Surface:
+    """Surface of a scenario."""
+    table = scenario.surface
+    return Paraboloid(table.alpha) if isinstance(table, ParaboloidTable) else Plane()
+
+
+def make_start(scenario: Scenario) -> Start:
+    """Compute a scenario's start.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such motion, or its disturbed state cannot be reached.
+    """
+    bicycle, surface = scenario.make_bicycle(), make_surface(scenario)
+    try:
+        family, motion, q, qd = _undisturbed(scenario, bicycle, surface)
+        straight = linearise(bicycle, surface, q, qd)
+        rate = growth_rate(surface, straight.eigenvalues, float(qd[YAW]))
+        q, qd = _disturbed(scenario, bicycle, surface, q, qd)
+    except ValueError as error:
+        raise ScenarioError(f"motion: {error}") from error
+    simulation = scenario.simulation
+    samples = round(simulation.duration * simulation.output_rate)
+    # Each time is rounded once: i / rate, not a sum of steps.
+    times = np.arange(samples + 1) / simulation.output_rate
+    size = float(np.hypot(*motion.position[:2])) if motion is not None else bicycle.wheelbase
+    return Start(Problem(bicycle, surface, q, qd, times), family, motion, rate, size)
+
+
+def _undisturbed(
+    scenario: Scenario, bicycle: Bicycle, surface: Surface
+) -> tuple[int | None, CircularMotion | None, np.ndarray, np.ndarray]:
+    table = scenario.motion
+    if isinstance(table, CircularTable):
+        alpha = surface.alpha if isinstance(surface, Paraboloid) else 0.0
+        near = (table.near.lean, table.near.steer) if table.near is not None else None
+        family, motion = find_motion(bicycle, alpha, table.rear_rate, table.family, near)
+        return family, motion, *motion.state()
+    rates = (0.0, 0.0, table.speed / bicycle.rear_wheel_radius)
+    q, qd = consistent_state(bicycle, surface, (float(bicycle.reference_point[0]), 0.0), 0.0, 0.0, rates)
+    return None, None, q, qd
+
+
+def _disturbed(
+    scenario: Scenario, bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    change = scenario.perturbation
+    if change == type(change)():
+        return q, qd
+    return consistent_state(
+        bicycle,
+        surface,
+        (q[0] + change.x, q[1] + change.y),
+        q[LEAN] + change.lean,
+        q[STEER] + change.steer,
+        (qd[LEAN] + change.lean_rate, qd[STEER] + change.steer_rate, qd[REAR_ANGLE] + change.rear_rate),
+        guess=(float(q[2]), float(q[5])),
+    )
