@@ -128,6 +128,16 @@ class Engine(Protocol):
         """The model of its settings; every field has a default."""
         ...
 
+    def check(self, problem: Problem, settings: Any) -> None:
+        """Refuse a problem that this engine cannot run with these settings, before anything is computed.
+
+        Raises
+        ------
+        ValueError
+            With one line that says what is wrong and what would be right.
+        """
+        ...
+
     def step_noise(self, settings: Any) -> float:
         """Relative error that one step may add beyond its method: round-off and unconverged iterations."""
         ...

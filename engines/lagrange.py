@@ -10,7 +10,7 @@ from pydantic import Field
 
 from reference.contact import observe
 from reference.kinematics import body_positions, quaternions, rotations
-from reference.simulate import simulate, simulate_modified_euler
+from reference.simulate import simulate, simulate_modified_euler, steps_per_output
 
 from .engine import REFERENCE, EngineError, Problem, Progress, Settings, Trajectory
 
@@ -36,6 +36,11 @@ class LagrangeEngine:
     def version(self) -> str:
         """Version of this suite."""
         return version("velodrome")
+
+    def check(self, problem: Problem, settings: LagrangeSettings) -> None:
+        """Refuse output times that the fixed step does not meet; see `engines.engine.Engine`."""
+        if settings.integrator == "modified-euler":
+            steps_per_output(problem.times, settings.step)
 
     def step_noise(self, settings: LagrangeSettings) -> float:
         """Relative error that a step may add beyond its method: the tolerance itself, or round-off."""

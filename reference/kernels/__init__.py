@@ -8,6 +8,9 @@ when a kernel that it calls from another file does; so the cache's folder carrie
 kernels, and a changed kernel starts a new one.
 """
 
+# numba fills its configuration in at run time.
+# pyright: reportAttributeAccessIssue=false
+
 import hashlib
 from pathlib import Path
 

@@ -1,0 +1,29 @@
+PYTHON ?= python3
+BIN := .venv/bin
+# The stamp's time is that of the last set-up: a changed list of packages sets up again.
+STAMP := .venv/set-up
+
+.PHONY: run test test-all lint check
+
+run: $(STAMP)
+	$(BIN)/velodrome run q2-plus
+
+test: $(STAMP)
+	$(BIN)/python -m pytest
+
+test-all: $(STAMP)
+	$(BIN)/python -m pytest -m ""
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+
+check: $(STAMP)
+	$(BIN)/velodrome check
+
+$(STAMP): pyproject.toml constraints.txt
+	$(PYTHON) -c 'import sys; sys.exit("velodrome needs Python 3.11 or newer") if sys.version_info < (3, 11) else None'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	touch $@

@@ -1,0 +1,1 @@
+"""The bicycle in Exudyn."""

@@ -1,0 +1,155 @@
+"""The bicycle as the engine's multibody system: four rigid bodies, three revolute joints, two wheels on the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import exudyn as exu
+import numpy as np
+from exudyn.itemInterface import SensorBody
+from exudyn.rigidBodyUtilities import RigidBodyInertia
+
+from engines.engine import Problem
+from reference.bicycle import BODIES, Bicycle
+from reference.kinematics import angular_velocities, body_positions, body_velocities, rotations
+
+Joint = TypeVar("Joint")
+AddJoint = Callable[[exu.MainSystem, dict[str, Any], float], Joint]
+
+LEFT = np.array([0.0, 1.0, 0.0])
+
+
+@dataclass(frozen=True)
+class Model(Generic[Joint]):
+    """An assembled system, ready to solve.
+
+    Attributes
+    ----------
+    container : exudyn.SystemContainer
+        Owner of the system; it must outlive it.
+    system : exudyn.MainSystem
+    joints : tuple
+        What the wheels' joint factory returned, rear then front.
+    sensors : tuple of dict
+        Per body, in the order of `BODIES`, sensor numbers of position, velocity, rotation and spin.
+    """
+
+    container: exu.SystemContainer
+    system: exu.MainSystem
+    joints: tuple[Joint, Joint]
+    sensors: tuple[dict[str, Any], ...]
+
+
+def build_model(problem: Problem, add_joint: AddJoint[Joint]) -> Model[Joint]:
+    """Build and assemble the bicycle in its initial state.
+
+    Parameters
+    ----------
+    problem : Problem
+        Bicycle and initial state; its surface belongs to the wheels' joint.
+    add_joint : callable
+        ``(system, wheel, radius) -> joint`` puts one wheel on the ground. ``wheel`` is what
+        ``CreateRigidBody`` returned; its axle is the y axis.
+    """
+    container = exu.SystemContainer()
+    system = container.AddSystem()
+    bicycle = problem.bicycle
+    bodies = _add_bodies(system, problem)
+    _connect(system, bicycle, problem.q, [body["bodyNumber"] for body in bodies])
+    radii = (bicycle.rear_wheel_radius, bicycle.front_wheel_radius)
+    rear, front = (add_joint(system, body, radius) for body, radius in zip(bodies[2:], radii, strict=True))
+    sensors = tuple(_watch(system, body["bodyNumber"]) for body in bodies)
+    system.Assemble()
+    return Model(container, system, (rear, front), sensors)
+
+
+def _add_bodies(system: exu.MainSystem, problem: Problem) -> list[dict[str, Any]]:
+    bicycle, q, qd = problem.bicycle, problem.q[None], problem.qd[None]
+    position, rotation = body_positions(bicycle, q)[0], rotations(bicycle, q)[0]
+    velocity, spin = body_velocities(bicycle, q, qd)[0], angular_velocities(bicycle, q, qd)[0]
+    bodies = []
+    for i, body in enumerate(BODIES):
+        mass: Any = bicycle.body_mass(body)
+        inertia = RigidBodyInertia(mass=mass, inertiaTensor=bicycle.inertia(body))
+        bodies.append(
+            system.CreateRigidBody(
+                name=body,
+                inertia=inertia,
+                referencePosition=position[i],
+                referenceRotationMatrix=rotation[i],
+                initialVelocity=velocity[i],
+                initialAngularVelocity=spin[i],
+                gravity=[0.0, 0.0, -bicycle.gravity],
+                nodeType=exu.NodeType.RotationEulerParameters,
+                show=False,
+                returnDict=True,
+            )
+        )
+    return bodies
+
+
+def _connect(system: exu.MainSystem, bicycle: Bicycle, q: np.ndarray, bodies: list[Any]) -> None:
+    """Hinge the wheels in their frames and the front frame in the rear one, along the axes at the start."""
+    rear_frame, front_frame, rear_wheel, front_wheel = bodies
+    rotation, position = rotations(bicycle, q[None])[0], body_positions(bicycle, q[None])[0]
+    for pair, point, axis in (
+        ([rear_wheel, rear_frame], position[2], rotation[0] @ LEFT),
+        ([front_wheel, front_frame], position[3], rotation[1] @ LEFT),
+        ([rear_frame, front_frame], q[:3], rotation[0] @ bicycle.steer_axis),
+    ):
+        system.CreateRevoluteJoint(itemNumbers=pair, position=point, axis=axis, show=False)
+
+
+def _watch(system: exu.MainSystem, body: Any) -> dict[str, Any]:
+    """Sensors of a body's motion, stored in memory."""
+    kinds: dict[str, Any] = {
+        "position": exu.OutputVariableType.Position,
+        "velocity": exu.OutputVariableType.Velocity,
+        "rotation": exu.OutputVariableType.RotationMatrix,
+        "spin": exu.OutputVariableType.AngularVelocity,
+    }
+    return {
+        name: system.AddSensor(
+            SensorBody(bodyNumber=body, outputVariableType=kind, storeInternal=True, writeToFile=False)
+        )
+        for name, kind in kinds.items()
+    }
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Motion of the four bodies as the engine computed it, all in inertial axes.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        Sampling times [s].
+    position, velocity, spin : ndarray, shape (n, 4, 3)
+        Of the centres of mass [m, m/s] and angular velocities [rad/s].
+    rotation : ndarray, shape (n, 4, 3, 3)
+        Body to inertial axes.
+    """
+
+    time: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    rotation: np.ndarray
+    spin: np.ndarray
+
+
+def stored(model: Model[Any], sensor: Any) -> np.ndarray:
+    """Samples of a sensor after a run, shape (n, 1 + k): time and values."""
+    return np.atleast_2d(model.system.GetSensorStoredData(sensor))
+
+
+def read_motion(model: Model[Any]) -> Motion:
+    """Collect the samples of the bodies' sensors after a run."""
+    values = {
+        name: np.stack([stored(model, sensors[name])[:, 1:] for sensors in model.sensors], axis=1)
+        for name in ("position", "velocity", "rotation", "spin")
+    }
+    time = stored(model, model.sensors[0]["position"])[:, 0]
+    rotation = np.ascontiguousarray(values["rotation"].reshape(len(time), 4, 3, 3))
+    return Motion(time, values["position"], values["velocity"], rotation, values["spin"])

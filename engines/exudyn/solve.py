@@ -1,0 +1,146 @@
+"""Integration by the engine's generalized-alpha solver."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+
+import exudyn as exu
+
+from engines.engine import EngineError, Progress
+
+PROGRESS_STEPS = 100
+
+
+@dataclass(frozen=True)
+class Integration:
+    """How to integrate: until ``end`` [s] in equal ``steps``, with ``samples`` evenly spaced samples after the start.
+
+    The rest are parameters of the solver, see `engines.exudyn.engine.ExudynSettings`.
+    """
+
+    end: float
+    steps: int
+    samples: int
+    spectral_radius: float
+    newton_relative_tolerance: float
+    newton_absolute_tolerance: float
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Steps done, process CPU time [s], and why the integration ended early (None if it did not)."""
+
+    steps: int
+    cpu_time: float
+    ended: str | None
+
+
+def integrate(
+    system: exu.MainSystem, integration: Integration, start: Callable[[], None], progress: Progress
+) -> Outcome:
+    """Integrate a system from its initial state; its sensors hold the result.
+
+    Parameters
+    ----------
+    system : exudyn.MainSystem
+        Assembled.
+    integration : Integration
+    start : callable
+        Called once, after the initial accelerations and before the first step.
+    progress : callable
+        Called now and then with the simulated time [s]; what it raises ends the run and is raised again.
+
+    Raises
+    ------
+    EngineError
+        If the engine did not come to the first step.
+    """
+    raised: list[BaseException] = []
+    taken = 0
+    step = integration.end / integration.steps
+
+    with _interruptible() as interrupted:
+
+        def before_step(_system, _time):
+            nonlocal taken
+            try:
+                if taken == 0:
+                    start()
+                elif taken % PROGRESS_STEPS == 0:
+                    progress(taken * step)
+            except BaseException as error:  # an exception must not cross the engine, which would swallow it
+                raised.append(error)
+            taken += 1
+            return not (raised or interrupted.is_set())
+
+        system.SetPreStepUserFunction(before_step)
+        solver = exu.MainSolverImplicitSecondOrder()
+        settings = _simulation_settings(integration)
+        begin = time.process_time()
+        success = False
+        with suppress(exu.SolverError):  # raised where the Jacobian is singular
+            success = solver.SolveSystem(system, settings)  # pyright: ignore[reportCallIssue]
+        cpu_time = time.process_time() - begin
+    if raised:
+        raise raised[0]
+    if interrupted.is_set():  # by a signal that the caller has made harmless
+        return Outcome(taken, cpu_time, "interrupted")
+    if success:
+        return Outcome(taken, cpu_time, None)
+    failure = "the Jacobian is singular" if solver.conv.linearSolverFailed else "Newton's method did not converge"
+    if taken == 0:
+        raise EngineError(f"exudyn could not start: {failure}")
+    return Outcome(max(taken - 1, 0), cpu_time, f"{failure} at t = {taken * step:.6g} s")
+
+
+def _simulation_settings(integration: Integration) -> exu.SimulationSettings:
+    settings = exu.SimulationSettings()
+    settings.solution.file.write = False
+    settings.solution.sensors.writePeriod = integration.end / integration.samples
+    method = settings.timeIntegration
+    method.verboseMode = 0
+    method.numberOfSteps = integration.steps
+    method.endTime = integration.end
+    # A refused step ends the run: a shorter one would miss the output times and hide the failure.
+    method.adaptiveStep = False
+    method.generalizedAlpha.spectralRadius = integration.spectral_radius
+    method.newton.useModifiedNewton = True
+    method.newton.modifiedNewtonJacUpdatePerStep = True
+    method.newton.relativeTolerance = integration.newton_relative_tolerance
+    method.newton.absoluteTolerance = integration.newton_absolute_tolerance
+    return settings
+
+
+@contextmanager
+def silent() -> Iterator[None]:
+    """Keep the engine's messages off the standard output."""
+    before = exu.config.printToConsole
+    exu.config.printToConsole = False
+    try:
+        yield
+    finally:
+        exu.config.printToConsole = before
+
+
+@contextmanager
+def _interruptible() -> Iterator[threading.Event]:
+    """Hold back SIGINT until the integration has stopped.
+
+    Python would raise inside a user function, from where the engine makes an error of its own of it.
+    """
+    interrupted = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield interrupted
+        return
+    before = signal.signal(signal.SIGINT, lambda _number, _frame: interrupted.set())
+    try:
+        yield interrupted
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if interrupted.is_set():
+            signal.raise_signal(signal.SIGINT)

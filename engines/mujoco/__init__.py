@@ -1,0 +1,1 @@
+"""MuJoCo on the bicycle: the model as its users build it."""

@@ -1,0 +1,183 @@
+"""What a trajectory is worth: errors against the reference, drift, slip, energy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from engines.engine import Trajectory
+from reference.bicycle import Bicycle
+from reference.kinematics import REAR_ANGLE
+from reference.surface import Surface, evaluate
+
+_FALLEN_HEIGHT = 0.1  # of the upright height of the rear frame's centre of mass: a lean of some 84 degrees
+
+
+def metrics(
+    trajectory: Trajectory,
+    reference: Trajectory | None,
+    bicycle: Bicycle,
+    surface: Surface,
+    growth_rate: float,
+    size: float,
+    circular: bool,
+) -> dict[str, Any]:
+    """Measure a trajectory.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    reference : Trajectory or None
+        What it is held against, sampled at the same times (at least as long); None for the reference
+        itself.
+    bicycle : Bicycle
+    surface : Surface
+    growth_rate : float
+        Largest real part of the motion's eigenvalues that symmetry does not fix [1/s].
+    size : float
+        Radius of the circle, or the wheelbase for a straight motion [m].
+    circular : bool
+        Whether the motion circles the z axis, so that radius and phase mean something.
+
+    Returns
+    -------
+    dict
+        The quantities of ``metrics.json``, JSON values; None where an engine does not give what a
+        quantity needs, or the quantity has no meaning.
+    """
+    result = _errors(trajectory, reference)
+    result |= _drifts(trajectory, reference, circular)
+    result |= _energy(trajectory)
+    result |= _constraints(trajectory)
+    simulated = float(trajectory.time[-1] - trajectory.time[0])
+    result |= {
+        "steps": trajectory.steps,
+        "cpu_time": trajectory.cpu_time,
+        "real_time_factor": simulated / trajectory.cpu_time if trajectory.cpu_time > 0 else None,
+        "fell_at": fell_at(trajectory, bicycle, surface),
+        "ended": trajectory.ended,
+    }
+    result["horizon"] = None if reference is None else horizon(trajectory, reference, growth_rate, size)
+    return {name: _finite(value) for name, value in result.items()}
+
+
+def _finite(value: Any) -> Any:
+    """Replace what JSON cannot carry: a number that is none becomes None."""
+    if isinstance(value, dict):
+        return {name: _finite(part) for name, part in value.items()}
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def position_errors(trajectory: Trajectory, reference: Trajectory) -> np.ndarray:
+    """Distance of D from the reference's, sample by sample, shape (n,) [m]."""
+    n = _common(trajectory, reference)
+    return np.linalg.norm(trajectory.q[:n, :3] - reference.q[:n, :3], axis=1)
+
+
+def orientation_errors(trajectory: Trajectory, reference: Trajectory) -> np.ndarray:
+    """Angle between the rear frames, sample by sample, shape (n,) [rad]."""
+    n = _common(trajectory, reference)
+    a, b = trajectory.body_quaternion[:n, 0], reference.body_quaternion[:n, 0]
+    # 2 asin(|a - +-b| / 2) resolves small angles, which the arc cosine of a product does not.
+    chord = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
+    return 4 * np.arcsin(np.minimum(chord / 2, 1.0))
+
+
+def fell_at(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> float | None:
+    """First sample at which the rear frame's centre of mass is nearly on the ground [s], or None."""
+    centre = trajectory.body_position[:, 0]
+    ground = evaluate(surface, centre[:, 0], centre[:, 1])[:, 0]
+    low = np.flatnonzero(centre[:, 2] - ground < _FALLEN_HEIGHT * bicycle.rear_frame_z)
+    return float(trajectory.time[low[0]]) if len(low) else None
+
+
+def horizon(trajectory: Trajectory, reference: Trajectory, growth_rate: float, size: float) -> float | None:
+    """Time up to which the comparison means anything [s]; None where the motion amplifies no error.
+
+    An error grows like e0 exp(growth_rate t), e0 = C h^p. e0 is the largest that the samples allow while
+    the error is small against the motion, and the horizon is where the law reaches the motion's size.
+    """
+    if growth_rate <= 0:
+        return None
+    error = position_errors(trajectory, reference)
+    time = trajectory.time[: len(error)]
+    small = (error > 0) & (error < 1e-2 * size)
+    if not small.any():
+        return None
+    seed = float(np.max(np.log(error[small]) - growth_rate * time[small]))
+    return max(0.0, (np.log(size) - seed) / growth_rate)
+
+
+def _common(trajectory: Trajectory, reference: Trajectory) -> int:
+    n = min(len(trajectory.time), len(reference.time))
+    if not np.array_equal(trajectory.time[:n], reference.time[:n]):
+        raise ValueError(f"{trajectory.engine} and {reference.engine} are not sampled at the same times")
+    return n
+
+
+def _extremes(values: np.ndarray) -> dict[str, float]:
+    return {"max": float(values.max()), "end": float(values[-1])}
+
+
+def _errors(trajectory: Trajectory, reference: Trajectory | None) -> dict[str, Any]:
+    names = ("position_error", "orientation_error", "rear_rate_error", "contact_force_error")
+    result: dict[str, Any] = dict.fromkeys(names)
+    if reference is None:
+        return result
+    n = _common(trajectory, reference)
+    rate = np.abs(trajectory.qd[:n, REAR_ANGLE] - reference.qd[:n, REAR_ANGLE])
+    result["position_error"] = _extremes(position_errors(trajectory, reference))
+    result["orientation_error"] = _extremes(orientation_errors(trajectory, reference))
+    result["rear_rate_error"] = float(rate.max())
+    if trajectory.contact_force is not None and reference.contact_force is not None:
+        difference = np.linalg.norm(trajectory.contact_force[:n] - reference.contact_force[:n], axis=2)
+        # Relative to the largest force that the reference ever needs.
+        largest = np.linalg.norm(reference.contact_force[:n], axis=2).max()
+        result["contact_force_error"] = float(difference.max() / largest)
+    return result
+
+
+def _slope(time: np.ndarray, values: np.ndarray) -> float:
+    """Slope of the least-squares line [1/s]."""
+    centred = time - time.mean()
+    return float(centred @ (values - values.mean()) / (centred @ centred))
+
+
+def _drifts(trajectory: Trajectory, reference: Trajectory | None, circular: bool) -> dict[str, float | None]:
+    """Rates at which radius, phase and rear-wheel rate leave the reference's."""
+    names = ("radius_drift_rate", "phase_drift_rate", "rear_rate_drift_rate")
+    result: dict[str, float | None] = dict.fromkeys(names)
+    if reference is None or _common(trajectory, reference) < 2:
+        return result
+    n = _common(trajectory, reference)
+    time = trajectory.time[:n]
+    result["rear_rate_drift_rate"] = _slope(time, trajectory.qd[:n, REAR_ANGLE] - reference.qd[:n, REAR_ANGLE])
+    if circular:
+        here, there = trajectory.q[:n, :2], reference.q[:n, :2]
+        radius = np.hypot(here[:, 0], here[:, 1]) - np.hypot(there[:, 0], there[:, 1])
+        phase = np.arctan2(here[:, 1], here[:, 0]) - np.arctan2(there[:, 1], there[:, 0])
+        result["radius_drift_rate"] = _slope(time, radius)
+        result["phase_drift_rate"] = _slope(time, np.unwrap(phase))
+    return result
+
+
+def _energy(trajectory: Trajectory) -> dict[str, float | None]:
+    if trajectory.kinetic_energy is None or trajectory.potential_energy is None:
+        return {"energy_drift": None, "energy_drift_rate": None, "energy_variation": None}
+    energy = trajectory.kinetic_energy + trajectory.potential_energy
+    return {
+        "energy_drift": float(np.abs(energy - energy[0]).max() / abs(energy[0])),
+        "energy_drift_rate": _slope(trajectory.time, energy) if len(energy) > 1 else None,
+        "energy_variation": float(100 * np.ptp(energy) / abs(energy[0])),
+    }
+
+
+def _constraints(trajectory: Trajectory) -> dict[str, float | None]:
+    result: dict[str, float | None] = dict.fromkeys(("max_gap", "max_slip", "mean_slip"))
+    if trajectory.gap is not None:
+        result["max_gap"] = float(np.abs(trajectory.gap).max())
+    if trajectory.slip is not None:
+        speed = np.linalg.norm(trajectory.slip, axis=2)
+        result["max_slip"], result["mean_slip"] = float(speed.max()), float(speed.mean())
+    return result

@@ -1,0 +1,167 @@
+"""The curves of a recording: which quantity, under what title, computed how."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from engines.engine import REFERENCE, Trajectory
+from reference.kinematics import FRONT_ANGLE, LEAN, REAR_ANGLE, STEER, WHEELS, YAW
+from reference.surface import Surface
+
+from .ground import unit_normals
+
+# Sizes below this are round-off of quantities of order one: they have no logarithm worth a point.
+SMALLEST_SIZE = 1e-16
+
+NANOSECONDS = 1e9
+
+
+@dataclass(frozen=True)
+class Ride:
+    """One scenario as ridden by several engines.
+
+    Attributes
+    ----------
+    surface : Surface
+    trajectories : mapping of str to Trajectory
+        By engine name, in the order of display.
+    """
+
+    surface: Surface
+    trajectories: Mapping[str, Trajectory]
+
+    @property
+    def reference(self) -> Trajectory | None:
+        """The trajectory that the others are compared with, if there is one."""
+        return self.trajectories.get(REFERENCE)
+
+
+Values = Callable[[Ride, Trajectory], np.ndarray | None]
+
+
+@dataclass(frozen=True)
+class Plot:
+    """One view of curves, one curve an engine.
+
+    Attributes
+    ----------
+    key : str
+        Name in entity paths: ``/plots/<key>/<engine>``.
+    title : str
+        Quantity and unit.
+    values : callable
+        (ride, trajectory) to samples of shape (n,); NaN where there is none, None where the engine
+        does not give the quantity.
+    span : float
+        Least height of the axis, so that round-off of a constant does not fill the view; 0 leaves
+        the axis to the viewer.
+    """
+
+    key: str
+    title: str
+    values: Values
+    span: float = 0.0
+
+
+def nanoseconds(time: np.ndarray) -> np.ndarray:
+    """Times [s] rounded to whole nanoseconds, int64."""
+    return np.round(np.asarray(time, float) * NANOSECONDS).astype(np.int64)
+
+
+def log_size(values: np.ndarray) -> np.ndarray:
+    """log10 of the size of values; NaN where the size is round-off or the value not finite."""
+    size = np.abs(values)
+    out = np.full(size.shape, np.nan)
+    kept = np.isfinite(size) & (size > SMALLEST_SIZE)
+    out[kept] = np.log10(size[kept])
+    return out
+
+
+def position_error(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
+    """Distance of D from the reference's [m], shape (n,), NaN at times the reference lacks."""
+    reference = ride.reference
+    if reference is None or trajectory is reference:
+        return None
+    _, ours, theirs = np.intersect1d(nanoseconds(trajectory.time), nanoseconds(reference.time), return_indices=True)
+    out = np.full(len(trajectory.time), np.nan)
+    out[ours] = np.linalg.norm(trajectory.q[ours, :3] - reference.q[theirs, :3], axis=1)
+    return out
+
+
+def energy_change(_: Ride, trajectory: Trajectory) -> np.ndarray | None:
+    """Change of kinetic and potential energy since the start, as a share of the start's size [-]."""
+    if trajectory.kinetic_energy is None or trajectory.potential_energy is None:
+        return None
+    energy = trajectory.kinetic_energy + trajectory.potential_energy
+    return (energy - energy[0]) / abs(energy[0]) if energy[0] != 0 else None
+
+
+def normal_force(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
+    """Part of the contact forces along the surface's normal, shape (n, 2) [N]."""
+    if trajectory.contact_force is None or trajectory.contact_point is None:
+        return None
+    point = trajectory.contact_point
+    return np.einsum("nwi,nwi->nw", trajectory.contact_force, unit_normals(ride.surface, point[..., 0], point[..., 1]))
+
+
+def friction_used(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
+    """Tangential over normal contact force, shape (n, 2); NaN where the ground does not push."""
+    normal = normal_force(ride, trajectory)
+    if normal is None or trajectory.contact_force is None:
+        return None
+    tangential = np.sqrt(np.maximum((trajectory.contact_force**2).sum(-1) - normal**2, 0))
+    return np.divide(tangential, normal, out=np.full_like(normal, np.nan), where=normal > 0)
+
+
+def _column(get: Values, index: int) -> Values:
+    def values(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
+        both = get(ride, trajectory)
+        return None if both is None else both[:, index]
+
+    return values
+
+
+def _log(get: Values) -> Values:
+    def values(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
+        linear = get(ride, trajectory)
+        return None if linear is None else log_size(linear)
+
+    return values
+
+
+def _gap(_: Ride, trajectory: Trajectory) -> np.ndarray | None:
+    return trajectory.gap
+
+
+def _slip(_: Ride, trajectory: Trajectory) -> np.ndarray | None:
+    return None if trajectory.slip is None else np.linalg.norm(trajectory.slip, axis=-1)
+
+
+ERROR = Plot("log_position_error", "log10 distance of D from the reference [m]", _log(position_error))
+RADIUS = Plot("radius", "distance of D from the z axis [m]", lambda _, run: np.hypot(run.q[:, 0], run.q[:, 1]), 0.05)
+ENERGY = Plot("energy_change", "relative energy change [-]", energy_change, 1e-6)
+LOG_ENERGY = Plot("log_energy_change", "log10 relative energy change [-]", _log(energy_change))
+
+STATES = (
+    Plot("lean", "lean [rad]", lambda _, run: run.q[:, LEAN], 0.02),
+    Plot("steer", "steer [rad]", lambda _, run: run.q[:, STEER], 0.02),
+    Plot("lean_rate", "lean rate [rad/s]", lambda _, run: run.qd[:, LEAN], 0.02),
+    Plot("yaw_rate", "yaw rate [rad/s]", lambda _, run: run.qd[:, YAW], 0.02),
+    Plot("rear_rate", "rear wheel rate [rad/s]", lambda _, run: run.qd[:, REAR_ANGLE], 0.1),
+    Plot("front_rate", "front wheel rate [rad/s]", lambda _, run: run.qd[:, FRONT_ANGLE], 0.1),
+)
+FORCES = (
+    *(Plot(f"{w}_normal_force", f"{w} normal force [N]", _column(normal_force, k), 10.0) for k, w in enumerate(WHEELS)),
+    *(
+        Plot(f"{w}_friction", f"{w} tangential / normal force [-]", _column(friction_used, k), 0.05)
+        for k, w in enumerate(WHEELS)
+    ),
+)
+CONSTRAINTS = (
+    *(Plot(f"{w}_log_gap", f"log10 {w} gap [m]", _column(_log(_gap), k)) for k, w in enumerate(WHEELS)),
+    *(Plot(f"{w}_log_slip", f"log10 {w} slip [m/s]", _column(_log(_slip), k)) for k, w in enumerate(WHEELS)),
+)
+PLOTS = (ERROR, RADIUS, LOG_ENERGY, ENERGY, *STATES, *FORCES, *CONSTRAINTS)

@@ -1,0 +1,101 @@
+"""The run in words and one table, computed from the metrics: Markdown for the recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from engines.engine import REFERENCE
+
+# (title, unit, metric, part of a metric that has parts): seven, so that a terminal of 80 columns holds them.
+COLUMNS: tuple[tuple[str, str, str, str | None], ...] = (
+    ("position error", "m", "position_error", "max"),
+    ("rotation error", "rad", "orientation_error", "max"),
+    ("force error", "1", "contact_force_error", None),
+    ("radius drift", "m/s", "radius_drift_rate", None),
+    ("energy drift", "1", "energy_drift", None),
+    ("largest slip", "m/s", "max_slip", None),
+    ("CPU time", "s", "cpu_time", None),
+)
+
+
+def cell(metrics: Mapping[str, Any], metric: str, part: str | None) -> str:
+    """Format a metric for a table: two digits, a dash where there is none."""
+    value = metrics.get(metric)
+    if isinstance(value, Mapping):
+        value = value.get(part)
+    return "–" if value is None else f"{value:.2g}"
+
+
+def remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]:
+    """Say what a reader must know before trusting an engine's row."""
+    lines = []
+    if metrics["fell_at"] is not None:
+        lines.append(f"{name} fell at {metrics['fell_at']:.2f} s")
+    if metrics["ended"] is not None:
+        lines.append(f"{name} ended early: {metrics['ended']}")
+    if metrics["horizon"] is not None and metrics["horizon"] < duration:
+        lines.append(
+            f"{name}: beyond {metrics['horizon']:.2f} s the motion's own instability makes the error meaningless"
+        )
+    return lines
+
+
+def summary(
+    title: str,
+    measured: Mapping[str, Mapping[str, Any]],
+    failures: Mapping[str, str],
+    verdicts: Sequence[Mapping[str, Any]],
+    growth_rate: float,
+    duration: float,
+) -> str:
+    """Markdown summary of a run.
+
+    Parameters
+    ----------
+    title : str
+    measured : mapping
+        Metrics by engine name.
+    failures : mapping
+        Reason by the name of an engine that gave no trajectory.
+    verdicts : sequence of mapping
+        As `scenarios.runner.judge` gives them.
+    growth_rate : float
+        Of the motion's own disturbances [1/s].
+    duration : float
+        Of the run [s].
+
+    Returns
+    -------
+    str
+    """
+    lines = [f"# {title}", "", _stability(growth_rate), ""]
+    lines += ["| engine | " + " | ".join(f"{name} [{unit}]" for name, unit, _, _ in COLUMNS) + " |"]
+    lines += ["|---|" + "---:|" * len(COLUMNS)]
+    for engine, values in measured.items():
+        cells = (cell(values, metric, part) for _, _, metric, part in COLUMNS)
+        lines.append(f"| {engine} | " + " | ".join(cells) + " |")
+    lines += [
+        "",
+        f"Errors are the largest over {duration:g} s, against `{REFERENCE}`; drifts are slopes of a line fit.",
+        "",
+    ]
+    for engine, values in measured.items():
+        lines += [f"- {line}" for line in remarks(engine, values, duration)]
+    lines += [f"- {engine} did not run: {reason}" for engine, reason in failures.items()]
+    for verdict in verdicts:
+        lines.append(f"- {verdict_line(verdict)}")
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def verdict_line(verdict: Mapping[str, Any]) -> str:
+    """One line on one verdict."""
+    value = "not done" if verdict["value"] is None else f"{verdict['value']:.3g}"
+    word = "holds" if verdict["holds"] else "falls short"
+    return f"{verdict['engine']}: {verdict['quantity']} {value}, limit {verdict['limit']:.3g}: {word}"
+
+
+def _stability(growth_rate: float) -> str:
+    if growth_rate < 0:
+        return f"The motion is Lyapunov stable: its slowest disturbance decays at {-growth_rate:.4g} 1/s."
+    return f"The motion is unstable: disturbances grow like exp({growth_rate:.4g} t / s)."

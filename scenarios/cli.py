@@ -1,0 +1,198 @@
+"""The command `velodrome`."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from engines.engine import engine_names, load_engine
+
+from . import present
+from .gate import check as check_gate
+from .gate import update as update_baselines
+from .runner import plan_run, run
+from .scenario import ScenarioError, library_names, load_scenario
+
+app = typer.Typer(
+    name="velodrome",
+    help="Cross-validation of multibody engines on a bicycle that rides hands-free in circles inside a bowl.",
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else.")]
+
+
+@app.command("list")
+def list_command(as_json: Json = False) -> None:
+    """Scenarios of the library and installed engines."""
+    scenarios = []
+    for name in library_names():
+        _, scenario = load_scenario(name)
+        scenarios.append({"name": name, "title": scenario.title, "tags": list(scenario.tags)})
+    engines = []
+    for name in engine_names():
+        engine = load_engine(name)
+        engines.append({"name": name, "version": engine.version, "gives": list(engine.gives)})
+    if as_json:
+        _print_json({"scenarios": scenarios, "engines": engines})
+        return
+    table = Table("scenario", "title", "tags", box=None, pad_edge=False)
+    for entry in scenarios:
+        table.add_row(entry["name"], entry["title"], ", ".join(entry["tags"]))
+    console = Console()
+    console.print(table)
+    console.print()
+    table = Table("engine", "version", "gives, beside coordinates and poses", box=None, pad_edge=False)
+    for entry in engines:
+        table.add_row(entry["name"], entry["version"], ", ".join(entry["gives"]))
+    console.print(table)
+
+
+@app.command("run")
+def run_command(
+    scenario: Annotated[list[str] | None, typer.Argument(help="Library names or paths to TOML files.")] = None,
+    engine: Annotated[list[str] | None, typer.Option(help="Run only this engine, beside the reference.")] = None,
+    tag: Annotated[str | None, typer.Option(help="Run all library scenarios with this tag.")] = None,
+    change: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Override a field, e.g. simulation.duration=5."),
+    ] = None,
+    duration: Annotated[float | None, typer.Option(help="Simulated time [s].")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for the run folders.")] = Path("runs"),
+    as_json: Json = False,
+) -> None:
+    """Run scenarios in every engine from the same computed start and compare with the reference."""
+    sources = [*(scenario or []), *(_tagged(tag) if tag is not None else [])]
+    if not sources:
+        raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
+    changes = dict(_assignment(text) for text in change or [])
+    if duration is not None:
+        changes["simulation.duration"] = duration
+    plans = [plan_run(*load_scenario(source, changes), wanted=engine) for source in dict.fromkeys(sources)]
+    console = Console(stderr=as_json)
+    outcomes = []
+    for plan in plans:
+        with present.Progress() as progress:
+            outcome = run(plan, out, progress.watch, progress.note)
+        outcomes.append((plan, outcome))
+        present.show_outcome(console, plan, outcome)
+        if outcome.interrupted:
+            break
+    if as_json:
+        _print_json({"runs": [present.outcome_json(plan, outcome) for plan, outcome in outcomes]})
+    if any(outcome.interrupted for _, outcome in outcomes):
+        raise typer.Exit(130)
+    if any(outcome.failures or not all(v["holds"] for v in outcome.verdicts) for _, outcome in outcomes):
+        raise typer.Exit(1)
+
+
+@app.command("circular")
+def circular_command(
+    alpha: Annotated[float, typer.Option(help="Shape of the bowl z = alpha (x² + y²) [1/m]; 0 is the plane.")],
+    rear_rate: Annotated[float, typer.Option(help="Rear-wheel rate [rad/s].")],
+    family: Annotated[int | None, typer.Option(help="Solution family, 1 to 4.")] = None,
+    near: Annotated[str | None, typer.Option(metavar="LEAN,STEER", help="Angles it is near to [rad].")] = None,
+    as_json: Json = False,
+) -> None:
+    """One circular motion: its 21 constants, contact forces, eigenvalues, verdict on stability."""
+    found = present.circular(alpha, rear_rate, family, _angles(near))
+    if as_json:
+        _print_json(found)
+    else:
+        present.show_circular(Console(), found)
+
+
+@app.command("check")
+def check_command(
+    update: Annotated[bool, typer.Option("--update", help="Write this run's values as the new baselines.")] = False,
+    as_json: Json = False,
+) -> None:
+    """The drift gate: run the gated scenarios and hold them against the committed baselines."""
+    console = Console(stderr=as_json)
+    with present.Progress() as progress:
+        verdicts, fresh = check_gate(progress.watch)
+    written = []
+    if update:
+        absent = [
+            verdict for _, verdict in verdicts if verdict.quantity == "run" and verdict.reason.startswith("did not")
+        ]
+        if absent:
+            raise ScenarioError(f"no baseline written: {absent[0].engine} {absent[0].reason}")
+        written = [str(path) for path in update_baselines(fresh)]
+    passes = update or all(verdict.passes for _, verdict in verdicts)
+    if as_json:
+        rows = [{"scenario": name} | verdict.as_json() for name, verdict in verdicts]
+        _print_json({"passes": passes, "updated": written, "verdicts": rows})
+    else:
+        present.show_verdicts(console, verdicts)
+        for path in written:
+            console.print(f"baseline written: {path}", soft_wrap=True)
+    if not passes:
+        raise typer.Exit(1)
+
+
+def _tagged(tag: str) -> list[str]:
+    tags = {name: load_scenario(name)[1].tags for name in library_names()}
+    names = [name for name in tags if tag in tags[name]]
+    if not names:
+        known = ", ".join(sorted({word for words in tags.values() for word in words}))
+        raise ScenarioError(f"--tag {tag}: no scenario has it; there are {known}")
+    return names
+
+
+def _assignment(text: str) -> tuple[str, Any]:
+    """Split KEY=VALUE; the value is TOML, or a plain word."""
+    key, equals, value = text.partition("=")
+    key = key.strip()
+    if not equals or not key or not all(key.split(".")):
+        raise ScenarioError(f"--set {text}: must be KEY=VALUE, e.g. simulation.duration=5")
+    try:
+        return key, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key, value
+
+
+def _angles(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        lean, steer = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ScenarioError(f"--near {text}: must be two angles LEAN,STEER in rad, e.g. 0.74,2.84") from None
+    return lean, steer
+
+
+def _print_json(data: Any) -> None:
+    print(json.dumps(data, indent=1, allow_nan=False))
+
+
+def main() -> None:
+    """Run the command; bad input ends with one line on stderr and exit status 2."""
+    status = 0
+    try:
+        status = app(sys.argv[1:] or ["--help"], standalone_mode=False)
+    except ScenarioError as error:
+        _complain(str(error))
+    except typer.TyperException as error:
+        _complain(error.format_message())
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except BrokenPipeError:
+        # The reader of a pipe (head, less) has gone: nothing is wrong here.
+        sys.stderr.close()
+        sys.exit(0)
+    sys.exit(status or 0)
+
+
+def _complain(message: str) -> None:
+    print(f"velodrome: {' '.join(message.split())}", file=sys.stderr)
+    sys.exit(2)

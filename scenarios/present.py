@@ -1,0 +1,185 @@
+"""What the command shows: progress, tables, JSON documents."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rich import progress as bars
+from rich.console import Console
+from rich.table import Table
+
+from reference.bicycle import Bicycle
+from reference.circular import CircularMotion
+from reference.contact import observe
+from reference.families import find_motion
+from reference.kinematics import YAW
+from reference.stability import growth_rate, linearise
+from reference.surface import Paraboloid
+from reports.drift import Verdict
+from reports.summary import COLUMNS, cell, remarks, verdict_line
+
+from .runner import Outcome, Plan
+from .scenario import ScenarioError
+
+
+class Progress:
+    """A bar an engine, on stderr; quiet where stderr is no terminal."""
+
+    def __init__(self) -> None:
+        columns = (
+            bars.TextColumn("{task.description:<16}"),
+            bars.BarColumn(),
+            bars.TextColumn("{task.completed:.1f} of {task.total:g} s"),
+            bars.TimeRemainingColumn(),
+        )
+        self._console = Console(stderr=True)
+        self._bars = bars.Progress(*columns, console=self._console, transient=True)
+        self._tasks: dict[str, bars.TaskID] = {}
+
+    def __enter__(self) -> Progress:
+        if self._console.is_terminal:
+            self._bars.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bars.stop()
+
+    def watch(self, engine: str, time: float, duration: float) -> None:
+        """Show that an engine has reached a simulated time."""
+        if engine not in self._tasks:
+            self._tasks[engine] = self._bars.add_task(engine, total=duration)
+        self._bars.update(self._tasks[engine], completed=time)
+
+    def note(self, line: str) -> None:
+        """Say a line without disturbing the bars."""
+        self._console.print(line, soft_wrap=True, highlight=False, markup=False)
+
+
+def show_outcome(console: Console, plan: Plan, outcome: Outcome) -> None:
+    """Print the table of a run and where its folder is."""
+    duration = plan.scenario.simulation.duration
+    console.print()
+    console.print(f"{plan.name}: {plan.scenario.title}, {duration:g} s", style="bold", markup=False)
+    table = Table("engine", box=None, pad_edge=False)
+    for title, unit, _, _ in COLUMNS:
+        table.add_column("{}\n{}\n[dim]{}[/dim]".format(*title.split(), unit), justify="right", no_wrap=True)
+    for name, values in outcome.metrics.items():
+        table.add_row(name, *(cell(values, metric, part) for _, _, metric, part in COLUMNS))
+    console.print(table)
+    for name, values in outcome.metrics.items():
+        for line in remarks(name, values, duration):
+            console.print(line, style="yellow", markup=False, soft_wrap=True)
+    for name, reason in outcome.failures.items():
+        console.print(f"{name} did not run: {reason}", style="red", markup=False, soft_wrap=True)
+    for verdict in outcome.verdicts:
+        style = "green" if verdict["holds"] else "red"
+        console.print(verdict_line(verdict), style=style, markup=False, soft_wrap=True)
+    recording = outcome.folder / "comparison.rrd"
+    console.print(f"run folder: {outcome.folder}", markup=False, highlight=False, soft_wrap=True)
+    if recording.exists():
+        console.print(f"recording:  rerun {recording}", markup=False, highlight=False, soft_wrap=True)
+
+
+def outcome_json(plan: Plan, outcome: Outcome) -> dict[str, Any]:
+    """JSON of one run."""
+    return {
+        "scenario": plan.name,
+        "folder": str(outcome.folder),
+        "complete": not outcome.interrupted,
+        "engines": outcome.metrics,
+        "failures": outcome.failures,
+        "verdicts": outcome.verdicts,
+    }
+
+
+def circular(alpha: float, rear_rate: float, family: int | None, near: tuple[float, float] | None) -> dict[str, Any]:
+    """Compute one circular motion of the benchmark bicycle as the JSON document of `velodrome circular`.
+
+    Raises
+    ------
+    ScenarioError
+        If there is none.
+    """
+    bicycle = Bicycle()
+    try:
+        surface = Paraboloid(alpha)
+        number, motion = find_motion(bicycle, alpha, rear_rate, family, near)
+        q, qd = motion.state()
+        reduced = linearise(bicycle, surface, q, qd)
+    except ValueError as error:
+        raise ScenarioError(str(error)) from error
+    seen = observe(bicycle, surface, q[None], qd[None])
+    normal_force = np.einsum("wi,wi->w", motion.force, seen.normal[0])
+    growth = growth_rate(surface, reduced.eigenvalues, float(qd[YAW]))
+    return {
+        "alpha": alpha,
+        "family": number,
+        **_constants(motion),
+        "contact_point": _by_wheel(seen.point[0].tolist()),
+        "contact_force": _by_wheel(motion.force.tolist()),
+        "normal_force": _by_wheel(normal_force.tolist()),
+        "energy": float(seen.kinetic_energy[0] + seen.potential_energy[0]),
+        "residual": motion.residual,
+        "eigenvalues": [[value.real, value.imag] for value in reduced.eigenvalues],
+        "jacobian": reduced.jacobian.tolist(),
+        "lyapunov_stable": bool(growth < 0),
+        "physical": bool(np.all(normal_force > 0)),
+    }
+
+
+def _constants(motion: CircularMotion) -> dict[str, Any]:
+    names = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch")
+    return {name: getattr(motion, name) for name in names} | {"position": motion.position.tolist()}
+
+
+def _by_wheel(pair: list[Any]) -> dict[str, Any]:
+    return {"rear": pair[0], "front": pair[1]}
+
+
+def show_circular(console: Console, found: dict[str, Any]) -> None:
+    """Print a circular motion."""
+    table = Table(box=None, show_header=False, pad_edge=False)
+    for name, unit in (
+        *(("alpha", "1/m"), ("family", ""), ("rear_rate", "rad/s"), ("front_rate", "rad/s"), ("yaw_rate", "rad/s")),
+        *(("lean", "rad"), ("steer", "rad"), ("pitch", "rad"), ("energy", "J"), ("residual", "")),
+    ):
+        table.add_row(name, f"{found[name]:.12g}", unit)
+    table.add_row("position", _numbers(found["position"]), "m, D in the heading frame")
+    for wheel in ("rear", "front"):
+        table.add_row(f"{wheel} contact", _numbers(found["contact_point"][wheel]), "m")
+        table.add_row(f"{wheel} force", _numbers(found["contact_force"][wheel]), "N, on the wheel")
+        table.add_row(f"{wheel} normal force", f"{found['normal_force'][wheel]:.9g}", "N")
+    for i, (real, imaginary) in enumerate(found["eigenvalues"]):
+        value = (
+            f"{real:.9g}" if imaginary == 0 else f"{real:.9g} {'+' if imaginary > 0 else '-'} {abs(imaginary):.9g} i"
+        )
+        table.add_row("eigenvalues" if i == 0 else "", value, "1/s" if i == 0 else "")
+    console.print(table)
+    stable = "Lyapunov stable" if found["lyapunov_stable"] else "unstable"
+    physical = "both wheels are pushed" if found["physical"] else "not physical: the ground would have to pull a wheel"
+    console.print(f"{stable}; {physical}")
+
+
+def _numbers(values: list[float]) -> str:
+    return ", ".join(f"{value:.9g}" for value in values)
+
+
+def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]]) -> None:
+    """Print the gate's verdicts: every quantity, then what fails in plain lines."""
+    table = Table("scenario", "engine", "quantity", box=None, pad_edge=False)
+    for title in ("value", "baseline", "limit"):
+        table.add_column(title, justify="right")
+    table.add_column("verdict")
+    styles = {"holds": "green", "better": "cyan", "worse": "red", "missing": "red"}
+    for scenario, verdict in verdicts:
+        numbers = ("–" if x is None else f"{x:.4g}" for x in (verdict.value, verdict.baseline, verdict.limit))
+        style = styles[verdict.status]
+        table.add_row(scenario, verdict.engine, verdict.quantity, *numbers, f"[{style}]{verdict.status}[/{style}]")
+    console.print(table)
+    for scenario, verdict in verdicts:
+        if verdict.status != "holds":
+            line = f"{scenario}: {verdict.engine}: {verdict.quantity}: {verdict.status}: {verdict.reason}"
+            console.print(line, style=styles[verdict.status], markup=False, highlight=False, soft_wrap=True)
+    passes = all(verdict.passes for _, verdict in verdicts)
+    console.print("the gate holds" if passes else "the gate fails", style="bold green" if passes else "bold red")

@@ -1,0 +1,318 @@
+"""The Exudyn engine against the reference and against the library's own rolling disc."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import threading
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from engines.engine import EngineError, Problem, Trajectory, load_engine
+from reference.bicycle import Bicycle
+from reference.dae import consistent_state
+from reference.simulate import Motion, simulate
+from reference.surface import Paraboloid, Plane, Surface, SurfaceFunction, surface_function
+
+ENGINE = load_engine("exudyn")
+RATE = 18.0  # rear wheel [rad/s]: the fastest rate of the motions below
+SHORT, LONG = 2.0, 10.0
+
+
+def problem(
+    surface: Surface, lean: float, steer: float, duration: float, bicycle: Bicycle | None = None, yaw: float = 0.0
+) -> Problem:
+    """A disturbed ride with the given lean and steer, 100 samples a second."""
+    bicycle = bicycle or Bicycle()
+    q, qd = consistent_state(bicycle, surface, (0.986, 2.148), lean, steer, (0.1, 0.0, RATE), yaw)
+    return Problem(bicycle, surface, q, qd, np.arange(round(100 * duration) + 1) / 100)
+
+
+def bowl(duration: float) -> Problem:
+    """Near the stable circular motion Q2 of the bowl (Xiong et al. 2020, section 4.2), lean rate disturbed."""
+    return problem(Paraboloid(0.005), 0.7374431, 2.8370309, duration)
+
+
+def run(task: Problem, step: float) -> Trajectory:
+    return ENGINE.simulate(task, ENGINE.settings.model_validate({"step": step}), lambda _time: None)
+
+
+@cache
+def bowl_run(duration: float, step: float) -> Trajectory:
+    return run(bowl(duration), step)
+
+
+@cache
+def bowl_reference(duration: float) -> Motion:
+    task = bowl(duration)
+    return simulate(task.bicycle, task.surface, task.q, task.qd, task.times)
+
+
+def furthest(q: np.ndarray, exact: np.ndarray) -> float:
+    """Largest distance of D from where it should be [m]."""
+    return float(np.linalg.norm(q[:, :3] - exact[:, :3], axis=1).max())
+
+
+# Generalized alpha has the error C h^2 (1 + k h + ...), where k is of the size of the motion's fastest rate.
+# So halving a step h divides the error by 4 (1 +- k h), and extrapolation to h = 0 leaves k h of it.
+def next_order(step: float) -> float:
+    return RATE * step
+
+
+DURATIONS = [SHORT, pytest.param(LONG, marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("duration", DURATIONS)
+def test_position_error_falls_with_the_square_of_the_step(duration):
+    exact = bowl_reference(duration).q
+    coarse, fine = (furthest(bowl_run(duration, step).q, exact) for step in (2e-3, 1e-3))
+    assert coarse / fine == pytest.approx(4, rel=next_order(2e-3))
+
+
+@pytest.mark.parametrize("duration", DURATIONS)
+def test_limit_of_small_steps_is_the_reference(duration):
+    exact = bowl_reference(duration).q
+    coarse, fine = bowl_run(duration, 2e-3).q, bowl_run(duration, 1e-3).q
+    assert furthest((4 * fine - coarse) / 3, exact) < next_order(2e-3) * furthest(fine, exact) < 1e-5
+
+
+@pytest.mark.parametrize("duration", DURATIONS)
+def test_contact_forces_are_the_multipliers_of_the_reference(duration):
+    exact, force = bowl_reference(duration).force, bowl_run(duration, 1e-3).contact_force
+    assert force is not None
+    error = np.linalg.norm(force - exact, axis=2) / np.linalg.norm(exact, axis=2)
+    # Multipliers belong to accelerations that the solver weighs from two ends of a step: no more wrong than
+    # the forces change within one step (they change at 4 per second at the most, right after the start).
+    change = np.linalg.norm(np.diff(exact, axis=0), axis=2) / np.linalg.norm(exact[1:], axis=2) / 0.01
+    assert error.max() < 1e-3 * change.max() < 5e-3
+    # At the start there is no step yet, but the engine's forward differences of 1e-7.
+    assert error[0].max() < 1e-6
+
+
+@pytest.mark.parametrize("duration", DURATIONS)
+def test_constraints_hold(duration):
+    result = bowl_run(duration, 1e-3)
+    assert result.gap is not None
+    assert result.slip is not None
+    # The gap is a difference of coordinates of some three metres: a few tens of their round-off.
+    assert np.abs(result.gap).max() < 30 * 3 * np.finfo(float).eps
+    # Newton's method leaves 1e-10 of a residual that starts as forces of the size of the weight.
+    assert np.abs(result.slip).max() < 1e-10 * 94 * 9.81
+
+
+@pytest.mark.parametrize("duration", DURATIONS)
+def test_energy_error_falls_with_the_square_of_the_step(duration):
+    def drift(step: float) -> float:
+        result = bowl_run(duration, step)
+        assert result.kinetic_energy is not None
+        assert result.potential_energy is not None
+        energy = result.kinetic_energy + result.potential_energy
+        return float(np.abs(energy / energy[0] - 1).max())
+
+    assert drift(2e-3) / drift(1e-3) == pytest.approx(4, rel=next_order(2e-3))
+
+
+def test_contact_points_are_those_of_the_reference():
+    from reference.contact import observe
+
+    task, result = bowl(SHORT), bowl_run(SHORT, 1e-3)
+    seen = observe(task.bicycle, task.surface, result.q, result.qd)
+    assert result.contact_point is not None
+    assert result.kinetic_energy is not None
+    # The joints hold the positions, so the wheels are where the coordinates say, up to round-off on some
+    # three metres. Velocities satisfy the joints up to the method's error, (k h)^2.
+    assert np.abs(result.contact_point - seen.point).max() < 100 * 3 * np.finfo(float).eps
+    assert np.abs(result.kinetic_energy / seen.kinetic_energy - 1).max() < next_order(1e-3) ** 2
+
+
+def test_initial_state_comes_back():
+    task = problem(Paraboloid(0.005), 0.3, -0.4, 0.01, yaw=8.0)
+    task.q[7:] = 100.0, -50.0  # some turns of the wheels
+    result = run(task, 1e-3)
+    np.testing.assert_array_equal(result.time, task.times)
+    np.testing.assert_allclose(result.q[0], task.q, rtol=0, atol=100 * np.finfo(float).eps)
+    np.testing.assert_allclose(result.qd[0], task.qd, rtol=0, atol=10 * RATE * np.finfo(float).eps)
+
+
+def test_runs_are_bitwise_identical():
+    first, second = bowl_run(SHORT, 2e-3), run(bowl(SHORT), 2e-3)
+    for field in dataclasses.fields(Trajectory):
+        if field.name != "cpu_time":
+            np.testing.assert_array_equal(getattr(first, field.name), getattr(second, field.name))
+
+
+def test_flat_joint_agrees_with_the_library_s_own():
+    """At strong lean on the plane both have an error of h^2, and the same limit."""
+    import exudyn as exu
+    from exudyn.itemInterface import MarkerBodyRigid, ObjectGround, ObjectJointRollingDisc
+
+    from engines.exudyn.model import LEFT, build_model, read_motion
+    from engines.exudyn.results import coordinates
+    from engines.exudyn.solve import Integration, integrate
+
+    task = problem(Plane(), 0.73234688, 2.8422746, SHORT)
+
+    def add_disc(system: exu.MainSystem, wheel: dict, radius: float) -> object:
+        earth: Any = system.AddObject(ObjectGround())
+        ground = system.AddMarker(MarkerBodyRigid(bodyNumber=earth))
+        centre = system.AddMarker(MarkerBodyRigid(bodyNumber=wheel["bodyNumber"]))
+        size: Any = radius
+        return system.AddObject(ObjectJointRollingDisc(markerNumbers=[ground, centre], discRadius=size, discAxis=LEFT))
+
+    def disc(step: float) -> np.ndarray:
+        model = build_model(task, add_disc)
+        integration = Integration(SHORT, round(SHORT / step), len(task.times) - 1, 0.8, 1e-10, 1e-12)
+        integrate(model.system, integration, lambda: None, lambda _time: None)
+        return coordinates(task, read_motion(model))[0]
+
+    ours = {step: run(task, step).q for step in (2e-3, 1e-3)}
+    theirs = {step: disc(step) for step in ours}
+    error = furthest(ours[1e-3], simulate(task.bicycle, task.surface, task.q, task.qd, task.times).q)
+    apart = {step: furthest(ours[step], theirs[step]) for step in ours}
+    assert apart[2e-3] / apart[1e-3] == pytest.approx(4, rel=next_order(2e-3))
+    limits = [(4 * q[1e-3] - q[2e-3]) / 3 for q in (ours, theirs)]
+    assert furthest(*limits) < next_order(2e-3) * error
+
+
+@surface_function
+def _waves(x, y, parameters):
+    height, k = parameters[0], parameters[1]
+    sx, cx, sy, cy = np.sin(k * x), np.cos(k * x), np.sin(k * y), np.cos(k * y)
+    f, bend = height * sx * cy, -height * k * k
+    return f, height * k * cx * cy, -height * k * sx * sy, bend * sx * cy, bend * cx * sy, bend * sx * cy
+
+
+class Waves:
+    """z = 0.02 sin x cos y: curvature changes its sign, and no axis of symmetry helps."""
+
+    function: SurfaceFunction = _waves
+    parameters = np.array([0.02, 1.0])
+
+
+def test_any_bicycle_on_any_surface():
+    bicycle = Bicycle(trail=0.06, steer_axis_tilt=0.4, rear_wheel_radius=0.33, front_wheel_mass=2.0, gravity=9.0)
+    task = problem(Waves(), 0.2, -0.1, SHORT, bicycle, yaw=2.0)
+    exact = simulate(bicycle, task.surface, task.q, task.qd, task.times)
+    coarse, fine = run(task, 2e-3), run(task, 1e-3)
+    error = furthest(fine.q, exact.q)
+    assert furthest(coarse.q, exact.q) / error == pytest.approx(4, rel=next_order(2e-3))
+    assert furthest((4 * fine.q - coarse.q) / 3, exact.q) < next_order(2e-3) * error
+
+
+def test_kernel_rows_are_derivatives():
+    """Normal row = gradient of the gap; all rows = velocity of the rim's material point in the contact frame."""
+    from engines.exudyn import kernel
+
+    function, parameters = _waves.real, Waves.parameters
+    rng = np.random.default_rng(1)
+    rows, scratch, step = np.empty((3, 7)), np.empty((3, 7)), 1e-6
+
+    def gap(coordinates: np.ndarray) -> float:
+        return kernel.velocity_rows(coordinates, 0.3, function, parameters, scratch)
+
+    for _ in range(20):
+        theta = np.array([1.0, 0.0, 0.0, 0.0]) + 0.3 * rng.standard_normal(4)
+        coordinates = np.concatenate([rng.standard_normal(2), [0.3], theta / np.linalg.norm(theta)])
+        kernel.velocity_rows(coordinates, 0.3, function, parameters, rows)
+        gradient = [(gap(coordinates + e) - gap(coordinates - e)) / (2 * step) for e in step * np.eye(7)]
+        # Central differences: h^2 of curvature, and round-off over h.
+        np.testing.assert_allclose(rows[2], gradient, rtol=0, atol=1e-8)
+        stretched = np.concatenate([coordinates[:3], 1.3 * coordinates[3:]])
+        assert gap(stretched) == pytest.approx(gap(coordinates), abs=1e-14)
+
+        rates = rng.standard_normal(7)
+        rates[3:] -= coordinates[3:] * (coordinates[3:] @ rates[3:])  # along the unit sphere
+        axes = [np.array(kernel.axes(*(coordinates + s * rates)[3:])).T for s in (-step, 0.0, step)]
+        arm = _arm(coordinates, axes[1], function, parameters)
+        material = rates[:3] + (axes[2] - axes[0]) / (2 * step) @ axes[1].T @ arm
+        np.testing.assert_allclose(rows @ rates, rows[:, :3] @ material, rtol=0, atol=1e-8)
+
+
+def _arm(coordinates, axes, function, parameters):
+    from engines.exudyn import kernel
+
+    x, axle, z = (tuple(axis) for axis in axes.T)
+    _, arm, _ = kernel.contact_frame(tuple(coordinates[:3]), x, axle, z, 0.3, function, parameters)
+    return np.array(arm)
+
+
+@pytest.mark.parametrize(
+    ("times", "complaint"),
+    [
+        (np.arange(11) / 1000 * 2.5, "0.00125 s would"),
+        (np.arange(1, 11) / 100, "starts at 0"),
+        (np.array([0.0, 0.1, 0.3]), "evenly spaced"),
+    ],
+)
+def test_times_off_the_steps_are_refused(times, complaint):
+    task = dataclasses.replace(bowl(0.1), times=times)
+    with pytest.raises(ValueError, match=complaint):
+        run(task, 2e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("step", 0.0), ("spectral_radius", 1.0), ("newton_relative_tolerance", 1.0), ("steps", 1.0)]
+)
+def test_wrong_settings_are_refused(name, value):
+    with pytest.raises(ValidationError, match=name):
+        ENGINE.settings.model_validate({name: value})
+
+
+def test_a_fall_ends_the_run_and_prints_nothing(capfd):
+    bicycle = Bicycle()
+    q, qd = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.3, 0.0, (1.0, 0.0, 2.0))
+    task = Problem(bicycle, Plane(), q, qd, np.arange(1001) / 100)
+    result = run(task, 1e-3)
+    assert result.ended is not None
+    assert "did not converge at t" in result.ended
+    assert 0 < len(result.time) < len(task.times)
+    assert result.contact_force is not None
+    assert len(result.q) == len(result.contact_force) == len(result.time)
+    np.testing.assert_array_equal(result.time, task.times[: len(result.time)])
+    assert np.all(np.isfinite(result.q))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_start_without_contact_is_an_error():
+    task = bowl(0.1)
+    task.q[0] = np.nan
+    with pytest.raises(EngineError, match="could not start"):
+        run(task, 1e-3)
+
+
+def test_progress_is_told_and_may_stop_the_run():
+    told: list[float] = []
+    ENGINE.simulate(bowl(0.5), ENGINE.settings(), told.append)
+    assert told == sorted(told)
+    assert len(told) > 2
+
+    class StopError(Exception):
+        pass
+
+    def stop(_time: float) -> None:
+        raise StopError
+
+    with pytest.raises(StopError):
+        ENGINE.simulate(bowl(0.5), ENGINE.settings(), stop)
+
+
+def test_interrupt_gets_out():
+    timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
+    bowl_run(SHORT, 2e-3)  # compiled: the signal must meet the integration
+    task = bowl(100.0)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        run(task, 1e-3)
+
+
+def test_library_is_imported_only_to_run():
+    load = "import sys; from engines.engine import load_engine; load_engine('exudyn').version"
+    check = f"{load}; assert 'exudyn' not in sys.modules"
+    subprocess.run([sys.executable, "-c", check], check=True)
