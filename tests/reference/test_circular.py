@@ -1,0 +1,141 @@
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.optimize import minimize_scalar
+
+from reference.bicycle import Bicycle
+from reference.circular import (
+    SIGMA,
+    STEER,
+    Steady,
+    nearest_condition,
+    newton,
+)
+from reference.dae import dynamics, residual
+from reference.families import anchors, find_motion, follow, motions, start_on_plane
+from reference.surface import Paraboloid
+from tests.literature import published, rounds_to
+
+BICYCLE = Bicycle()
+PRINTED = published("xiong2020")
+
+
+@pytest.mark.parametrize("name", ["P1", "P2", "P3", "P4"])
+def test_points_p_round_to_the_print(name: str) -> None:
+    point = PRINTED[name]
+    near = (float(point["lean"]), float(point["steer"]))
+    family, motion = find_motion(BICYCLE, point["alpha"], point["rear_rate"], point["family"], near)
+    assert family == point["family"]
+    for field in ("lean", "steer", "front_rate"):
+        assert rounds_to(getattr(motion, field), point[field]), field
+    assert motion.residual < 1e-12
+
+
+@pytest.mark.parametrize(("name", "family"), [("Q1", 1), ("Q2", 2)])
+def test_points_q_round_to_the_print(name: str, family: int) -> None:
+    point = PRINTED[name]
+    _, motion = find_motion(BICYCLE, point["alpha"], 18.0, family)
+    values = [*motion.position[:2], motion.lean, motion.steer, 0.0, 0.0, motion.rear_rate]
+    for value, printed in zip(values, point["v"], strict=True):
+        assert rounds_to(value, printed)
+    assert motion.residual < 1e-12
+
+
+def test_family_two_has_two_motions_at_q2_and_near_tells_them_apart() -> None:
+    both = motions(BICYCLE, 0.005, 2, 18.0)
+    assert [round(motion.lean, 3) for motion in both] == [0.737, 0.693]
+    _, other = find_motion(BICYCLE, 0.005, 18.0, 2, near=(0.69, 2.87))
+    assert other.lean == both[1].lean
+    # Without a family the nearest of all is found as well.
+    family, same = find_motion(BICYCLE, 0.005, 18.0, near=(0.69, 2.87))
+    assert (family, same.lean) == (2, both[1].lean)
+
+
+def test_point_a_is_the_printed_static_equilibrium() -> None:
+    _, u, _ = anchors(BICYCLE, 0.0, 1)
+    assert abs(u[SIGMA]) < 1e-14
+    assert rounds_to(u[STEER], PRINTED["A"]["steer"])
+
+
+def test_point_g_is_the_printed_pivoting_motion() -> None:
+    equations, u, _ = anchors(BICYCLE, 0.0, 3)
+    motion, point = equations.motion(u), PRINTED["G"]
+    assert abs(motion.rear_rate) < 1e-12
+    assert rounds_to(motion.lean, point["lean"])
+    assert rounds_to(motion.steer, point["steer"])
+    assert rounds_to(abs(motion.front_rate), point["front_rate"])
+
+
+@pytest.mark.parametrize(("name", "guess"), [("B", (-0.02, 0.02)), ("C", (0.02, 3.12))])
+def test_straight_motions_are_the_limits_of_large_circles(name: str, guess: tuple[float, float]) -> None:
+    """B and C: the front rate far out on the curve rounds to the print, and its error falls like 1/R^2."""
+    level = Steady(BICYCLE, Paraboloid(0.0))
+    u, _ = newton(level, start_on_plane(BICYCLE, *guess), nearest_condition(), most=30)
+    outwards = np.zeros(22)
+    outwards[1] = np.sign(u[1])
+    far = level.motion(list(follow(level, u, outwards))[-1].unknowns)
+    assert np.hypot(*far.position[:2]) > 900
+    assert rounds_to(far.front_rate, PRINTED[name]["front_rate"])
+
+
+def test_cusp_d_is_an_extremum_of_the_front_rate() -> None:
+    """D: along family 2 the size of the front rate is least near the printed point.
+
+    Lean, steer and radius all turn around close by, so the curve is followed by its arc. The printed
+    steer 2.78 is cut off, not rounded: it is 2.7857.
+    """
+    level, anchor, directions = anchors(BICYCLE, 0.0, 2)
+    points = [point.unknowns for point in follow(level, anchor, directions[1])]
+    curve = [level.motion(u) for u in points if 2.783 < u[STEER] < 2.8]
+    values = np.array([[motion.lean, motion.steer, motion.front_rate] for motion in curve])
+    # Continuation slows down around the cusp: its points lie some 0.01 apart, where a spline of the
+    # smooth curve errs by 0.01^4 times fourth derivatives, far below the printed digits.
+    through = CubicSpline(np.arange(len(values)), values)
+    best = minimize_scalar(lambda i: abs(through(i)[2]), bounds=(0, len(values) - 1), method="bounded")
+    lean, steer, front_rate = through(best.x)
+    point = PRINTED["D"]
+    assert 1 < best.x < len(values) - 2
+    assert rounds_to(lean, point["lean"])
+    assert rounds_to(front_rate, point["front_rate"])
+    assert np.floor(steer * 100) / 100 == float(point["steer"])
+    assert steer == pytest.approx(2.7857, abs=1e-3)
+
+
+@pytest.mark.parametrize(("alpha", "family", "rear_rate"), [(0.005, 2, 18.0), (0.2, 3, 20.0), (0.05, 4, 12.0)])
+def test_a_circular_motion_solves_the_equations_of_motion(alpha: float, family: int, rear_rate: float) -> None:
+    """All 21 equations of the unrotated system, with the accelerations of turning about z."""
+    surface = Paraboloid(alpha)
+    _, motion = find_motion(BICYCLE, alpha, rear_rate, family)
+    q, qd = motion.state()
+    turning = np.zeros(9)
+    turning[:2] = -(motion.yaw_rate**2) * motion.position[:2]
+    rows = residual(BICYCLE, surface, q, qd, turning, motion.contact.ravel(), motion.force.ravel())
+    # Rolling rows carry real speeds here, up to some 10 m/s.
+    assert np.abs(rows).max() < 1e-11
+    now = dynamics(BICYCLE, surface, q, qd)
+    assert np.abs(now.acceleration - turning).max() < 1e-9
+    assert np.abs(now.force - motion.force).max() < 1e-9
+    assert np.abs(now.contact_rate[:, 2]).max() < 1e-12
+
+
+def test_small_curvature_tends_to_the_plane() -> None:
+    """Families at alpha -> 0 tend to the plane's linearly in alpha."""
+    plane = find_motion(BICYCLE, 0.0, 18.0, 2)[1]
+    gaps = [abs(find_motion(BICYCLE, alpha, 18.0, 2)[1].lean - plane.lean) for alpha in (1e-4, 1e-5)]
+    # Linear with a quadratic correction of relative size alpha x lengths of some metres x O(10).
+    assert gaps[0] / gaps[1] == pytest.approx(10, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((0.005, -1.0, 2, None), "rear rate"),
+        ((0.005, 18.0, 5, None), "family"),
+        ((0.005, 18.0, None, None), "needs a family"),
+        ((0.005, 18.0, None, (np.nan, 0.0)), "near"),
+        ((0.005, 500.0, 1, None), "no circular motion"),
+    ],
+)
+def test_impossible_wishes_are_refused(arguments: tuple, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        find_motion(BICYCLE, *arguments)
