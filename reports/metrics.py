@@ -121,7 +121,7 @@ def _extremes(values: np.ndarray) -> dict[str, float]:
 
 
 def _errors(trajectory: Trajectory, reference: Trajectory | None) -> dict[str, Any]:
-    names = ("position_error", "orientation_error", "rear_rate_error", "contact_force_error")
+    names = ("position_error", "orientation_error", "rear_rate_error", "contact_force_error", "contact_force_error_at")
     result: dict[str, Any] = dict.fromkeys(names)
     if reference is None:
         return result
@@ -135,6 +135,8 @@ def _errors(trajectory: Trajectory, reference: Trajectory | None) -> dict[str, A
         # Relative to the largest force that the reference ever needs.
         largest = np.linalg.norm(reference.contact_force[:n], axis=2).max()
         result["contact_force_error"] = float(difference.max() / largest)
+        # Contacts that start unsettled are worst in the first sample, which says little of the ride.
+        result["contact_force_error_at"] = float(trajectory.time[difference.max(axis=1).argmax()])
     return result
 
 

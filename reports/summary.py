@@ -34,6 +34,8 @@ def remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]
         lines.append(f"{name} fell at {metrics['fell_at']:.2f} s")
     if metrics["ended"] is not None:
         lines.append(f"{name} ended early: {metrics['ended']}")
+    if metrics["contact_force_error_at"] == 0:
+        lines.append(f"{name}: the force error is largest in the first sample")
     if metrics["horizon"] is not None and metrics["horizon"] < duration:
         lines.append(
             f"{name}: beyond {metrics['horizon']:.2f} s the motion's own instability makes the error meaningless"
@@ -70,11 +72,11 @@ def summary(
     str
     """
     lines = [f"# {title}", "", _stability(growth_rate), ""]
-    lines += ["| engine | " + " | ".join(f"{name} [{unit}]" for name, unit, _, _ in COLUMNS) + " |"]
-    lines += ["|---|" + "---:|" * len(COLUMNS)]
-    for engine, values in measured.items():
-        cells = (cell(values, metric, part) for _, _, metric, part in COLUMNS)
-        lines.append(f"| {engine} | " + " | ".join(cells) + " |")
+    # Engines as columns: they are fewer than quantities, and the recording's tab is narrow.
+    lines += ["| | " + " | ".join(measured) + " |", "|---|" + "---:|" * len(measured)]
+    for name, unit, metric, part in COLUMNS:
+        cells = (cell(values, metric, part) for values in measured.values())
+        lines.append(f"| {name} [{unit}] | " + " | ".join(cells) + " |")
     lines += [
         "",
         f"Errors are the largest over {duration:g} s, against `{REFERENCE}`; drifts are slopes of a line fit.",

@@ -107,7 +107,7 @@ def circular(alpha: float, rear_rate: float, family: int | None, near: tuple[flo
         number, motion = find_motion(bicycle, alpha, rear_rate, family, near)
         q, qd = motion.state()
         reduced = linearise(bicycle, surface, q, qd)
-    except ValueError as error:
+    except (ValueError, ArithmeticError) as error:
         raise ScenarioError(str(error)) from error
     seen = observe(bicycle, surface, q[None], qd[None])
     normal_force = np.einsum("wi,wi->w", motion.force, seen.normal[0])

@@ -23,7 +23,7 @@ from engines.storage import write_trajectory
 from reports.metrics import metrics
 from reports.summary import summary
 
-from .scenario import Scenario, ScenarioError, one_line
+from .scenario import Scenario, ScenarioError, one_line, refuse_unknown
 from .start import Start, make_start
 
 LIBRARIES = ("velodrome", "numpy", "scipy", "numba", "exudyn", "mujoco", "rerun-sdk", "pyarrow")
@@ -114,9 +114,12 @@ def configure(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
     """
     engine = load_engine(name)
     try:
-        return engine, engine.settings(**values)
+        refuse_unknown(values, engine.settings.model_fields)
+        return engine, engine.settings.model_validate(dict(values), strict=True)
     except ValidationError as error:
         raise ScenarioError(f"engines.{name}.{one_line(error)}") from error
+    except ValueError as error:
+        raise ScenarioError(f"engines.{name}: {error}") from error
 
 
 def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None]) -> Outcome:

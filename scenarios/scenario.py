@@ -3,20 +3,39 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from reference.bicycle import Bicycle
 
 LIBRARY = files("scenarios") / "library"
 
 
+# Far beyond any bicycle, and far from where products of such numbers overflow.
+_Moderate = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
 class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    # Strict: true is no number, and neither is "18".
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, data: Any) -> Any:
+        if isinstance(data, Mapping):
+            refuse_unknown(data, cls.model_fields)
+        return data
+
+
+def refuse_unknown(data: Mapping[str, Any], known: Iterable[str]) -> None:
+    """Raise ValueError with the known keys if there is another."""
+    unknown = sorted(set(data) - set(known))
+    if unknown:
+        raise ValueError(f"unknown key {unknown[0]!r}; there are {', '.join(known)}")
 
 
 class PlaneTable(_Table):
@@ -43,8 +62,8 @@ class CircularTable(_Table):
     """A circular motion to start from."""
 
     kind: Literal["circular"] = "circular"
-    rear_rate: float = Field(gt=0, description="rear-wheel rate [rad/s]")
-    family: Literal[1, 2, 3, 4] | None = None
+    rear_rate: float = Field(gt=0, le=1e4, description="rear-wheel rate [rad/s]")
+    family: Annotated[int, Field(ge=1, le=4)] | None = None
     near: Near | None = None
 
     @model_validator(mode="after")
@@ -58,19 +77,19 @@ class UprightTable(_Table):
     """A straight upright start along x, the rear contact in the origin."""
 
     kind: Literal["upright"]
-    speed: float = Field(gt=0, description="forward speed [m/s]")
+    speed: float = Field(gt=0, le=1e4, description="forward speed [m/s]")
 
 
 class Perturbation(_Table):
     """Added to the independent variables of the start; the rest is solved."""
 
-    x: float = 0.0
-    y: float = 0.0
-    lean: float = 0.0
-    steer: float = 0.0
-    lean_rate: float = 0.0
-    steer_rate: float = 0.0
-    rear_rate: float = 0.0
+    x: _Moderate = 0.0
+    y: _Moderate = 0.0
+    lean: _Moderate = 0.0
+    steer: _Moderate = 0.0
+    lean_rate: _Moderate = 0.0
+    steer_rate: _Moderate = 0.0
+    rear_rate: _Moderate = 0.0
 
 
 class Simulation(_Table):
@@ -100,15 +119,22 @@ class Criterion(_Table):
 class Scenario(_Table):
     """A scenario as its file declares it."""
 
-    title: str = Field(min_length=1)
-    tags: tuple[str, ...] = ()
+    title: str
+    tags: Annotated[tuple[str, ...], Field(strict=False)] = ()  # TOML has arrays only
     surface: Annotated[PlaneTable | ParaboloidTable, Field(discriminator="kind")]
     motion: Annotated[CircularTable | UprightTable, Field(discriminator="kind")]
     perturbation: Perturbation = Perturbation()
     simulation: Simulation
     criterion: Criterion | None = None
-    bicycle: dict[str, float] = {}
+    bicycle: dict[str, _Moderate] = {}
     engines: dict[str, dict[str, Any]] = {}
+
+    @field_validator("title")
+    @classmethod
+    def _one_line(cls, title: str) -> str:
+        if not title.strip() or not title.isprintable():
+            raise ValueError("must be one line of text")
+        return title
 
     @model_validator(mode="before")
     @classmethod
@@ -198,12 +224,22 @@ def validate(data: Mapping[str, Any], source: str) -> Scenario:
         raise ScenarioError(f"{source}: {one_line(error)}") from error
 
 
+_PLAIN_WORDS = {
+    "missing": "is missing",
+    "union_tag_not_found": "kind is missing",
+    "model_type": "must be a table",
+    "dict_type": "must be a table",
+    "model_attributes_type": "must be a table",
+}
+
+
 def one_line(error: ValidationError) -> str:
     """Say the first thing wrong in one line: where, what, what came."""
     first = error.errors()[0]
     # Discriminator values appear in the location of a union's member: they are no keys of the file.
     where = ".".join(str(part) for part in first["loc"] if part not in ("circular", "upright", "plane", "paraboloid"))
-    message = first["msg"].removeprefix("Value error, ").replace("\n", " ")
+    plain = _PLAIN_WORDS.get(first["type"], first["msg"].removeprefix("Value error, "))
+    message = plain.replace("\n", " ")
     came = first.get("input")
     shown = "" if isinstance(came, Mapping | BaseModel) or first["type"] == "missing" else f" (it is {came!r})"
     more = len(error.errors()) - 1

@@ -11,9 +11,9 @@ from reference.bicycle import Bicycle
 from reference.circular import CircularMotion
 from reference.dae import consistent_state
 from reference.families import find_motion
-from reference.kinematics import LEAN, REAR_ANGLE, STEER, YAW
+from reference.kinematics import LEAN, REAR_ANGLE, STEER, YAW, body_positions
 from reference.stability import growth_rate, linearise
-from reference.surface import Paraboloid, Plane, Surface
+from reference.surface import Paraboloid, Plane, Surface, evaluate
 
 from .scenario import CircularTable, ParaboloidTable, Scenario, ScenarioError
 
@@ -57,11 +57,13 @@ def make_start(scenario: Scenario) -> Start:
     """
     bicycle, surface = scenario.make_bicycle(), make_surface(scenario)
     try:
-        family, motion, q, qd = _undisturbed(scenario, bicycle, surface)
-        straight = linearise(bicycle, surface, q, qd)
-        rate = growth_rate(surface, straight.eigenvalues, float(qd[YAW]))
-        q, qd = _disturbed(scenario, bicycle, surface, q, qd)
-    except ValueError as error:
+        # Numbers that no bicycle has may overflow on the way; what comes of them is checked.
+        with np.errstate(all="ignore"):
+            family, motion, q, qd = _undisturbed(scenario, bicycle, surface)
+            straight = linearise(bicycle, surface, q, qd)
+            rate = growth_rate(surface, straight.eigenvalues, float(qd[YAW]))
+            q, qd = _disturbed(scenario, bicycle, surface, q, qd)
+    except (ValueError, ArithmeticError) as error:
         raise ScenarioError(f"motion: {error}") from error
     simulation = scenario.simulation
     samples = round(simulation.duration * simulation.output_rate)
@@ -91,12 +93,18 @@ def _disturbed(
     change = scenario.perturbation
     if change == type(change)():
         return q, qd
-    return consistent_state(
+    lean = float(q[LEAN]) + change.lean
+    q, qd = consistent_state(
         bicycle,
         surface,
-        (q[0] + change.x, q[1] + change.y),
-        q[LEAN] + change.lean,
-        q[STEER] + change.steer,
+        (float(q[0]) + change.x, float(q[1]) + change.y),
+        lean,
+        float(q[STEER]) + change.steer,
         (qd[LEAN] + change.lean_rate, qd[STEER] + change.steer_rate, qd[REAR_ANGLE] + change.rear_rate),
         guess=(float(q[2]), float(q[5])),
     )
+    centre = body_positions(bicycle, q[None])[0, 0]
+    # The wheels touch the ground from below just as well.
+    if centre[2] <= evaluate(surface, centre[0], centre[1])[0]:
+        raise ValueError(f"at lean = {lean!r} the rear frame lies below the ground; a smaller perturbation would not")
+    return q, qd
