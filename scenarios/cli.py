@@ -17,7 +17,7 @@ from engines.engine import engine_names, load_engine
 from . import present
 from .gate import check as check_gate
 from .gate import update as update_baselines
-from .runner import plan_run, run
+from .runner import Plan, plan_run, run
 from .scenario import ScenarioError, library_names, load_scenario
 
 app = typer.Typer(
@@ -27,6 +27,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+_STARTING = "computing the motion (the first time on a machine, kernels are compiled: half a minute)"
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else.")]
 
@@ -77,7 +79,8 @@ def run_command(
     changes = dict(_assignment(text) for text in change or [])
     if duration is not None:
         changes["simulation.duration"] = duration
-    plans = [plan_run(*load_scenario(source, changes), wanted=engine) for source in dict.fromkeys(sources)]
+    with present.working(_STARTING):
+        plans = [_plan(source, changes, engine) for source in dict.fromkeys(sources)]
     console = Console(stderr=as_json)
     outcomes = []
     for plan in plans:
@@ -98,13 +101,15 @@ def run_command(
 @app.command("circular")
 def circular_command(
     alpha: Annotated[float, typer.Option(help="Shape of the bowl z = alpha (x² + y²) [1/m]; 0 is the plane.")],
-    rear_rate: Annotated[float, typer.Option(help="Rear-wheel rate [rad/s].")],
+    rear_rate: Annotated[float, typer.Option(max=1e4, help="Rear-wheel rate [rad/s].")],
     family: Annotated[int | None, typer.Option(help="Solution family, 1 to 4.")] = None,
     near: Annotated[str | None, typer.Option(metavar="LEAN,STEER", help="Angles it is near to [rad].")] = None,
     as_json: Json = False,
 ) -> None:
     """One circular motion: its 21 constants, contact forces, eigenvalues, verdict on stability."""
-    found = present.circular(alpha, rear_rate, family, _angles(near))
+    angles = _angles(near)
+    with present.working(_STARTING):
+        found = present.circular(alpha, rear_rate, family, angles)
     if as_json:
         _print_json(found)
     else:
@@ -138,6 +143,14 @@ def check_command(
             console.print(f"baseline written: {path}", soft_wrap=True)
     if not passes:
         raise typer.Exit(1)
+
+
+def _plan(source: str, changes: dict[str, Any], wanted: list[str] | None) -> Plan:
+    name, scenario = load_scenario(source, changes)
+    try:
+        return plan_run(name, scenario, wanted)
+    except ScenarioError as error:
+        raise ScenarioError(f"{source}: {error}") from error
 
 
 def _tagged(tag: str) -> list[str]:

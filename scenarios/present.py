@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -43,7 +47,9 @@ class Progress:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._bars.stop()
+        # Bars that never started would still print an empty line.
+        if self._console.is_terminal:
+            self._bars.stop()
 
     def watch(self, engine: str, time: float, duration: float) -> None:
         """Show that an engine has reached a simulated time."""
@@ -54,6 +60,17 @@ class Progress:
     def note(self, line: str) -> None:
         """Say a line without disturbing the bars."""
         self._console.print(line, soft_wrap=True, highlight=False, markup=False)
+
+
+@contextmanager
+def working(line: str) -> Iterator[None]:
+    """Show on a terminal's stderr that something is under way."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield
+        return
+    with console.status(line):
+        yield
 
 
 def show_outcome(console: Console, plan: Plan, outcome: Outcome) -> None:
@@ -75,10 +92,12 @@ def show_outcome(console: Console, plan: Plan, outcome: Outcome) -> None:
     for verdict in outcome.verdicts:
         style = "green" if verdict["holds"] else "red"
         console.print(verdict_line(verdict), style=style, markup=False, soft_wrap=True)
-    recording = outcome.folder / "comparison.rrd"
+    recording, viewer = outcome.folder / "comparison.rrd", Path(sys.executable).with_name("rerun")
+    if viewer.is_relative_to(Path.cwd()):
+        viewer = viewer.relative_to(Path.cwd())
     console.print(f"run folder: {outcome.folder}", markup=False, highlight=False, soft_wrap=True)
     if recording.exists():
-        console.print(f"recording:  rerun {recording}", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"recording:  {viewer} {recording}", markup=False, highlight=False, soft_wrap=True)
 
 
 def outcome_json(plan: Plan, outcome: Outcome) -> dict[str, Any]:
@@ -107,7 +126,7 @@ def circular(alpha: float, rear_rate: float, family: int | None, near: tuple[flo
         number, motion = find_motion(bicycle, alpha, rear_rate, family, near)
         q, qd = motion.state()
         reduced = linearise(bicycle, surface, q, qd)
-    except (ValueError, ArithmeticError) as error:
+    except ValueError as error:
         raise ScenarioError(str(error)) from error
     seen = observe(bicycle, surface, q[None], qd[None])
     normal_force = np.einsum("wi,wi->w", motion.force, seen.normal[0])

@@ -173,7 +173,8 @@ def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None]) -> Out
 
 def _reason(error: Exception) -> str:
     """One line on why an engine failed; its own words where it chose them."""
-    return str(error) if isinstance(error, EngineError) else f"{type(error).__name__}: {error}"
+    words = str(error) if isinstance(error, EngineError) else f"{type(error).__name__}: {error}"
+    return " ".join(words.split())
 
 
 def measure(plan: Plan, trajectories: Mapping[str, Trajectory]) -> dict[str, dict[str, Any]]:
