@@ -17,6 +17,8 @@ from reference.kinematics import COORDINATES, WHEELS
 from .engine import Trajectory
 
 METADATA_KEY = b"velodrome"
+FACTS = ("engine", "version", "settings", "steps", "cpu_time", "ended")
+REQUIRED = ("time", "q", "qd", "body_position", "body_quaternion")
 
 
 def _coordinate_columns() -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
@@ -62,7 +64,7 @@ def write_trajectory(trajectory: Trajectory, path: Path) -> None:
         for j, (column, unit) in enumerate(names):
             fields.append(pa.field(column, pa.float64(), nullable=False, metadata={b"unit": unit.encode()}))
             arrays.append(pa.array(np.ascontiguousarray(flat[:, j])))
-    facts = {key: getattr(trajectory, key) for key in ("engine", "version", "settings", "steps", "cpu_time", "ended")}
+    facts = {key: getattr(trajectory, key) for key in FACTS}
     schema = pa.schema(fields, metadata={METADATA_KEY: json.dumps(facts).encode()})
     partial = path.with_name(f".{path.name}.partial")
     try:
@@ -84,15 +86,20 @@ def read_trajectory(path: Path) -> Trajectory:
         table = pq.read_table(path)
     except (OSError, pa.ArrowInvalid) as error:
         raise ValueError(f"{path} cannot be read as a trajectory: {error}") from error
-    metadata = (table.schema.metadata or {}).get(METADATA_KEY)
-    if metadata is None or "time" not in table.column_names:
-        raise ValueError(f"{path} is not a trajectory: its schema has no velodrome metadata")
+    try:
+        facts = json.loads((table.schema.metadata or {})[METADATA_KEY])
+        facts = {key: facts[key] for key in FACTS}
+    except (KeyError, TypeError, json.JSONDecodeError) as error:
+        raise ValueError(f"{path} is not a trajectory: its schema has no whole velodrome metadata") from error
     values: dict[str, np.ndarray | None] = {}
     present = set(table.column_names)
     for name, names in columns():
-        if not present.issuperset(column for column, _ in names):
+        absent = [column for column, _ in names if column not in present]
+        if absent and name in REQUIRED:
+            raise ValueError(f"{path} is not a trajectory: it has no column {absent[0]}")
+        if absent:
             values[name] = None
             continue
         flat = np.column_stack([table.column(column).to_numpy() for column, _ in names])
         values[name] = flat[:, 0] if name in VECTORS else flat.reshape(-1, *SHAPES.get(name, (len(names),)))
-    return Trajectory(**json.loads(metadata), **values)  # pyright: ignore[reportArgumentType]
+    return Trajectory(**facts, **values)  # pyright: ignore[reportArgumentType]

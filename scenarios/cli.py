@@ -203,6 +203,11 @@ def main() -> None:
         # The reader of a pipe (head, less) has gone: nothing is wrong here.
         sys.stderr.close()
         sys.exit(0)
+    except SystemExit:
+        # What rich makes of a broken pipe; the commands themselves end with typer.Exit.
+        sys.exit(0)
+    except OSError as error:
+        _complain(f"cannot write: {error}")
     sys.exit(status or 0)
 
 

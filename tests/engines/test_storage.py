@@ -1,0 +1,147 @@
+"""Trajectories written and read back: every bit, every fact, or a refusal."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from engines.engine import Trajectory
+from engines.storage import METADATA_KEY, columns, read_trajectory, write_trajectory
+
+OPTIONAL = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
+SHAPES = {
+    "time": (),
+    "q": (9,),
+    "qd": (9,),
+    "body_position": (4, 3),
+    "body_quaternion": (4, 4),
+    "contact_point": (2, 3),
+    "contact_force": (2, 3),
+    "gap": (2,),
+    "slip": (2, 2),
+    "kinetic_energy": (),
+    "potential_energy": (),
+}
+
+
+def trajectory(count: int = 5, **changes: Any) -> Trajectory:
+    """Distinct numbers everywhere, so that a swapped column shows."""
+    rng = np.random.default_rng(1)
+    values: dict[str, Any] = {name: rng.standard_normal((count, *shape)) for name, shape in SHAPES.items()}
+    facts = {"engine": "exudyn", "version": "1.0", "settings": {"step": 0.001, "method": None}}
+    return Trajectory(**{**values, **facts, "steps": 7, "cpu_time": 0.1 + 0.2, "ended": "fell", **changes})
+
+
+def assert_same(a: Trajectory, b: Trajectory) -> None:
+    for field in fields(Trajectory):
+        left, right = getattr(a, field.name), getattr(b, field.name)
+        if isinstance(left, np.ndarray):
+            assert right.dtype == np.float64, field.name
+            assert right.shape == left.shape, field.name
+            # Bits, not values: nan and -0 come back as they were.
+            assert right.tobytes() == left.tobytes(), field.name
+        else:
+            assert left == right, field.name
+
+
+def test_everything_comes_back_to_the_bit(tmp_path: Path) -> None:
+    q = trajectory().q
+    q[0, :5] = np.nan, np.inf, -0.0, 5e-324, 1 / 3
+    written = trajectory(q=q)
+    write_trajectory(written, tmp_path / "a.parquet")
+    assert_same(written, read_trajectory(tmp_path / "a.parquet"))
+
+
+@pytest.mark.parametrize("absent", [(name,) for name in OPTIONAL] + [OPTIONAL])
+def test_what_an_engine_does_not_give_stays_none(absent: tuple[str, ...], tmp_path: Path) -> None:
+    written = replace(trajectory(), **dict.fromkeys(absent))
+    write_trajectory(written, tmp_path / "a.parquet")
+    assert_same(written, read_trajectory(tmp_path / "a.parquet"))
+
+
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.integers(1, 40),
+    st.none() | st.text(),
+    st.dictionaries(st.text(), st.none() | st.booleans() | st.integers() | st.text() | st.floats(allow_nan=False)),
+)
+def test_any_facts_come_back(tmp_path: Path, count: int, ended: str | None, facts: dict[str, Any]) -> None:
+    written = trajectory(count, ended=ended, settings=facts)
+    write_trajectory(written, tmp_path / "a.parquet")
+    assert_same(written, read_trajectory(tmp_path / "a.parquet"))
+
+
+def test_columns_are_named_and_carry_units(tmp_path: Path) -> None:
+    written = trajectory()
+    write_trajectory(written, tmp_path / "a.parquet")
+    table = pq.read_table(tmp_path / "a.parquet")
+    units = {field.name: field.metadata[b"unit"].decode() for field in table.schema}
+    assert list(units) == [column for _, names in columns() for column, _ in names]
+    sample = {"time": "s", "lean": "rad", "lean_rate": "rad/s", "x_rate": "m/s", "rear_contact_x": "m"}
+    sample |= {"front_force_z": "N", "rear_gap": "m", "front_slip_forward": "m/s", "kinetic_energy": "J"}
+    sample |= {"front_wheel_qw": "1", "rear_frame_x": "m"}
+    assert sample.items() <= units.items()
+    # A reader without this suite finds the right numbers under the names.
+    force, slip = written.contact_force, written.slip
+    assert force is not None
+    assert slip is not None
+    assert table["front_force_z"].to_pylist() == force[:, 1, 2].tolist()
+    assert table["rear_slip_forward"].to_pylist() == slip[:, 0, 1].tolist()
+    assert table["front_wheel_qw"].to_pylist() == written.body_quaternion[:, 3, 0].tolist()
+
+
+def test_a_write_that_fails_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="reshape"):
+        write_trajectory(trajectory(gap=np.zeros((4, 2))), tmp_path / "a.parquet")
+    with pytest.raises(TypeError):
+        write_trajectory(trajectory(settings={"step": object()}), tmp_path / "a.parquet")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_write_that_breaks_off_keeps_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.parquet"
+    write_trajectory(trajectory(), path)
+    whole = path.read_bytes()
+
+    def half(_: Any, where: Path) -> None:
+        where.write_bytes(whole[: len(whole) // 2])
+        raise OSError("disk full")
+
+    monkeypatch.setattr(pq, "write_table", half)
+    with pytest.raises(OSError, match="disk full"):
+        write_trajectory(replace(trajectory(), steps=8), path)
+    assert path.read_bytes() == whole
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def damaged(kind: str, path: Path) -> None:
+    """Write a file that is no whole trajectory."""
+    write_trajectory(trajectory(), path)
+    table, content = pq.read_table(path), path.read_bytes()
+    if kind == "missing":
+        path.unlink()
+    elif kind == "text":
+        path.write_text("time,x\n0,1\n")
+    elif kind == "cut":
+        path.write_bytes(content[: len(content) // 2])
+    elif kind == "no column x":
+        pq.write_table(table.drop(["x"]), path)
+    elif kind == "no metadata":
+        pq.write_table(table.replace_schema_metadata(None), path)
+    else:
+        pq.write_table(table.replace_schema_metadata({METADATA_KEY: kind.encode()}), path)
+
+
+@pytest.mark.parametrize("kind", ["missing", "text", "cut", "no column x", "no metadata", "{", "{}", "[]"])
+def test_what_is_no_trajectory_is_refused_by_name(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.parquet"
+    damaged(kind, path)
+    with pytest.raises(ValueError, match=r"a\.parquet .*trajectory"):
+        read_trajectory(path)
