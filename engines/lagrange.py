@@ -22,7 +22,7 @@ class LagrangeSettings(Settings):
         "dop853", description="adaptive order 8 with projection, or the paper's own method"
     )
     tolerance: float = Field(1e-13, ge=1e-15, le=1e-3, description="error of a step of dop853, relative to 1 + |state|")
-    step: float = Field(1e-3, gt=0, le=0.1, description="step of modified-euler [s]")
+    step: float = Field(1e-3, ge=1e-6, le=0.1, description="step of modified-euler [s]")
 
 
 class LagrangeEngine:

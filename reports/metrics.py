@@ -104,7 +104,8 @@ def horizon(trajectory: Trajectory, reference: Trajectory, growth_rate: float, s
     time = trajectory.time[: len(error)]
     small = (error > 0) & (error < 1e-2 * size)
     if not small.any():
-        return None
+        # Meaningless from the start, or without any error at all.
+        return 0.0 if error.max() > 0 else None
     seed = float(np.max(np.log(error[small]) - growth_rate * time[small]))
     return max(0.0, (np.log(size) - seed) / growth_rate)
 

@@ -24,7 +24,8 @@ from .start import Start
 
 BASELINES = Path(next(iter(reports.__path__))) / "baselines"
 GATED_TAG = "gated"
-DURATION = 3.0  # two turns of q2 and a bit: seconds of work in the slowest engine
+DURATION = 3.0  # a turn of q2 and a bit: seconds of work in the slowest engine
+OUTPUT_RATE = 50.0  # an interval that doubled steps divide as well: a coarser step is judged, not refused
 SHORT_HORIZON = 1.0
 
 
@@ -95,7 +96,7 @@ def check(
     verdicts: list[tuple[str, Verdict]] = []
     fresh: dict[str, dict[str, Any]] = {}
     for name in gated_names():
-        _, scenario = load_scenario(name, {"simulation.duration": DURATION})
+        _, scenario = load_scenario(name, {"simulation.duration": DURATION, "simulation.output_rate": OUTPUT_RATE})
         start = plan_run(name, scenario, []).start
         baseline = read_baseline(name)
         entries: dict[str, Any] = {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from rich import progress as bars
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from reference.bicycle import Bicycle
 from reference.circular import CircularMotion
@@ -184,21 +186,25 @@ def _numbers(values: list[float]) -> str:
     return ", ".join(f"{value:.9g}" for value in values)
 
 
+STATUS_STYLES = {"holds": "green", "better": "cyan", "changed": "red", "worse": "red", "missing": "red"}
+
+
 def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]]) -> None:
-    """Print the gate's verdicts: every quantity, then what fails in plain lines."""
-    table = Table("scenario", "engine", "quantity", box=None, pad_edge=False)
-    for title in ("value", "baseline", "limit"):
-        table.add_column(title, justify="right")
-    table.add_column("verdict")
-    styles = {"holds": "green", "better": "cyan", "worse": "red", "missing": "red"}
-    for scenario, verdict in verdicts:
-        numbers = ("–" if x is None else f"{x:.4g}" for x in (verdict.value, verdict.baseline, verdict.limit))
-        style = styles[verdict.status]
-        table.add_row(scenario, verdict.engine, verdict.quantity, *numbers, f"[{style}]{verdict.status}[/{style}]")
-    console.print(table)
-    for scenario, verdict in verdicts:
+    """Print the gate's verdicts: every quantity by scenario, then what does not hold in plain lines."""
+    for name, group in groupby(verdicts, key=lambda item: item[0]):
+        console.print(name, style="bold", markup=False)
+        table = Table("engine", "quantity", box=None, pad_edge=False)
+        for title in ("value", "baseline", "limit"):
+            table.add_column(title, justify="right")
+        table.add_column("verdict")
+        for _, verdict in group:
+            numbers = ("–" if x is None else f"{x:.4g}" for x in (verdict.value, verdict.baseline, verdict.limit))
+            status = Text(verdict.status, STATUS_STYLES[verdict.status])
+            table.add_row(verdict.engine, verdict.quantity, *numbers, status)
+        console.print(table)
+    for name, verdict in verdicts:
         if verdict.status != "holds":
-            line = f"{scenario}: {verdict.engine}: {verdict.quantity}: {verdict.status}: {verdict.reason}"
-            console.print(line, style=styles[verdict.status], markup=False, highlight=False, soft_wrap=True)
+            line = f"{name}: {verdict.engine}: {verdict.quantity}: {verdict.status}: {verdict.reason}"
+            console.print(line, style=STATUS_STYLES[verdict.status], markup=False, highlight=False, soft_wrap=True)
     passes = all(verdict.passes for _, verdict in verdicts)
     console.print("the gate holds" if passes else "the gate fails", style="bold green" if passes else "bold red")

@@ -23,7 +23,7 @@ class ExudynSettings(Settings):
     """Settings of the generalized-alpha solver (Chung and Hulbert 1993; Arnold and Bruels 2007)."""
 
     step: float = Field(
-        default=1e-3, gt=0, le=0.05, description="Step size [s]; the output interval is a multiple of it."
+        default=1e-3, ge=1e-6, le=0.05, description="Step size [s]; the output interval is a multiple of it."
     )
     spectral_radius: float = Field(
         default=0.8,

@@ -12,7 +12,7 @@ from engines.engine import Settings
 class NativeSettings(Settings):
     """How MuJoCo integrates the bicycle and softens its contacts."""
 
-    step: float = Field(default=0.002, gt=0, le=0.02, description="time step [s]; must divide the output interval")
+    step: float = Field(default=0.002, ge=1e-6, le=0.02, description="time step [s]; must divide the output interval")
     integrator: Literal["Euler", "implicit", "implicitfast", "RK4"] = Field(
         default="implicitfast",
         description="MuJoCo's integrator; on a curved surface RK4's stages see the ground as at the start of the step",

@@ -76,7 +76,9 @@ def test_a_bounded_disturbance_tilts_a_line_by_no_more_than_the_limit_says(distu
         (1.0099e-5, "holds"),
         (0.9901e-5, "holds"),
         (1.0101e-5, "worse"),
-        (0.9899e-5, "better"),
+        (0.9899e-5, "changed"),
+        (-1e-5, "changed"),
+        (-1.0101e-5, "worse"),
         (float("nan"), "worse"),
         (float("inf"), "worse"),
         (None, "missing"),
@@ -86,6 +88,15 @@ def test_a_value_is_held_against_its_baseline(value: float | None, status: str) 
     (verdict,) = judged(value)
     assert (verdict.engine, verdict.quantity, verdict.status) == ("exudyn", "short_error", status)
     assert verdict.passes == (status in ("holds", "better"))
+
+
+def test_an_improvement_needs_another_version_or_other_settings() -> None:
+    for change in ({"version": "1.1"}, {"settings": SETTINGS | {"step": 0.0005}}):
+        (verdict,) = judged(0.9899e-5, **change)
+        assert (verdict.status, verdict.passes) == ("better", True)
+        # The other sign at the same size is no improvement.
+        (verdict,) = judged(-1e-5, **change)
+        assert (verdict.status, verdict.passes) == ("changed", False)
 
 
 def test_what_an_engine_never_gave_is_not_judged_and_what_is_new_is_missing() -> None:
@@ -117,15 +128,15 @@ def test_verdicts_are_json() -> None:
     assert [row["passes"] for row in rows] == [True, False]
 
 
-def test_quantities_are_sizes() -> None:
+def test_quantities_keep_their_signs() -> None:
     rates = {"radius_drift_rate": -1e-6, "phase_drift_rate": 2e-6, "rear_rate_drift_rate": -3e-6}
     measured = rates | {"energy_drift": 1e-8, "max_slip": None, "mean_slip": None}
     found = quantities(measured, 5e-6)
     assert found == {
         "short_error": 5e-6,
-        "radius_drift_rate": 1e-6,
+        "radius_drift_rate": -1e-6,
         "phase_drift_rate": 2e-6,
-        "rear_rate_drift_rate": 3e-6,
+        "rear_rate_drift_rate": -3e-6,
         "energy_drift": 1e-8,
         "max_slip": None,
         "mean_slip": None,

@@ -281,7 +281,7 @@ WORSE = Verdict("exudyn", "short_error", 2e-5, 1e-5, 1e-7, "worse", "1e-05 -> 2e
 
 
 @pytest.mark.parametrize(
-    ("status", "passes"), [("holds", True), ("better", True), ("worse", False), ("missing", False)]
+    ("status", "passes"), [("holds", True), ("better", True), ("changed", False), ("worse", False), ("missing", False)]
 )
 def test_check_is_status_1_when_a_verdict_fails(
     status: str, passes: bool, velodrome, monkeypatch: pytest.MonkeyPatch

@@ -21,7 +21,7 @@ from scenarios.scenario import Scenario, ScenarioError
 from scenarios.start import Start, make_start
 
 NAMES = engine_names()
-FIXED_STEP = {"exudyn": 0.002, "mujoco-native": 0.005}  # coarser than their baselines' 1 ms and 2 ms
+FIXED_STEP = {"exudyn": 0.002, "mujoco-native": 0.004}  # twice their baselines'
 Chosen = Callable[[str, Mapping[str, Any]], tuple[Engine, Settings]]
 
 
@@ -90,7 +90,7 @@ def test_round_off_of_the_start_stays_far_inside_the_limits(name: str) -> None:
         assert share < (0.5 if name == "reference" else 1e-3), verdict.quantity
 
 
-# Both directions where the engine's own error is larger than what the fault brings, and may hide it.
+# Both directions where the fault may cancel part of the engine's own error.
 @pytest.mark.parametrize(
     ("name", "factor"), [("reference", 1.01), ("exudyn", 1.01), ("mujoco-native", 0.99), ("mujoco-native", 1.01)]
 )
@@ -104,7 +104,8 @@ def test_one_percent_of_the_front_wheels_spin_inertia_fails(name: str, factor: f
         return replace(problem, bicycle=changed)
 
     fails = failing(verdicts_on(name, altered(before=heavier)))
-    assert fails & {"short_error", "radius_drift_rate", "phase_drift_rate", "rear_rate_drift_rate"}
+    # The exact circle is another one, so most of what is gated moves.
+    assert len(fails & {"short_error", "radius_drift_rate", "phase_drift_rate", "rear_rate_drift_rate"}) >= 3
 
 
 @pytest.mark.parametrize("name", FIXED_STEP)
@@ -181,12 +182,12 @@ def test_updated_baselines_hold_the_next_run(tmp_path: Path, monkeypatch: pytest
     def coarser(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
         if name != "mujoco-native":
             raise EngineError("not asked for")
-        return configure(name, {**values, "step": 0.005})
+        return configure(name, {**values, "step": 0.004})
 
     _, fresh = gate.check(lambda *_: None, coarser)
     paths = gate.update(fresh)
     assert [path.stem for path in paths] == gate.gated_names()
-    assert json.loads(paths[0].read_text())["engines"]["mujoco-native"]["settings"]["step"] == 0.005
+    assert json.loads(paths[0].read_text())["engines"]["mujoco-native"]["settings"]["step"] == 0.004
     assert failing(verdicts_on("mujoco-native", coarser)) == set()
     # And the step that was right before is a change now, as large as the other way round.
     statuses = {verdict.status for verdict in verdicts_on("mujoco-native")}
