@@ -84,9 +84,9 @@ class Steady:
             If the solution is no motion (sigma < 0).
         """
         u = unknowns
-        if u[SIGMA] < 0:
+        if u[SIGMA] < -1e-12:  # round-off of a static equilibrium
             raise ValueError(f"no motion: the squared speed is {u[SIGMA]!r}")
-        speed = np.sqrt(kernel.SIGMA_UNIT * u[SIGMA]) * (-1.0 if u[REAR_SPEED] < 0 else 1.0)
+        speed = np.sqrt(kernel.SIGMA_UNIT * max(u[SIGMA], 0.0)) * (-1.0 if u[REAR_SPEED] < 0 else 1.0)
         yaw_rate, rear_rate, front_rate = (float(speed * u[i]) for i in (YAW_SPEED, REAR_SPEED, FRONT_SPEED))
         weight = self.bicycle.mass * self.bicycle.gravity
         return CircularMotion(

@@ -4,15 +4,16 @@ Random starts land on spurious roots, and the families reconnect as alpha grows.
 a curve with an *anchor*: a named point on the level plane, carried to the wanted alpha by
 continuation; from there the curve is followed by pseudo-arclength.
 
-=======  ===================  ==========================================================
-family   anchor               followed towards
-=======  ===================  ==========================================================
-1        A, static            growing rear rate, to B
-2        D's branch at a      both ends: E (the lean grows) and, through the cusp, C
-         rear rate of 20
-3        G, pivoting          the forward-rolling rear wheel with the steer falling, to F
-4        H = G, run backward  the reversed front wheel, through the cusp I
-=======  ===================  ==========================================================
+=======  =====================================  ============================================
+family   anchor                                 followed towards
+=======  =====================================  ============================================
+1        on the curve from A (static), at a     both ends: A and B on small curvature
+         rear rate of 15
+2        on the curve from D, away from its     both ends: E and, through the cusp D, C on
+         cusp, at a rear rate of 20             small curvature
+3        G, pivoting                            the steer falling, to F
+4        H = G                                  the steer growing, through the cusp I
+=======  =====================================  ============================================
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ import numpy as np
 from .bicycle import Bicycle
 from .circular import (
     CONTACT,
-    FORCE,
+    FRONT_SPEED,
     LEAN,
     REAR_SPEED,
     SIGMA,
@@ -35,10 +36,10 @@ from .circular import (
     Steady,
     nearest_condition,
     newton,
-    plane_condition,
     rear_rate_condition,
     unknown_condition,
 )
+from .continuation import FARTHEST, LARGEST_LEAN, LONGEST_STEP, Point, follow, root_between
 from .kernels import dynamics as kernel
 from .kernels.steady import UNKNOWNS
 from .kinematics import constants
@@ -48,29 +49,7 @@ FAMILIES = (1, 2, 3, 4)
 
 # (lean, steer) of A, D and G on the level plane, as printed (Xiong et al. 2020, section 3.2).
 _POINT_A, _POINT_D, _POINT_G = (0.0, 1.33973991149), (0.62, 2.78), (-0.01206, 1.6019)
-_ANCHOR_REAR_RATE = 20.0
-_LARGEST_RADIUS = 1e3
-_LARGEST_LEAN = 1.5
-_LARGEST_SIGMA = 100.0  # 200 rad/s: a curve can run off to infinite speed at finite angles
-
-
-def _metric(u: np.ndarray) -> np.ndarray:
-    """Diagonal of the arclength's metric at a point: unknowns that grow without bound count relatively."""
-    reach = 0.3 / (1 + 0.3 * np.hypot(u[0], u[1]))
-    scale = np.ones(UNKNOWNS)
-    scale[[0, 1, 10, 11, 13, 14]] = reach
-    scale[2] = 1 / (1 + abs(u[2]))
-    scale[SIGMA] = 1 / (1 + abs(u[SIGMA]))
-    scale[FORCE] = 1 / (1 + np.abs(u[FORCE]).max())
-    return scale**2
-
-
-@dataclass(frozen=True)
-class Point:
-    """A solution on a curve with the curve's direction there."""
-
-    unknowns: np.ndarray
-    tangent: np.ndarray
+_ANCHOR_REAR_RATE = {1: 15.0, 2: 20.0}
 
 
 def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
@@ -116,64 +95,6 @@ def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
     return u
 
 
-def follow(equations: Steady, start: np.ndarray, towards: np.ndarray, most: int = 4000) -> Iterator[Point]:
-    """Pseudo-arclength continuation along the curve through a solution.
-
-    Parameters
-    ----------
-    equations : Steady
-    start : ndarray, shape (22,)
-        A solution.
-    towards : ndarray, shape (22,)
-        Direction whose scalar product with the first tangent is to be positive.
-    most : int
-        Number of points at the most.
-
-    Yields
-    ------
-    Point
-        The start, then points along the curve, until its physical end (sigma < 0, the lean near
-        +-pi/2, a very large circle) or until steps of 1e-6 no longer converge.
-    """
-    u, distance = start, 0.02
-    tangent = _tangent(equations, u)
-    tangent = tangent if tangent @ towards > 0 else -tangent
-    yield Point(u, tangent)
-    for _ in range(most):
-        while (step := _step(equations, Point(u, tangent), distance)) is None:
-            distance /= 2
-            if distance < 1e-6:
-                return
-        (u, tangent), iterations = (step[0].unknowns, step[0].tangent), step[1]
-        distance = min(0.15, distance * (1.4 if iterations <= 4 else 0.8))
-        if not -1e-9 < u[SIGMA] < _LARGEST_SIGMA or abs(u[LEAN]) > _LARGEST_LEAN:
-            return
-        if np.hypot(u[0], u[1]) > _LARGEST_RADIUS:
-            return
-        yield Point(u, tangent)
-
-
-def _step(equations: Steady, point: Point, distance: float) -> tuple[Point, int] | None:
-    """One step along the arc and the iterations it took; None where it fails or turns too sharply."""
-    covector = _metric(point.unknowns) * point.tangent
-    guess = point.unknowns + distance * point.tangent
-    try:
-        u, iterations = newton(equations, guess, plane_condition(point.unknowns, covector, distance), most=7)
-    except ValueError:
-        return None
-    tangent = _tangent(equations, u)
-    turn = float(tangent @ covector)
-    # A sharp turn means that the step jumped to another branch or over a bend.
-    return (Point(u, tangent * np.sign(turn)), iterations) if abs(turn) > 0.9 else None
-
-
-def _tangent(equations: Steady, u: np.ndarray) -> np.ndarray:
-    """Null vector of the Jacobian, of unit length in the arclength's metric."""
-    # Rank 21 of 22: the singular vector of the smallest singular value.
-    null = np.linalg.svd(equations.jacobian(u))[2][-1]
-    return null / np.sqrt(null @ (_metric(u) * null))
-
-
 def _carry(bicycle: Bicycle, u: np.ndarray, alpha: float, condition: Callable) -> np.ndarray:
     """Carry a solution from the level plane to alpha at a fixed condition, with steps as long as converge."""
     reached, step = 0.0, min(alpha, 0.01)
@@ -188,12 +109,6 @@ def _carry(bicycle: Bicycle, u: np.ndarray, alpha: float, condition: Callable) -
         else:
             reached, step = wanted, step * (1.5 if iterations <= 5 else 1.0)
     return u
-
-
-def _squared_rear_rate_slope(point: Point) -> float:
-    """Derivative of sigma b^2 along the curve; zero at a fold in the rear rate."""
-    u, t = point.unknowns, point.tangent
-    return t[SIGMA] * u[REAR_SPEED] ** 2 + 2 * u[SIGMA] * u[REAR_SPEED] * t[REAR_SPEED]
 
 
 def anchors(bicycle: Bicycle, alpha: float, family: int) -> tuple[Steady, np.ndarray, list[np.ndarray]]:
@@ -212,18 +127,19 @@ def anchors(bicycle: Bicycle, alpha: float, family: int) -> tuple[Steady, np.nda
     """
     level = Steady(bicycle, Paraboloid(0.0))
     axis = np.eye(UNKNOWNS)
-    if family == 1:
-        condition = unknown_condition(SIGMA, 0.0)
-        u, _ = newton(level, start_on_plane(bicycle, *_POINT_A), condition, most=30)
-        directions = [axis[SIGMA]]
-    elif family == 2:
-        u, _ = newton(level, start_on_plane(bicycle, *_POINT_D), nearest_condition(), most=30)
-        points = follow(level, u, axis[LEAN])
-        crossing = next(_crossings(level, points, _ANCHOR_REAR_RATE), None)
+    if family in _ANCHOR_REAR_RATE:
+        if family == 1:
+            u, _ = newton(level, start_on_plane(bicycle, *_POINT_A), unknown_condition(SIGMA, 0.0), most=30)
+            points = follow(level, u, axis[SIGMA])
+        else:
+            u, _ = newton(level, start_on_plane(bicycle, *_POINT_D), nearest_condition(), most=30)
+            points = follow(level, u, axis[LEAN])
+        rear_rate = _ANCHOR_REAR_RATE[family]
+        crossing = next(_crossings(level, points, rear_rate), None)
         if crossing is None:
-            raise ValueError("family 2 of this bicycle does not reach its anchor")
-        u, condition = crossing, rear_rate_condition(_ANCHOR_REAR_RATE)
-        directions = [axis[LEAN], -axis[LEAN]]
+            raise ValueError(f"family {family} of this bicycle does not reach its anchor, rear rate {rear_rate} rad/s")
+        u, condition = crossing, rear_rate_condition(rear_rate)
+        directions = [axis[STEER], -axis[STEER]]
     else:
         condition = unknown_condition(REAR_SPEED, 0.0)
         u, _ = newton(level, start_on_plane(bicycle, *_POINT_G), condition, most=30)
@@ -231,35 +147,122 @@ def anchors(bicycle: Bicycle, alpha: float, family: int) -> tuple[Steady, np.nda
     return Steady(bicycle, Paraboloid(alpha)), _carry(bicycle, u, alpha, condition), directions
 
 
+def rear_rate_slope(point: Point) -> float:
+    """Derivative of the squared rear rate along the curve; zero at a fold in it and at the pivot."""
+    return _squared_rate_slope(point, REAR_SPEED)
+
+
+def front_rate_slope(point: Point) -> float:
+    """Derivative of the squared front rate along the curve; zero at a cusp of the paper's figures."""
+    return _squared_rate_slope(point, FRONT_SPEED)
+
+
+def _squared_rate_slope(point: Point, wheel: int) -> float:
+    u, t = point.unknowns, point.tangent
+    return float(t[SIGMA] * u[wheel] ** 2 + 2 * u[SIGMA] * u[wheel] * t[wheel])
+
+
 def _crossings(equations: Steady, points: Iterator[Point], rear_rate: float) -> Iterator[np.ndarray]:
     """Solutions of a given rear rate on a followed curve, in the order met."""
     condition = rear_rate_condition(rear_rate)
     for first, second in pairwise(points):
         nodes = [first.unknowns, second.unknowns]
-        if _squared_rear_rate_slope(first) * _squared_rear_rate_slope(second) < 0:
-            nodes.insert(1, _fold(equations, first, second))
+        if rear_rate_slope(first) * rear_rate_slope(second) < 0:
+            nodes.insert(1, root_between(equations, first, second, rear_rate_slope).unknowns)
         for a, b in pairwise(nodes):
             fa, fb = condition(a).value, condition(b).value
             if fa == 0 or fa * fb < 0:
                 yield newton(equations, a + (b - a) * fa / (fa - fb), condition, most=30)[0]
 
 
-def _fold(equations: Steady, first: Point, second: Point) -> np.ndarray:
-    """Point between two others where the rear rate is extreme, by bisection on the slope along the arc."""
-    covector = _metric(first.unknowns) * first.tangent
-    low, high, u = 0.0, float(covector @ (second.unknowns - first.unknowns)), first.unknowns
-    # The extreme value is quadratic in the position: half the digits of the arc give all of the rate's.
-    while high - low > 1e-8:
-        middle = 0.5 * (low + high)
-        guess = first.unknowns + middle * first.tangent
-        u, _ = newton(equations, guess, plane_condition(first.unknowns, covector, middle))
-        tangent = _tangent(equations, u)
-        point = Point(u, tangent * np.sign(tangent @ covector))
-        if _squared_rear_rate_slope(point) * _squared_rear_rate_slope(first) > 0:
-            low = middle
-        else:
-            high = middle
-    return u
+@dataclass(frozen=True)
+class Family:
+    """A solution family, end to end.
+
+    Attributes
+    ----------
+    number : int
+    equations : Steady
+    points : list of Point
+        In the order of one direction; all tangents point that way.
+    """
+
+    number: int
+    equations: Steady
+    points: list[Point]
+
+    @property
+    def ends(self) -> tuple[str, str]:
+        """What the curve ends in: ``static``, ``pivot``, ``large circle``, ``flat`` or ``fast front wheel``."""
+        return _kind_of_end(self.points[0]), _kind_of_end(self.points[-1])
+
+
+def _kind_of_end(point: Point) -> str:
+    u = point.unknowns
+    # Static and pivot are solved for: their unknown is zero to round-off.
+    if abs(u[SIGMA]) < 1e-12:
+        return "static"
+    if abs(u[REAR_SPEED]) < 1e-12:
+        return "pivot"
+    if np.linalg.norm(u[:3]) > 0.3 * FARTHEST:
+        return "large circle"
+    return "flat" if abs(u[LEAN]) > LARGEST_LEAN - 0.2 else "fast front wheel"
+
+
+def trace(bicycle: Bicycle, alpha: float, family: int, longest: float = LONGEST_STEP) -> Family:
+    """Follow a family through its anchor to both ends.
+
+    A curve ends at the static equilibrium, at the pivoting motion (where families 3 and 4 meet), near
+    a lean of +-pi/2, on a very large circle or at a very large speed.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    alpha : float
+        Shape of the paraboloid [1/m].
+    family : int
+        1 to 4.
+    longest : float
+        Longest step of the arc.
+
+    Returns
+    -------
+    Family
+
+    Raises
+    ------
+    ValueError
+        If the family's anchor cannot be reached at this alpha.
+    """
+    equations, anchor, directions = anchors(bicycle, alpha, family)
+    forward = _end_exactly(equations, list(_to_an_end(follow(equations, anchor, directions[0], longest))))
+    if len(directions) == 1:
+        return Family(family, equations, forward)
+    backward = _end_exactly(equations, list(_to_an_end(follow(equations, anchor, directions[1], longest))))
+    turned = [Point(point.unknowns, -point.tangent) for point in reversed(backward[1:])]
+    return Family(family, equations, turned + forward)
+
+
+def _to_an_end(points: Iterator[Point]) -> Iterator[Point]:
+    """Points up to and with the first beyond the pivoting motion, or to the end of the curve."""
+    start = 0.0
+    for point in points:
+        yield point
+        speed = point.unknowns[REAR_SPEED]
+        if start * speed < 0:
+            return
+        if abs(speed) > 1e-9:  # not yet: the curve may start at the pivot
+            start = speed
+
+
+def _end_exactly(equations: Steady, points: list[Point]) -> list[Point]:
+    """Replace a last point beyond the static equilibrium or the pivoting motion by that end itself."""
+    for unknown in (SIGMA, REAR_SPEED):
+        first, last = points[-2:] if len(points) > 1 else (points[0], points[0])
+        if first.unknowns[unknown] * last.unknowns[unknown] < 0:
+            end = root_between(equations, first, last, lambda point, k=unknown: float(point.unknowns[k]))
+            return [*points[:-1], end]
+    return points
 
 
 def motions(bicycle: Bicycle, alpha: float, family: int, rear_rate: float) -> list[CircularMotion]:

@@ -116,6 +116,26 @@ def circular_command(
         present.show_circular(Console(), found)
 
 
+@app.command("families")
+def families_command(
+    alpha: Annotated[float, typer.Option(help="Shape of the bowl z = alpha (x² + y²) [1/m]; 0 is the plane.")],
+    out: Annotated[Path | None, typer.Option(help="Folder for families.json and the figure families.png.")] = None,
+    as_json: Json = False,
+) -> None:
+    """The four solution families by continuation: special points, stable sections."""
+    # scipy's optimisers and matplotlib take half a second that the other commands need not wait for.
+    from .survey import families_document, write_families
+
+    with present.working(_STARTING):
+        document = families_document(alpha)
+    if out is not None:
+        write_families(document, out)
+    if as_json:
+        _print_json(document)
+    else:
+        present.show_families(Console(), document)
+
+
 @app.command("check")
 def check_command(
     update: Annotated[bool, typer.Option("--update", help="Write this run's values as the new baselines.")] = False,

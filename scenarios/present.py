@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
@@ -184,6 +184,30 @@ def show_circular(console: Console, found: dict[str, Any]) -> None:
 
 def _numbers(values: list[float]) -> str:
     return ", ".join(f"{value:.9g}" for value in values)
+
+
+def show_families(console: Console, document: Mapping[str, Any]) -> None:
+    """Print the families: where each runs, its special points, its stable sections."""
+    for family in document["families"]:
+        points = family["points"]
+        console.print(
+            f"family {family['family']}: {len(points['lean'])} points, from {family['ends'][0]} to {family['ends'][1]}",
+            style="bold",
+            markup=False,
+            highlight=False,
+        )
+        table = Table("", "kind", box=None, pad_edge=False)
+        for title in ("rear rate", "front rate", "lean", "steer"):
+            table.add_column(title, justify="right")
+        for name, point in family["special_points"].items():
+            numbers = (f"{point[key]:.9f}" for key in ("rear_rate", "front_rate", "lean", "steer"))
+            table.add_row(name, point["kind"], *numbers)
+        if family["special_points"]:
+            console.print(table)
+        for section in family["stable_sections"]:
+            rates, causes = section["rear_rate"], section["cause"]
+            line = " to ".join(f"{rate:.9f} ({cause})" for rate, cause in zip(rates, causes, strict=True))
+            console.print(f"Lyapunov stable: rear rate {line}", style="green", markup=False, highlight=False)
 
 
 STATUS_STYLES = {"holds": "green", "better": "cyan", "changed": "red", "worse": "red", "missing": "red"}

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .dynamics import accelerations, complete_velocity, mass_and_bias, residual, settle
+from .dynamics import accelerations, complete_velocity, energies, mass_and_bias, residual, settle
 from .vector import jit
 
 UNKNOWNS = 22
@@ -62,6 +62,16 @@ def steady_jacobian(u, function, parameters, c, out):
         z[j] = u[j]
         for i in range(UNKNOWNS):
             out[i, j] = r[i].imag / STEP
+
+
+@jit
+def steady_energy(u, c):
+    """Kinetic plus potential energy at the unknowns ``u`` (22,) [J]."""
+    q, qd = np.zeros(9, u.dtype), np.zeros(9, u.dtype)
+    q[0], q[1], q[2], q[4], q[5], q[6] = u[0], u[1], u[2], u[3], u[4], u[5]
+    qd[0], qd[1], qd[3], qd[7], qd[8] = -u[6] * u[1], u[6] * u[0], u[6], u[7], u[8]
+    kinetic, potential = energies(q, qd, c)
+    return SIGMA_UNIT * u[9] * kinetic + potential
 
 
 @jit

@@ -5,7 +5,6 @@ from scipy.optimize import minimize_scalar
 
 from reference.bicycle import Bicycle
 from reference.circular import (
-    SIGMA,
     STEER,
     Steady,
     nearest_condition,
@@ -49,12 +48,6 @@ def test_family_two_has_two_motions_at_q2_and_near_tells_them_apart() -> None:
     # Without a family the nearest of all is found as well.
     family, same = find_motion(BICYCLE, 0.005, 18.0, near=(0.69, 2.87))
     assert (family, same.lean) == (2, both[1].lean)
-
-
-def test_point_a_is_the_printed_static_equilibrium() -> None:
-    _, u, _ = anchors(BICYCLE, 0.0, 1)
-    assert abs(u[SIGMA]) < 1e-14
-    assert rounds_to(u[STEER], PRINTED["A"]["steer"])
 
 
 def test_point_g_is_the_printed_pivoting_motion() -> None:

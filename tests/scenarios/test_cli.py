@@ -347,3 +347,28 @@ def test_a_real_interrupt_ends_a_real_run_in_order(tmp_path: Path) -> None:
     assert list(entry["engines"]) == ["reference"]
     files = {"scenario.toml", "manifest.json", "metrics.json", "comparison.rrd", "reference.parquet"}
     assert {path.name for path in Path(entry["folder"]).iterdir()} == files
+
+
+def test_families_is_one_document_with_every_family(velodrome, tmp_path: Path) -> None:
+    result = velodrome("families", "--alpha", "0.005", "--out", "found", "--json")
+    assert (result.status, result.stderr) == (0, "")
+    document = result.json()
+    assert document == json.loads((tmp_path / "found" / "families.json").read_text())
+    assert (tmp_path / "found" / "families.png").stat().st_size > 10_000
+    assert [family["family"] for family in document["families"]] == [1, 2, 3, 4]
+    for family in document["families"]:
+        lengths = {name: len(values) for name, values in family["points"].items()}
+        assert len(set(lengths.values())) == 1, lengths
+        assert {"rear_rate", "radius", "energy", "lyapunov_stable", "normal_force_front"} <= set(lengths)
+        assert any(family["points"]["lyapunov_stable"]) == bool(family["stable_sections"])
+    assert document["families"][1]["special_points"]["D"]["kind"] == "cusp"
+    table = velodrome("families", "--alpha", "0.005").stdout
+    assert all(f"family {number}: " in table for number in (1, 2, 3, 4))
+    assert "Lyapunov stable: rear rate 15.276263732 (hopf) to 19.314284863 (hopf)" in table
+
+
+def test_families_refuses_a_shape_that_is_none(velodrome, tmp_path: Path) -> None:
+    result = velodrome("families", "--alpha", "-1", "--out", "found")
+    assert (result.status, result.stdout) == (2, "")
+    assert "alpha is -1.0" in result.stderr
+    assert not list(tmp_path.iterdir())

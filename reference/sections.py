@@ -1,0 +1,127 @@
+"""Stability along a family: eigenvalues, their modes, and the Lyapunov-stable sections."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from .circular import CircularMotion, Steady
+from .continuation import Point, root_between
+from .families import Family
+from .stability import Linearisation, growth_rate, linearise, structural_eigenvalues
+
+MODES = ("family", "castering", "capsize", "weave", "orbital")
+
+
+@dataclass(frozen=True)
+class SectionEnd:
+    """One end of a stable section.
+
+    Attributes
+    ----------
+    cause : str
+        ``hopf`` where a pair of eigenvalues crosses the imaginary axis, ``energy`` where a real one crosses
+        zero (the energy is extreme along the family there), ``end`` where the family itself ends stable.
+    motion : CircularMotion
+    eigenvalue : complex
+        The crossing one, of positive imaginary part [1/s].
+    """
+
+    cause: str
+    motion: CircularMotion
+    eigenvalue: complex
+
+
+def linearise_point(equations: Steady, point: Point) -> tuple[CircularMotion, Linearisation]:
+    """Motion and reduced linear system at a point of a family."""
+    motion = equations.motion(point.unknowns)
+    return motion, linearise(equations.bicycle, equations.surface, *motion.state())
+
+
+def growth_along(equations: Steady, point: Point) -> float:
+    """Growth rate of disturbances at a point of a family [1/s]."""
+    motion, reduced = linearise_point(equations, point)
+    return growth_rate(equations.surface, reduced.eigenvalues, motion.yaw_rate)
+
+
+def stable_sections(family: Family) -> list[tuple[SectionEnd, SectionEnd]]:
+    """Lyapunov-stable sections of a family, both ends solved to round-off.
+
+    Parameters
+    ----------
+    family : Family
+        Points dense enough that no section lies between two neighbours.
+
+    Returns
+    -------
+    list of (SectionEnd, SectionEnd)
+        In the order of the family's points.
+    """
+    equations, points = family.equations, family.points
+    growth = [growth_along(equations, point) for point in points]
+    ends: list[SectionEnd] = []
+    if growth[0] < 0:
+        ends.append(_end(equations, points[0], "end"))
+    for i, (first, second) in enumerate(pairwise(points)):
+        if growth[i] * growth[i + 1] < 0:
+            crossing = root_between(equations, first, second, lambda point: growth_along(equations, point))
+            ends.append(_end(equations, crossing))
+    if growth[-1] < 0:
+        ends.append(_end(equations, points[-1], "end"))
+    return list(zip(ends[::2], ends[1::2], strict=True))
+
+
+def _end(equations: Steady, point: Point, cause: str | None = None) -> SectionEnd:
+    motion, reduced = linearise_point(equations, point)
+    rest = list(reduced.eigenvalues)
+    for known in structural_eigenvalues(equations.surface, motion.yaw_rate):
+        rest.remove(min(rest, key=lambda value: abs(value - known)))
+    critical = max(rest, key=lambda value: (value.real, value.imag))
+    critical = complex(critical.real, abs(critical.imag))
+    # Two zeros that meet split by the root of round-off, 1e-7; the slowest pair that crosses turns at 1/s.
+    return SectionEnd(cause or ("hopf" if critical.imag > 1e-3 else "energy"), motion, critical)
+
+
+def modes(family: Family) -> np.ndarray:
+    """Eigenvalues along a family with their modes, followed by continuity.
+
+    The first point's are named by what they are on the plane: the zero of the family, the orbital pair
+    near +-i times the yaw rate, the fast real castering root, and of the rest the complex pair weave, the
+    real root capsize. From there each point's are matched with its neighbour's as a whole.
+
+    Parameters
+    ----------
+    family : Family
+
+    Returns
+    -------
+    ndarray, shape (n, 7), complex
+        Columns family, castering, capsize, weave (2), orbital (2).
+    """
+    rows = []
+    for point in family.points:
+        motion, reduced = linearise_point(family.equations, point)
+        if not rows:
+            rows.append(_named(reduced.eigenvalues, motion.yaw_rate))
+            continue
+        cost = np.abs(rows[-1][:, None] - reduced.eigenvalues[None, :])
+        rows.append(reduced.eigenvalues[linear_sum_assignment(cost)[1]])
+    return np.array(rows)
+
+
+def _named(eigenvalues: np.ndarray, yaw_rate: float) -> np.ndarray:
+    rest = list(eigenvalues)
+
+    def take(target: complex) -> complex:
+        nearest = min(rest, key=lambda value: abs(value - target))
+        rest.remove(nearest)
+        return nearest
+
+    zero = take(0)
+    orbital = [take(complex(0, yaw_rate)), take(complex(0, -yaw_rate))]
+    castering = take(min(value.real for value in rest))
+    capsize = take(min((value for value in rest), key=lambda value: (abs(value.imag), -value.real)))
+    return np.array([zero, castering, capsize, *sorted(rest, key=lambda value: value.imag), *orbital])

@@ -1,0 +1,143 @@
+"""Special points of a family, solved from what defines them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from .bicycle import Bicycle
+from .circular import REAR_SPEED, CircularMotion, Steady
+from .continuation import Point, root_between
+from .dae import consistent_state
+from .families import Family, front_rate_slope, rear_rate_slope
+from .kernels.steady import STEP, steady_energy
+from .kinematics import FRONT_ANGLE, constants
+from .stability import VARIABLES, linearise
+from .surface import Plane
+
+LEAN, STEER, LEAN_RATE, STEER_RATE = (VARIABLES.index(name) for name in ("lean", "steer", "lean_rate", "steer_rate"))
+STRAIGHT = {1: ("B", 0.0), 2: ("C", np.pi)}
+SMALL_LEAN = 0.05  # the extremum of the front rate next to the pivoting motion has no letter
+
+
+@dataclass(frozen=True)
+class SpecialPoint:
+    """A point of a family that a condition singles out.
+
+    Attributes
+    ----------
+    name : str
+        The paper's letter where it has one, else the kind and a number.
+    kind : str
+        ``static``, ``pivot``, ``straight``, ``cusp`` (extreme front rate), ``fold`` (extreme rear rate),
+        ``energy`` (extreme energy).
+    lean, steer : float
+        [rad].
+    rear_rate, front_rate : float
+        [rad/s].
+    """
+
+    name: str
+    kind: str
+    lean: float
+    steer: float
+    rear_rate: float
+    front_rate: float
+
+
+def energy_slope(equations: Steady) -> Callable[[Point], float]:
+    """Derivative of the energy along a family of these equations, by the complex step."""
+    c = constants(equations.bicycle)
+
+    def slope(point: Point) -> float:
+        return float(steady_energy(point.unknowns + 1j * STEP * point.tangent, c).imag / STEP)
+
+    return slope
+
+
+def special_points(family: Family) -> list[SpecialPoint]:
+    """All special points of a family, in the order of its points."""
+    equations = family.equations
+    conditions: tuple[tuple[str, Callable[[Point], float]], ...] = (
+        ("cusp", front_rate_slope),
+        ("fold", rear_rate_slope),
+        ("energy", energy_slope(equations)),
+    )
+    found: list[tuple[int, str, Point]] = []
+    for kind, condition in conditions:
+        values = [condition(point) for point in family.points]
+        for i, (first, second) in enumerate(pairwise(family.points)):
+            if values[i] * values[i + 1] < 0:
+                point = root_between(equations, first, second, condition)
+                # The squared rear rate is least at the pivoting motion: that is no fold of its own.
+                if kind != "fold" or abs(point.unknowns[REAR_SPEED]) > 1e-6:
+                    found.append((i, kind, point))
+    for i, end in zip((0, len(family.points) - 1), family.ends, strict=True):
+        if end in ("static", "pivot"):
+            found.append((i, end, family.points[i]))
+    found.sort(key=lambda item: item[0])
+    ordered = [(kind, equations.motion(point.unknowns)) for _, kind, point in found]
+    points = [SpecialPoint(name, kind, *_figures(motion)) for name, kind, motion in _named(family, ordered)]
+    level = not np.any(equations.surface.parameters)
+    if level and family.number in STRAIGHT:
+        points.append(straight_motion(equations.bicycle, *STRAIGHT[family.number]))
+    return points
+
+
+def straight_motion(bicycle: Bicycle, name: str, steer: float) -> SpecialPoint:
+    """Upright straight motion on the plane that neighbouring circular motions tend to (B and C).
+
+    Its capsize eigenvalue is zero: the stiffness of lean and steer is singular.
+
+    Raises
+    ------
+    ValueError
+        If there is no such speed up to 30 m/s.
+    """
+    radius = bicycle.rear_wheel_radius
+    block = [LEAN, STEER, LEAN_RATE, STEER_RATE]
+
+    def determinant(rear_rate: float) -> float:
+        state = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.0, steer, (0.0, 0.0, rear_rate))
+        return float(np.linalg.det(linearise(bicycle, Plane(), *state).jacobian[np.ix_(block, block)]))
+
+    rates = np.linspace(0.5, 30.0, 60) / radius
+    signs = np.sign([determinant(rate) for rate in rates])
+    changes = np.flatnonzero(signs[:-1] * signs[1:] < 0)
+    if len(changes) == 0:
+        raise ValueError(f"no straight motion at steer = {steer!r} has circular neighbours")
+    rear_rate: Any = brentq(determinant, rates[changes[0]], rates[changes[0] + 1], xtol=1e-13)
+    _, rates = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.0, steer, (0.0, 0.0, rear_rate))
+    return SpecialPoint(name, "straight", 0.0, steer, rear_rate, float(rates[FRONT_ANGLE]))
+
+
+def _figures(motion: CircularMotion) -> tuple[float, float, float, float]:
+    return motion.lean, motion.steer, motion.rear_rate, motion.front_rate
+
+
+def _named(family: Family, points: list[tuple[str, CircularMotion]]) -> Iterator[tuple[str, str, CircularMotion]]:
+    """Give points the paper's letters, the others their kind and a number.
+
+    The cusps D and I exist while family 2 runs out to large circles (to C): then D is the least size of
+    the front rate on family 2, I the greatest on family 4, whose end is the wheel that runs backward.
+    """
+    letters = {"static": "A", "pivot": "H" if family.number == 4 else "G"}
+    cusps = [motion for kind, motion in points if kind == "cusp" and abs(motion.lean) > SMALL_LEAN]
+    special, ends = None, family.ends
+    if family.number == 2 and cusps and "large circle" in ends:
+        special, letters["cusp"] = min(cusps, key=lambda motion: abs(motion.front_rate)), "D"
+    if family.number == 4 and cusps and "fast front wheel" in ends:
+        special, letters["cusp"] = max(cusps, key=lambda motion: abs(motion.front_rate)), "I"
+    count: Counter[str] = Counter()
+    for kind, motion in points:
+        if kind in letters and (kind != "cusp" or motion is special):
+            yield letters[kind], kind, motion
+            continue
+        count[kind] += 1
+        yield f"{kind} {count[kind]}", kind, motion

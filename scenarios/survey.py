@@ -1,0 +1,118 @@
+"""Solution families of the benchmark bicycle as data: what `velodrome families` gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from reference.bicycle import Bicycle
+from reference.contact import observe
+from reference.families import FAMILIES, Family, trace
+from reference.sections import SectionEnd, modes, stable_sections
+from reference.special import special_points
+from reference.stability import growth_rate
+
+from .runner import write_json
+from .scenario import ScenarioError
+
+LONGEST_STEP = 0.05  # of the arc: some 100 to 300 points a family, no stable section known is shorter than three
+
+
+def families_document(alpha: float) -> dict[str, Any]:
+    """Follow all four families at alpha, with special points and stable sections.
+
+    Parameters
+    ----------
+    alpha : float
+        Shape of the paraboloid [1/m].
+
+    Returns
+    -------
+    dict
+        The JSON document of `velodrome families`.
+
+    Raises
+    ------
+    ScenarioError
+        If alpha is no shape, or a family cannot be reached there.
+    """
+    bicycle, families = Bicycle(), []
+    for number in FAMILIES:
+        try:
+            families.append(_family(trace(bicycle, alpha, number, LONGEST_STEP)))
+        except ValueError as error:
+            raise ScenarioError(f"family {number} at alpha = {alpha!r}: {error}") from error
+    return {"alpha": alpha, "families": families}
+
+
+def write_families(document: Mapping[str, Any], out: Path) -> None:
+    """Write the document and its figure into a folder, which is made if need be.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder cannot be made.
+    """
+    from reports.figures import family_figure
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ScenarioError(f"--out {out}: the folder cannot be made: {error.strerror}") from error
+    write_json(out / "families.json", document)
+    family_figure(out / "families.png", document, Bicycle().front_wheel_radius)
+
+
+def _family(family: Family) -> dict[str, Any]:
+    return {
+        "family": family.number,
+        "ends": list(family.ends),
+        "points": _points(family),
+        "stable_sections": [_section(*ends) for ends in stable_sections(family)],
+        "special_points": {
+            point.name: {
+                "rear_rate": point.rear_rate,
+                "front_rate": point.front_rate,
+                "lean": point.lean,
+                "steer": point.steer,
+                "kind": point.kind,
+            }
+            for point in special_points(family)
+        },
+    }
+
+
+def _points(family: Family) -> dict[str, list[Any]]:
+    """Quantities along the curve, equal-length lists."""
+    equations = family.equations
+    motions = [equations.motion(point.unknowns) for point in family.points]
+    states = [motion.state() for motion in motions]
+    seen = observe(
+        equations.bicycle, equations.surface, np.array([q for q, _ in states]), np.array([qd for _, qd in states])
+    )
+    normal = np.einsum("nwi,nwi->nw", np.array([motion.force for motion in motions]), seen.normal)
+    values = modes(family)
+    growth = [float(growth_rate(equations.surface, row, m.yaw_rate)) for row, m in zip(values, motions, strict=True)]
+    names = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch")
+    return {
+        **{name: [getattr(motion, name) for motion in motions] for name in names},
+        "radius": [float(np.hypot(*motion.position[:2])) for motion in motions],
+        "energy": (seen.kinetic_energy + seen.potential_energy).tolist(),
+        "lyapunov_stable": [bool(rate < 0) for rate in growth],
+        "growth_rate": growth,
+        "normal_force_rear": normal[:, 0].tolist(),
+        "normal_force_front": normal[:, 1].tolist(),
+        "eigenvalues": [[[value.real, value.imag] for value in row] for row in values],
+    }
+
+
+def _section(start: SectionEnd, end: SectionEnd) -> dict[str, Any]:
+    both = (start, end)
+    names = ("rear_rate", "lean", "steer")
+    return {name: [getattr(one.motion, name) for one in both] for name in names} | {
+        "cause": [one.cause for one in both],
+        "eigenvalue": [[one.eigenvalue.real, one.eigenvalue.imag] for one in both],
+    }
