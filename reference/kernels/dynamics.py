@@ -306,48 +306,6 @@ def complete_velocity(q, qd, p, function, parameters, c):
 
 
 @jit
-def project(q, qd, p, function, parameters, c):
-    """Return (q, qd, p) to contact and rolling by the smallest change; True on success.
-
-    Positions: the least-norm step along the gaps' gradients. Velocities: the least step in kinetic
-    energy, qd -= M^-1 J^T (J M^-1 J^T)^-1 J qd.
-    """
-    mass, bias = np.empty((9, 9), q.dtype), np.empty(9, q.dtype)
-    jacobian, spread, rows = np.empty((6, 9), q.dtype), np.empty((6, 9), q.dtype), np.empty((2, 9), q.dtype)
-    schur, slip, p_rate = np.empty((6, 6), q.dtype), np.empty(6, q.dtype), np.empty(6, q.dtype)
-    for _ in range(4):
-        if not find_contacts(q, p, function, parameters, c):
-            return False
-        gaps = rolling(q, qd, p, function, parameters, c, jacobian, slip, p_rate)
-        # Round-off of a height computed from coordinates of some ten metres.
-        if abs(gaps[0]) + abs(gaps[1]) < 1e-14:
-            break
-        normal_rows(q, p, function, parameters, c, jacobian, rows)
-        a00 = a01 = a11 = 0 * q[0]
-        for j in range(9):
-            a00 += rows[0, j] * rows[0, j]
-            a01 += rows[0, j] * rows[1, j]
-            a11 += rows[1, j] * rows[1, j]
-        det = a00 * a11 - a01 * a01
-        u = (gaps[0] * a11 - gaps[1] * a01) / det
-        v = (a00 * gaps[1] - a01 * gaps[0]) / det
-        for j in range(9):
-            q[j] -= u * rows[0, j] + v * rows[1, j]
-    mass_and_bias(q, qd, c, mass, bias)
-    factorise(mass, 9)
-    schur_complement(mass, jacobian, spread, schur)
-    for i in range(6):
-        slip[i] = 0
-        for k in range(9):
-            slip[i] += jacobian[i, k] * qd[k]
-    solve_factorised(schur, slip, 6)
-    for k in range(9):
-        for i in range(6):
-            qd[k] -= spread[i, k] * slip[i]
-    return True
-
-
-@jit
 def energies(q, qd, c):
     """Kinetic and potential energy, the latter zero at z = 0 [J]."""
     mass, bias = np.empty((9, 9), q.dtype), np.empty(9, q.dtype)

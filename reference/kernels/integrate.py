@@ -11,7 +11,10 @@ import math
 
 import numpy as np
 
-from .dynamics import accelerations, project
+from . import lean
+from .lean import derivative
+from .pose import aligned
+from .projection import project
 from .vector import jit
 
 SIZE = 24
@@ -19,14 +22,6 @@ DONE, MORE, FAILED = 0, 1, 2
 # Nothing that rolls changes within 10 ns: a smaller step means that a singularity is being crept up to
 # (a wheel flat on the ground, lean = +-pi/2), which would take millions of steps.
 SMALLEST_STEP = 1e-8
-
-
-@jit
-def derivative(y, function, parameters, c, out):
-    """Fill out = dy/dt (24,)."""
-    for i in range(9):
-        out[i] = y[9 + i]
-    accelerations(y[:9], y[9:18], y[18:], function, parameters, c, out[9:18], np.empty(6), out[18:])
 
 
 @jit
@@ -42,27 +37,32 @@ def _combine(y, h, weights, count, stages, out):
 
 
 @jit
-def _error(y, new, h, stages, e3, e5, tolerance):
-    """Error norm of a step in units of the tolerance, which is relative above 1 and absolute below."""
+def _error(y, new, h, stages, e3, e5, tolerance, error3, error5):
+    """Error norm of a step in units of the tolerance, which is relative above 1 and absolute below.
+
+    ``error3`` and ``error5`` (24,) are overwritten.
+    """
+    for i in range(SIZE):
+        error3[i] = error5[i] = 0.0
+    for j in range(13):
+        for i in range(SIZE):
+            error3[i] += e3[j] * stages[j, i]
+            error5[i] += e5[j] * stages[j, i]
     norm5 = norm3 = 0.0
     for i in range(SIZE):
-        s5 = s3 = 0.0
-        for j in range(13):
-            s5 += e5[j] * stages[j, i]
-            s3 += e3[j] * stages[j, i]
         unit = tolerance * (1 + max(abs(y[i]), abs(new[i])))
-        norm5 += (s5 / unit) ** 2
-        norm3 += (s3 / unit) ** 2
+        norm5 += (error5[i] / unit) ** 2
+        norm3 += (error3[i] / unit) ** 2
     denominator = norm5 + 0.01 * norm3
     return 0.0 if denominator == 0 else abs(h) * norm5 / math.sqrt(denominator * SIZE)
 
 
 @jit
-def _dense(y, new, h, stages, a_extra, d, function, parameters, c, work, out):
+def _dense(y, new, h, stages, a_extra, d, function, parameters, bicycle, work, out):
     """Fill ``out`` (7, 24), the coefficients of the dense output; ``stages`` gets its three extra rows."""
     for s in range(3):
         _combine(y, h, a_extra[s], 13 + s, stages, work)
-        derivative(work, function, parameters, c, stages[13 + s])
+        derivative(work, function, parameters, bicycle, stages[13 + s])
     for i in range(SIZE):
         delta = new[i] - y[i]
         out[0, i] = delta
@@ -97,39 +97,39 @@ def dop853(y, times, index, t, h, tolerance, most_steps, tableau, function, para
     Returns ``(status, index, t, h, steps, evaluations)``.
     """
     a, b, e3, e5, a_extra, d = tableau
+    bicycle = aligned(c)
     stages, coefficients = np.empty((16, SIZE)), np.empty((7, SIZE))
-    new, work = np.empty(SIZE), np.empty(SIZE)
-    derivative(y, function, parameters, c, stages[0])
+    new, work, error5 = np.empty(SIZE), np.empty(SIZE), np.empty(SIZE)
+    derivative(y, function, parameters, bicycle, stages[0])
     steps, evaluations, rejected = 0, 1, False
     while index < times.size and steps < most_steps:
         if not SMALLEST_STEP < h < 1e300:
             return FAILED, index, t, h, steps, evaluations
         for s in range(1, 12):
             _combine(y, h, a[s], s, stages, work)
-            derivative(work, function, parameters, c, stages[s])
+            derivative(work, function, parameters, bicycle, stages[s])
         _combine(y, h, b, 12, stages, new)
-        derivative(new, function, parameters, c, stages[12])
+        derivative(new, function, parameters, bicycle, stages[12])
         evaluations += 12
-        error = _error(y, new, h, stages, e3, e5, tolerance)
+        error = _error(y, new, h, stages, e3, e5, tolerance, work, error5)
         if not error < 1:  # also where it is not a number
             h *= max(0.2, 0.9 * error ** (-1 / 8)) if error < 1e300 else 0.2
             rejected = True
             continue
         if times[index] <= t + h:
-            _dense(y, new, h, stages, a_extra, d, function, parameters, c, work, coefficients)
+            _dense(y, new, h, stages, a_extra, d, function, parameters, bicycle, work, coefficients)
             evaluations += 3
             while index < times.size and times[index] <= t + h:
                 _interpolate(y, coefficients, (times[index] - t) / h, out[index])
-                row = out[index]
-                if not project(row[:9], row[9:18], row[18:], function, parameters, c):
+                if not project(out[index], function, parameters, c, bicycle):
                     return FAILED, index, t, h, steps, evaluations
                 index += 1
         factor = 10.0 if error == 0 else min(10.0, 0.9 * error ** (-1 / 8))
         for i in range(SIZE):
             y[i] = new[i]
-        if not project(y[:9], y[9:18], y[18:], function, parameters, c):
+        if not project(y, function, parameters, c, bicycle):
             return FAILED, index, t, h, steps, evaluations
-        derivative(y, function, parameters, c, stages[0])
+        derivative(y, function, parameters, bicycle, stages[0])
         evaluations += 1
         t += h
         h *= min(1.0, factor) if rejected else factor
@@ -144,13 +144,14 @@ def modified_euler(y, step, count, stride, function, parameters, c, out):
     Nothing is projected: the constraints drift with the method's error. Returns the rows filled, fewer
     than count / stride where the state stops being finite.
     """
+    bicycle = aligned(c)
     first, second, work = np.empty(SIZE), np.empty(SIZE), np.empty(SIZE)
     rows = 0
     for n in range(1, count + 1):
-        derivative(y, function, parameters, c, first)
+        derivative(y, function, parameters, bicycle, first)
         for i in range(SIZE):
             work[i] = y[i] + step * first[i]
-        derivative(work, function, parameters, c, second)
+        derivative(work, function, parameters, bicycle, second)
         total = 0.0
         for i in range(SIZE):
             y[i] += 0.5 * step * (first[i] + second[i])
@@ -164,8 +165,8 @@ def modified_euler(y, step, count, stride, function, parameters, c, out):
 
 
 @jit
-def contact_forces(q, qd, p, function, parameters, c, force):
-    """Fill ``force`` (n, 6), the multipliers along a trajectory with known contact parameters (n, 6)."""
-    qdd, rate = np.empty(9), np.empty(6)
-    for n in range(q.shape[0]):
-        accelerations(q[n], qd[n], p[n], function, parameters, c, qdd, force[n], rate)
+def contact_forces(rows, function, parameters, c, force):
+    """Fill ``force`` (n, 6), the multipliers along a trajectory ``rows`` (n, 24)."""
+    bicycle = aligned(c)
+    for n in range(rows.shape[0]):
+        lean.contact_forces(rows[n], function, parameters, bicycle, force[n])

@@ -1,0 +1,185 @@
+"""The bicycle in axes (u, y, s): the rear frame turned about its axle until its third axis is the steering axis.
+
+In these axes steer is a turn about the third axis, the rear wheel lies in the first and the third, and
+most components of what the right-hand side multiplies are zero or one. With T the tilt of the steering
+axis, x_r and z_r the axes of the rear frame (`kinematics.frames`) and e(angle), t(angle) those of a rim
+
+    u = cos T x_r + sin T z_r,    s = -sin T x_r + cos T z_r
+    e = -sin(angle + T) u - cos(angle + T) s,    t = -cos(angle + T) u + sin(angle + T) s
+
+and the same with u turned by steer for the front wheel.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numba as nb
+import numpy as np
+
+from .vector import add, combine, dot, jit, scale
+
+# Parts of one function, named for the reader: a call that passes a dozen tuples through memory costs
+# as much as the arithmetic in it (measured: a quarter of the right-hand side).
+inline = nb.njit(cache=True, error_model="numpy", forceinline=True)
+
+
+class Aligned(NamedTuple):
+    """`kinematics.Constants` in axes (u, y, s), the front assembly's at zero steer."""
+
+    gravity: float
+    mass: float
+    s1: Any  # (x, z) of the rear assembly's first moment about D
+    i1: Any  # (xx, yy, zz, xz) of its inertia about D
+    s2: Any
+    i2: Any
+    spin_rear: float
+    spin_front: float
+    rear: Any  # (x, z) of the rear wheel's centre from D
+    front: Any
+    rear_radius: float
+    front_radius: float
+    sin_tilt: float
+    cos_tilt: float
+
+
+@jit
+def _turned(x, z, c):
+    return c.cos_tilt * x + c.sin_tilt * z, c.cos_tilt * z - c.sin_tilt * x
+
+
+@jit
+def _turned_inertia(xx, yy, zz, xz, c):
+    sine, cosine = c.sin_tilt, c.cos_tilt
+    both = 2 * sine * cosine * xz
+    return (
+        cosine * cosine * xx + both + sine * sine * zz,
+        yy,
+        sine * sine * xx - both + cosine * cosine * zz,
+        (cosine * cosine - sine * sine) * xz + sine * cosine * (zz - xx),
+    )
+
+
+@jit
+def aligned(c):
+    """Turn `kinematics.Constants` into axes (u, y, s)."""
+    return Aligned(
+        c.gravity,
+        c.m1 + c.m2,
+        _turned(c.s1x, c.s1z, c),
+        _turned_inertia(c.i1xx, c.i1yy, c.i1zz, c.i1xz, c),
+        _turned(c.s2x, c.s2z, c),
+        _turned_inertia(c.i2xx, c.i2yy, c.i2zz, c.i2xz, c),
+        c.spin_rear,
+        c.spin_front,
+        _turned(c.rear_x, c.rear_z, c),
+        _turned(c.front_x, c.front_z, c),
+        c.rear_radius,
+        c.front_radius,
+        c.sin_tilt,
+        c.cos_tilt,
+    )
+
+
+class Wheel(NamedTuple):
+    """A wheel at its contact."""
+
+    rho: Any  # contact from D
+    e: Any  # radial unit vector, from the centre to the contact
+    t: Any  # tangent, axle x e
+    radius: Any
+
+
+class Pose(NamedTuple):
+    """What depends on angles alone, as components along (u, y, s)."""
+
+    x: Any  # inertial axes
+    y: Any
+    z: Any
+    ahead: Any  # a_lean
+    above: Any  # a_lean x rear axle
+    sin_lean: Any
+    cos_lean: Any
+    left: Any  # front axle
+    rear: Any
+    front: Any
+    s1: Any  # first moments of rear and front assembly about D
+    s2: Any
+    i1: Any  # inertia about D: xx, yy, zz, xy, xz, yz
+    i2: Any
+
+
+@inline
+def _wheel(hub, radius, angle, forward, a):
+    sine, cosine = np.sin(angle), np.cos(angle)
+    s, c = sine * a.cos_tilt + cosine * a.sin_tilt, cosine * a.cos_tilt - sine * a.sin_tilt
+    e = (-s * forward[0], -s * forward[1], -c)
+    t = (-c * forward[0], -c * forward[1], s)
+    reach = hub[0] - radius * s
+    return Wheel((reach * forward[0], reach * forward[1], hub[1] - radius * c), e, t, radius)
+
+
+@inline
+def pose(yaw, lean, pitch, steer, rear_angle, front_angle, a):
+    """Pose from yaw, lean, pitch, steer and the two rim angles; ``a`` the `Aligned` constants."""
+    cy, sy, cl, sl, cd, sd = np.cos(yaw), np.sin(yaw), np.cos(lean), np.sin(lean), np.cos(steer), np.sin(steer)
+    sine, cosine = np.sin(pitch), np.cos(pitch)
+    cp, sp = cosine * a.cos_tilt + sine * a.sin_tilt, sine * a.cos_tilt - cosine * a.sin_tilt
+    zero = 0 * cy
+    one = 1 + zero
+    ahead, above, across = (cp, zero, sp), (-sp, zero, cp), (sl * sp, cl, -sl * cp)
+    forward = (cd, sd, zero)
+    xx, yy, zz, xz = a.i2
+    turned = cd * cd * xx + sd * sd * yy
+    return Pose(
+        x=combine(cy, ahead, -sy, across),
+        y=combine(sy, ahead, cy, across),
+        z=(-cl * sp, sl, cl * cp),
+        ahead=ahead,
+        above=above,
+        sin_lean=sl,
+        cos_lean=cl,
+        left=(-sd, cd, zero),
+        rear=_wheel(a.rear, a.rear_radius, rear_angle, (one, zero, zero), a),
+        front=_wheel(a.front, a.front_radius, front_angle, forward, a),
+        s1=(a.s1[0] * one, zero, a.s1[1] * one),
+        s2=(cd * a.s2[0], sd * a.s2[0], a.s2[1] * one),
+        i1=(a.i1[0] * one, a.i1[1] * one, a.i1[2] * one, zero, a.i1[3] * one, zero),
+        i2=(turned, xx + yy - turned, zz * one, cd * sd * (xx - yy), cd * xz, sd * xz),
+    )
+
+
+@inline
+def times(k, v):
+    """Symmetric matrix (xx, yy, zz, xy, xz, yz) times a vector."""
+    return (
+        k[0] * v[0] + k[3] * v[1] + k[4] * v[2],
+        k[3] * v[0] + k[1] * v[1] + k[5] * v[2],
+        k[4] * v[0] + k[5] * v[1] + k[2] * v[2],
+    )
+
+
+@inline
+def angular_velocity(here, turn, lean, pitch):
+    """Angular velocity of the rear frame from its angles' rates."""
+    w = combine(turn, here.z, lean, here.ahead)
+    return w[0], w[1] + pitch, w[2]
+
+
+@inline
+def angle_rates(here, w):
+    """Rates of yaw, lean and pitch from an angular velocity: the inverse of `angular_velocity`."""
+    turn = dot(here.above, w) / here.cos_lean
+    return turn, dot(here.ahead, w), w[1] - here.sin_lean * turn
+
+
+@inline
+def to_aligned(here, x, y, z):
+    """Components along (u, y, s) from inertial ones."""
+    return add(combine(x, here.x, y, here.y), scale(z, here.z))
+
+
+@inline
+def to_inertial(here, v):
+    """Inertial components from those along (u, y, s)."""
+    return dot(here.x, v), dot(here.y, v), dot(here.z, v)

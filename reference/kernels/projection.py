@@ -1,0 +1,94 @@
+"""Return of a state to contact and rolling by the smallest change.
+
+Positions take the least-norm step along the gaps' gradients. Velocities take the least step in kinetic
+energy: minimal 1/2 d^T M d with J (qd + d) = 0 is what the equations of motion say of accelerations (the
+principle of least constraint), with the slip in the place of beta and no load but its own, so `reduction`
+finds it.
+"""
+
+from __future__ import annotations
+
+from . import contact
+from .dynamics import wheels
+from .linear import solve_three
+from .pose import angle_rates, angular_velocity, inline, pose, to_aligned, to_inertial
+from .reduction import build, solve
+from .vector import add, combine, cross, dot, jit, scale, subtract
+
+
+@inline
+def _gap_gradient(here, normal, rho):
+    """Gradient of a gap in (yaw, lean, pitch, steer) as far as the wheel follows it; ``normal`` along (u, y, s)."""
+    moment = cross(rho, normal)
+    return dot(here.z, moment), dot(here.ahead, moment), moment[1], moment[2]
+
+
+@jit
+def _to_contact(y, function, parameters, c, a):
+    """Bring gaps and contact equations to round-off in place; True on success."""
+    # A gap is a difference of coordinates, rounded a few times.
+    round_off = 2e-15 * (5 + abs(y[0]) + abs(y[1]) + abs(y[2]))
+    for _ in range(10):
+        rear, front = wheels(y, c)
+        one = contact.equations(*rear[:2], *rear[3:], y[18], y[19], y[20], function, parameters)
+        two = contact.equations(*front[:2], *front[3:], y[21], y[22], y[23], function, parameters)
+        step1, step2 = solve_three(one.jacobian, one.residual), solve_three(two.jacobian, two.residual)
+        worst = 0.0
+        for i in range(3):
+            worst += abs(step1[i]) + abs(step2[i])
+            y[18 + i] -= step1[i]
+            y[21 + i] -= step2[i]
+        if not worst < 1e300:
+            return False
+        # Newton's method leaves the square of this step, and a gap at its closest approach errs by that too.
+        if worst < 1e-8 and abs(one.gap) + abs(two.gap) < round_off:
+            return True
+        here = pose(y[3], y[4], y[5], y[6], y[20], y[23], a)
+        g1 = _gap_gradient(here, to_aligned(here, *one.normal), here.rear.rho)
+        g2 = _gap_gradient(here, to_aligned(here, *two.normal), here.front.rho)
+        m11 = 1.0 + g1[0] * g1[0] + g1[1] * g1[1] + g1[2] * g1[2]
+        m12 = dot(one.normal, two.normal) + g1[0] * g2[0] + g1[1] * g2[1] + g1[2] * g2[2]
+        m22 = 1.0 + g2[0] * g2[0] + g2[1] * g2[1] + g2[2] * g2[2] + g2[3] * g2[3]
+        det = m11 * m22 - m12 * m12
+        u, v = (one.gap * m22 - two.gap * m12) / det, (m11 * two.gap - m12 * one.gap) / det
+        for i in range(3):
+            y[i] -= u * one.normal[i] + v * two.normal[i]
+            y[3 + i] -= u * g1[i] + v * g2[i]
+        y[6] -= v * g2[3]
+    return False
+
+
+@jit
+def _to_rolling(y, a):
+    """Take the slip out of the rates in place."""
+    here = pose(y[3], y[4], y[5], y[6], y[20], y[23], a)
+    rear, front, zero = here.rear, here.front, 0 * y[0]
+    w = angular_velocity(here, y[12], y[13], y[14])
+    velocity = to_aligned(here, y[9], y[10], y[11])
+    slip = add(velocity, combine(1.0, cross(w, rear.rho), rear.radius * y[16], rear.t))
+    w2 = (w[0], w[1], w[2] + y[15])
+    slip2 = add(velocity, combine(1.0, cross(w2, front.rho), front.radius * y[17], front.t))
+    moment2 = cross(slip, here.s2)
+    moment = add(cross(slip, here.s1), moment2)
+    system = build(here, a, scale(-a.mass, slip), moment, moment2[2], zero, subtract(slip2, slip))
+    turn, steer, rear_spin, front_spin = solve(system)
+    origin = add(slip, combine(1.0, cross(turn, rear.rho), rear.radius * rear_spin, rear.t))
+    change, angles = to_inertial(here, origin), angle_rates(here, turn)
+    for i in range(3):
+        y[9 + i] -= change[i]
+        y[12 + i] += angles[i]
+    y[15] += steer
+    y[16] += rear_spin
+    y[17] += front_spin
+
+
+@jit
+def project(y, function, parameters, c, a):
+    """Return y = (q, qd, contact parameters), (24,), to contact and rolling in place; True on success.
+
+    ``c`` and ``a`` are the `kinematics.Constants` and what `pose.aligned` makes of them.
+    """
+    if not _to_contact(y, function, parameters, c, a):
+        return False
+    _to_rolling(y, a)
+    return True
