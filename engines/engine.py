@@ -63,7 +63,7 @@ class Trajectory:
     body_quaternion : ndarray, shape (n, 4, 4)
         Orientations (w, x, y, z), body to inertial axes.
     contact_point : ndarray or None, shape (n, 2, 3)
-        Contact points of the rear and the front wheel [m].
+        Rim points of the rear and the front wheel that are closest to the surface [m].
     contact_force : ndarray or None, shape (n, 2, 3)
         Force of the ground on each wheel, inertial axes [N].
     gap : ndarray or None, shape (n, 2)

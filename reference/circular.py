@@ -14,6 +14,9 @@ from .surface import Surface
 LEAN, PITCH, STEER, YAW_SPEED, REAR_SPEED, FRONT_SPEED, SIGMA = range(3, 10)
 CONTACT, FORCE = slice(10, 16), slice(16, 22)
 
+# Rows are of order one: round-off of a solution is some 1e-14, times the heights on large circles.
+LARGEST_RESIDUAL = 1e-12
+
 
 @dataclass(frozen=True)
 class CircularMotion:
@@ -184,5 +187,8 @@ def newton(equations: Steady, unknowns: np.ndarray, condition, most: int = 12) -
         size = float(np.abs(step / (1 + np.abs(u))).max())
         u = u + step * min(1.0, 0.5 / size if size > 0 else 1.0)
         if size < 1e-9:  # quadratic: what is left is round-off
+            # Least squares may also settle where the equations have no solution.
+            if np.abs(equations.residual(u)).max() > LARGEST_RESIDUAL * (1 + np.abs(u).max()):
+                break
             return u, iteration
     raise ValueError("Newton's method finds no circular motion there")

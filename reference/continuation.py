@@ -72,9 +72,8 @@ def follow(
     Yields
     ------
     Point
-        The start, then points along the curve, until it ends: with the first point of sigma < 0, near
-        a lean of +-pi/2, on a very large circle, at a very large speed, or where the shortest steps no
-        longer converge.
+        The start, then points along the curve, until it ends: with the first point of sigma < 0, beyond
+        the largest lean, circle or speed, or where the shortest steps no longer converge.
     """
     u, distance = start, 0.02
     direction = tangent(equations, u)
@@ -87,10 +86,8 @@ def follow(
                 return
         (u, direction), iterations = (step[0].unknowns, step[0].tangent), step[1]
         distance = min(longest, distance * (1.4 if iterations <= 4 else 0.8))
-        if u[SIGMA] > LARGEST_SIGMA or abs(u[LEAN]) > LARGEST_LEAN or np.linalg.norm(u[:3]) > FARTHEST:
-            return
         yield Point(u, direction)
-        if u[SIGMA] < 0:
+        if not 0 <= u[SIGMA] < LARGEST_SIGMA or abs(u[LEAN]) > LARGEST_LEAN or np.linalg.norm(u[:3]) > FARTHEST:
             return
 
 

@@ -1,8 +1,10 @@
 """Solution families: curves of circular motions, reached from the paper's named points.
 
 Random starts land on spurious roots, and the families reconnect as alpha grows. So every family is
-a curve with an *anchor*: a named point on the level plane, carried to the wanted alpha by
-continuation; from there the curve is followed by pseudo-arclength.
+a curve with an *anchor*: a point of the benchmark bicycle on the level plane, reached from a named
+one, carried by continuation to the wanted bicycle and alpha; from there the curve is followed by
+pseudo-arclength. Where families have joined or exchanged parts, an anchor stays on its part: family 3
+has two, since its part of forward circles joins family 1 between alpha = 1/5 and 1/2.
 
 =======  =====================================  ============================================
 family   anchor                                 followed towards
@@ -11,7 +13,8 @@ family   anchor                                 followed towards
          rear rate of 15
 2        on the curve from D, away from its     both ends: E and, through the cusp D, C on
          cusp, at a rear rate of 20             small curvature
-3        G, pivoting                            the steer falling, to F
+3        on the curve from G to F, at a rear    both ends; the steer falling, to F
+         rate of 20; and G, pivoting
 4        H = G                                  the steer growing, through the cusp I
 =======  =====================================  ============================================
 """
@@ -19,7 +22,8 @@ family   anchor                                 followed towards
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -49,7 +53,9 @@ FAMILIES = (1, 2, 3, 4)
 
 # (lean, steer) of A, D and G on the level plane, as printed (Xiong et al. 2020, section 3.2).
 _POINT_A, _POINT_D, _POINT_G = (0.0, 1.33973991149), (0.62, 2.78), (-0.01206, 1.6019)
-_ANCHOR_REAR_RATE = {1: 15.0, 2: 20.0}
+# Rear rates of each family's anchors; None is the pivoting motion. The last one's curve is the family's.
+ANCHORS: dict[int, tuple[float | None, ...]] = {1: (15.0,), 2: (20.0,), 3: (20.0, None), 4: (None,)}
+_NEAR_ENOUGH = 0.2  # rad: a motion further from what was asked for is another one
 
 
 def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
@@ -95,56 +101,81 @@ def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
     return u
 
 
-def _carry(bicycle: Bicycle, u: np.ndarray, alpha: float, condition: Callable) -> np.ndarray:
-    """Carry a solution from the level plane to alpha at a fixed condition, with steps as long as converge."""
-    reached, step = 0.0, min(alpha, 0.01)
-    while reached < alpha:
-        wanted = min(alpha, reached + step)
+def _carry(path: Callable[[float], Steady], u: np.ndarray, condition: Callable, what: str) -> np.ndarray:
+    """Carry a solution along a path of equations, 0 to 1, at a fixed condition; steps as long as converge."""
+    reached, step = 0.0, 0.02
+    while reached < 1:
+        wanted = min(1.0, reached + step)
         try:
-            u, iterations = newton(Steady(bicycle, Paraboloid(wanted)), u, condition, most=8)
+            u, iterations = newton(path(wanted), u, condition, most=8)
         except ValueError:
             step /= 2
-            if step < 1e-7:
-                raise ValueError(f"the family's named point cannot be followed beyond alpha = {reached:.6g}") from None
+            if step < 1e-6:
+                raise ValueError(f"its anchor is lost {100 * reached:.4g} % of the way to {what}") from None
         else:
             reached, step = wanted, step * (1.5 if iterations <= 5 else 1.0)
     return u
 
 
-def anchors(bicycle: Bicycle, alpha: float, family: int) -> tuple[Steady, np.ndarray, list[np.ndarray]]:
-    """Anchor of a family at alpha and the directions in which its curve runs.
+def _between(bicycle: Bicycle, fraction: float) -> Bicycle:
+    """Bicycle between the benchmark and another; rigid bodies stay so, since their inertias are a convex set."""
+    one, other = asdict(Bicycle()), asdict(bicycle)
+    return Bicycle(**{name: (1 - fraction) * one[name] + fraction * other[name] for name in one})
+
+
+@cache
+def _on_the_plane(family: int, rear_rate: float | None) -> np.ndarray:
+    """The benchmark's anchor on the level plane, from the paper's named points."""
+    level = Steady(Bicycle(), Paraboloid(0.0))
+    if rear_rate is None or family == 3:
+        start, _ = newton(level, start_on_plane(level.bicycle, *_POINT_G), unknown_condition(REAR_SPEED, 0.0), most=30)
+        towards = -np.eye(UNKNOWNS)[STEER]
+    elif family == 1:
+        start, _ = newton(level, start_on_plane(level.bicycle, *_POINT_A), unknown_condition(SIGMA, 0.0), most=30)
+        towards = np.eye(UNKNOWNS)[SIGMA]
+    else:
+        start, _ = newton(level, start_on_plane(level.bicycle, *_POINT_D), nearest_condition(), most=30)
+        towards = np.eye(UNKNOWNS)[LEAN]
+    return start if rear_rate is None else next(_crossings(level, follow(level, start, towards), rear_rate))
+
+
+def anchor(
+    bicycle: Bicycle, alpha: float, family: int, rear_rate: float | None
+) -> tuple[Steady, np.ndarray, list[np.ndarray]]:
+    """Carry an anchor of a family to a bicycle and alpha.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    alpha : float
+        Shape of the paraboloid [1/m].
+    family : int
+        1 to 4.
+    rear_rate : float or None
+        One of the family's `ANCHORS`.
 
     Returns
     -------
     equations : Steady
     unknowns : ndarray, shape (22,)
     directions : list of ndarray, shape (22,)
+        In which the family's curve runs from there.
 
     Raises
     ------
     ValueError
-        If this bicycle has no such point.
+        If the anchor is lost on the way.
     """
-    level = Steady(bicycle, Paraboloid(0.0))
-    axis = np.eye(UNKNOWNS)
-    if family in _ANCHOR_REAR_RATE:
-        if family == 1:
-            u, _ = newton(level, start_on_plane(bicycle, *_POINT_A), unknown_condition(SIGMA, 0.0), most=30)
-            points = follow(level, u, axis[SIGMA])
-        else:
-            u, _ = newton(level, start_on_plane(bicycle, *_POINT_D), nearest_condition(), most=30)
-            points = follow(level, u, axis[LEAN])
-        rear_rate = _ANCHOR_REAR_RATE[family]
-        crossing = next(_crossings(level, points, rear_rate), None)
-        if crossing is None:
-            raise ValueError(f"family {family} of this bicycle does not reach its anchor, rear rate {rear_rate} rad/s")
-        u, condition = crossing, rear_rate_condition(rear_rate)
-        directions = [axis[STEER], -axis[STEER]]
+    bowl, axis, u = Paraboloid(alpha), np.eye(UNKNOWNS), _on_the_plane(family, rear_rate)
+    if rear_rate is None:
+        condition, directions = unknown_condition(REAR_SPEED, 0.0), [axis[STEER] if family == 4 else -axis[STEER]]
     else:
-        condition = unknown_condition(REAR_SPEED, 0.0)
-        u, _ = newton(level, start_on_plane(bicycle, *_POINT_G), condition, most=30)
-        directions = [-axis[STEER] if family == 3 else axis[STEER]]
-    return Steady(bicycle, Paraboloid(alpha)), _carry(bicycle, u, alpha, condition), directions
+        condition, directions = rear_rate_condition(rear_rate), [axis[STEER], -axis[STEER]]
+    if bicycle != Bicycle():
+        u = _carry(lambda s: Steady(_between(bicycle, s), Paraboloid(0.0)), u, condition, "this bicycle")
+    if alpha > 0:
+        u = _carry(lambda s: Steady(bicycle, Paraboloid(s * alpha)), u, condition, f"alpha = {alpha!r}")
+    return Steady(bicycle, bowl), u, directions
 
 
 def rear_rate_slope(point: Point) -> float:
@@ -171,7 +202,10 @@ def _crossings(equations: Steady, points: Iterator[Point], rear_rate: float) -> 
             nodes.insert(1, root_between(equations, first, second, rear_rate_slope).unknowns)
         for a, b in pairwise(nodes):
             fa, fb = condition(a).value, condition(b).value
-            if fa == 0 or fa * fb < 0:
+            # An anchor may lie on the wanted rate itself, to round-off.
+            if abs(fa) < 1e-11:
+                yield newton(equations, a, condition, most=30)[0]
+            elif fa * fb < 0 and abs(fb) >= 1e-11:
                 yield newton(equations, a + (b - a) * fa / (fa - fb), condition, most=30)[0]
 
 
@@ -234,11 +268,11 @@ def trace(bicycle: Bicycle, alpha: float, family: int, longest: float = LONGEST_
     ValueError
         If the family's anchor cannot be reached at this alpha.
     """
-    equations, anchor, directions = anchors(bicycle, alpha, family)
-    forward = _end_exactly(equations, list(_to_an_end(follow(equations, anchor, directions[0], longest))))
+    equations, start, directions = anchor(bicycle, alpha, family, ANCHORS[family][-1])
+    forward = _end_exactly(equations, list(_to_an_end(follow(equations, start, directions[0], longest))))
     if len(directions) == 1:
         return Family(family, equations, forward)
-    backward = _end_exactly(equations, list(_to_an_end(follow(equations, anchor, directions[1], longest))))
+    backward = _end_exactly(equations, list(_to_an_end(follow(equations, start, directions[1], longest))))
     turned = [Point(point.unknowns, -point.tangent) for point in reversed(backward[1:])]
     return Family(family, equations, turned + forward)
 
@@ -288,13 +322,14 @@ def motions(bicycle: Bicycle, alpha: float, family: int, rear_rate: float) -> li
     ValueError
         If the family's anchor cannot be reached at this alpha.
     """
-    equations, anchor, directions = anchors(bicycle, alpha, family)
-    found = []
-    for direction in directions:
-        for u in _crossings(equations, follow(equations, anchor, direction), rear_rate):
-            motion = equations.motion(u)
-            if not any(np.hypot(motion.lean - m.lean, motion.steer - m.steer) < 1e-7 for m in found):
-                found.append(motion)
+    found: list[CircularMotion] = []
+    for anchor_rate in ANCHORS[family]:
+        equations, start, directions = anchor(bicycle, alpha, family, anchor_rate)
+        for direction in directions:
+            for u in _crossings(equations, follow(equations, start, direction), rear_rate):
+                motion = equations.motion(u)
+                if not any(np.hypot(motion.lean - m.lean, motion.steer - m.steer) < 1e-7 for m in found):
+                    found.append(motion)
     return found
 
 
@@ -344,11 +379,21 @@ def find_motion(
             found += [(number, motion) for motion in motions(bicycle, alpha, number, rear_rate)]
         except ValueError as error:
             failures.append(f"family {number}: {error}")
+    wanted = f"rear rate {rear_rate!r} rad/s at alpha = {alpha!r}"
     if not found:
-        reason = "; ".join(failures) or "the curve does not reach that rear rate"
+        reason = "; ".join(failures) or "their curves, as followed from their anchors, do not reach it"
         where = f"family {family}" if family is not None else "any family"
-        wanted = f"rear rate {rear_rate!r} rad/s at alpha = {alpha!r} in {where}"
-        raise ValueError(f"no circular motion with {wanted}: {reason}")
+        raise ValueError(f"no circular motion found with {wanted} in {where}: {reason}")
     if near is None:
         return found[0]
-    return min(found, key=lambda item: np.hypot(item[1].lean - near[0], item[1].steer - near[1]))
+
+    def distance(item: tuple[int, CircularMotion]) -> float:
+        return float(np.hypot(item[1].lean - near[0], item[1].steer - near[1]))
+
+    nearest = min(found, key=distance)
+    if distance(nearest) > _NEAR_ENOUGH:
+        place = f"{nearest[1].lean:.6g}, {nearest[1].steer:.6g}"
+        raise ValueError(
+            f"no circular motion found with {wanted} within {_NEAR_ENOUGH} rad of near; the nearest is at {place}"
+        )
+    return nearest

@@ -4,7 +4,7 @@ A baseline holds what each engine measured on a circular motion, whose exact sol
 same engine with the same settings repeats those values up to round-off and to what its iterations
 leave unconverged; anything beyond is a change of the engine. So no percentage is set by hand: with
 
-    noise = (relative error a step may add) x (steps) x exp(max(growth rate, 0) x duration)
+    noise = (error of the start + relative error a step may add x steps) x exp(max(growth rate, 0) x duration)
 
 the state may differ by ``noise`` relative to the motion's own sizes, and each quantity by its
 sensitivity to the state times that.
@@ -22,6 +22,10 @@ from typing import Any
 
 # A bounded disturbance |e| <= b over a duration T tilts a least-squares line by 3 b / T at the most.
 _SLOPE = 3.0
+
+# The start is a root of equations known to round-off, some 1e-13 of their rows, and their condition is
+# the inverse of the Jacobian's least singular value, some 1e2.
+START_ERROR = 1e-11
 
 
 @dataclass(frozen=True)
@@ -111,7 +115,7 @@ def limits(scale: Scale, step_noise: float, steps: int) -> dict[str, float]:
     dict
         Limit by quantity, in the quantity's unit.
     """
-    noise = step_noise * steps * math.exp(max(scale.growth_rate, 0.0) * scale.duration)
+    noise = (START_ERROR + step_noise * steps) * math.exp(max(scale.growth_rate, 0.0) * scale.duration)
     return {
         "short_error": noise * scale.radius,
         "radius_drift_rate": _SLOPE * noise * scale.radius / scale.duration,

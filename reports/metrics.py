@@ -55,6 +55,7 @@ def metrics(
         "steps": trajectory.steps,
         "cpu_time": trajectory.cpu_time,
         "real_time_factor": simulated / trajectory.cpu_time if trajectory.cpu_time > 0 else None,
+        "min_normal_force": least_normal_force(trajectory, surface),
         "fell_at": fell_at(trajectory, bicycle, surface),
         "ended": trajectory.ended,
     }
@@ -92,6 +93,16 @@ def fell_at(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> float
     return float(trajectory.time[low[0]]) if len(low) else None
 
 
+def least_normal_force(trajectory: Trajectory, surface: Surface) -> float | None:
+    """Least normal contact force [N]; negative where the ground would have to pull, as no contact can."""
+    if trajectory.contact_force is None or trajectory.contact_point is None:
+        return None
+    point, force = trajectory.contact_point, trajectory.contact_force
+    slope = evaluate(surface, point[..., 0], point[..., 1])[..., 1:3]
+    across = np.concatenate([-slope, np.ones((*slope.shape[:-1], 1))], axis=-1)
+    return float((np.sum(force * across, axis=-1) / np.linalg.norm(across, axis=-1)).min())
+
+
 def horizon(trajectory: Trajectory, reference: Trajectory, growth_rate: float, size: float) -> float | None:
     """Time up to which the comparison means anything [s]; None where the motion amplifies no error.
 
@@ -107,7 +118,10 @@ def horizon(trajectory: Trajectory, reference: Trajectory, growth_rate: float, s
         # Meaningless from the start, or without any error at all.
         return 0.0 if error.max() > 0 else None
     seed = float(np.max(np.log(error[small]) - growth_rate * time[small]))
-    return max(0.0, (np.log(size) - seed) / growth_rate)
+    law = max(0.0, (np.log(size) - seed) / growth_rate)
+    # Other causes may be faster than the law: an engine's own drift, a fall.
+    beyond = np.flatnonzero(error >= size)
+    return min(law, float(time[beyond[0]])) if len(beyond) else law
 
 
 def _common(trajectory: Trajectory, reference: Trajectory) -> int:

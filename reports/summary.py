@@ -32,6 +32,9 @@ def remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]
     lines = []
     if metrics["fell_at"] is not None:
         lines.append(f"{name} fell at {metrics['fell_at']:.2f} s")
+    if metrics["min_normal_force"] is not None and metrics["min_normal_force"] < 0:
+        pull = -metrics["min_normal_force"]
+        lines.append(f"{name}: the ground pulls a wheel, by up to {pull:.3g} N; no contact could")
     if metrics["ended"] is not None:
         lines.append(f"{name} ended early: {metrics['ended']}")
     if metrics["contact_force_error_at"] == 0:

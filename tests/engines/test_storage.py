@@ -145,3 +145,32 @@ def test_what_is_no_trajectory_is_refused_by_name(kind: str, tmp_path: Path) -> 
     damaged(kind, path)
     with pytest.raises(ValueError, match=r"a\.parquet .*trajectory"):
         read_trajectory(path)
+
+
+def test_columns_are_what_their_names_say(tmp_path: Path) -> None:
+    """A round trip cannot see two columns exchanged on both ways."""
+    written = trajectory()
+    write_trajectory(written, tmp_path / "a.parquet")
+    table = pq.read_table(tmp_path / "a.parquet")
+    point, force, slip = written.contact_point, written.contact_force, written.slip
+    assert point is not None
+    assert force is not None
+    assert slip is not None
+    for column, values in {
+        "z": written.q[:, 2],
+        "lean": written.q[:, 4],
+        "rear_angle_rate": written.qd[:, 7],
+        "rear_contact_x": point[:, 0, 0],
+        "rear_contact_y": point[:, 0, 1],
+        "front_contact_z": point[:, 1, 2],
+        "rear_force_y": force[:, 0, 1],
+        "front_force_x": force[:, 1, 0],
+        "rear_slip_lateral": slip[:, 0, 0],
+        "rear_slip_forward": slip[:, 0, 1],
+        "front_slip_lateral": slip[:, 1, 0],
+        "rear_frame_x": written.body_position[:, 0, 0],
+        "front_wheel_z": written.body_position[:, 3, 2],
+        "front_frame_qw": written.body_quaternion[:, 1, 0],
+        "rear_wheel_qz": written.body_quaternion[:, 2, 3],
+    }.items():
+        assert np.array_equal(table.column(column).to_numpy(), values), column

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
@@ -11,7 +13,7 @@ from reference.circular import (
     newton,
 )
 from reference.dae import dynamics, residual
-from reference.families import anchors, find_motion, follow, motions, start_on_plane
+from reference.families import anchor, find_motion, follow, motions, start_on_plane
 from reference.surface import Paraboloid
 from tests.literature import published, rounds_to
 
@@ -51,7 +53,7 @@ def test_family_two_has_two_motions_at_q2_and_near_tells_them_apart() -> None:
 
 
 def test_point_g_is_the_printed_pivoting_motion() -> None:
-    equations, u, _ = anchors(BICYCLE, 0.0, 3)
+    equations, u, _ = anchor(BICYCLE, 0.0, 3, None)
     motion, point = equations.motion(u), PRINTED["G"]
     assert abs(motion.rear_rate) < 1e-12
     assert rounds_to(motion.lean, point["lean"])
@@ -77,8 +79,8 @@ def test_cusp_d_is_an_extremum_of_the_front_rate() -> None:
     Lean, steer and radius all turn around close by, so the curve is followed by its arc. The printed
     steer 2.78 is cut off, not rounded: it is 2.7857.
     """
-    level, anchor, directions = anchors(BICYCLE, 0.0, 2)
-    points = [point.unknowns for point in follow(level, anchor, directions[1])]
+    level, start, directions = anchor(BICYCLE, 0.0, 2, 20.0)
+    points = [point.unknowns for point in follow(level, start, directions[1])]
     curve = [level.motion(u) for u in points if 2.783 < u[STEER] < 2.8]
     values = np.array([[motion.lean, motion.steer, motion.front_rate] for motion in curve])
     # Continuation slows down around the cusp: its points lie some 0.01 apart, where a spline of the
@@ -109,6 +111,32 @@ def test_a_circular_motion_solves_the_equations_of_motion(alpha: float, family: 
     assert np.abs(now.acceleration - turning).max() < 1e-9
     assert np.abs(now.force - motion.force).max() < 1e-9
     assert np.abs(now.contact_rate[:, 2]).max() < 1e-12
+
+
+def test_families_one_and_three_are_continuous_in_alpha() -> None:
+    """Their curves join between alpha = 1/5 and 1/2; the motions at a rear rate stay and move smoothly."""
+    for family, rear_rate in ((1, 12.0), (3, 20.0)):
+        found = [find_motion(BICYCLE, alpha, rear_rate, family)[1] for alpha in np.arange(0.2, 1.01, 0.1)]
+        angles = np.array([[motion.lean, motion.steer] for motion in found])
+        # Lean and steer move by some 0.1 over the whole range.
+        assert np.abs(np.diff(angles, axis=0)).max() < 0.1
+        assert max(motion.residual for motion in found) < 1e-12
+
+
+@pytest.mark.parametrize("change", [{"trail": 0.081}, {"trail": 0.06, "wheelbase": 1.1}, {"rear_frame_mass": 70.0}])
+def test_another_bicycle_is_reached_from_the_benchmark(change: dict[str, float]) -> None:
+    """Motions of bicycles nearby are neighbours of the benchmark's, not another family's."""
+    for alpha, rear_rate, family in ((0.005, 19.0, 2), (0.2, 20.0, 3)):
+        there = find_motion(BICYCLE, alpha, rear_rate, family)[1]
+        here = find_motion(replace(BICYCLE, **change), alpha, rear_rate, family)[1]
+        assert here.residual < 1e-12
+        # Parameters differ by up to a quarter; angles are functions of order one of their logarithms.
+        assert np.hypot(here.lean - there.lean, here.steer - there.steer) < 0.25
+
+
+def test_near_is_refused_where_nothing_is_near() -> None:
+    with pytest.raises(ValueError, match=r"within 0\.2 rad of near; the nearest is at 0\.7"):
+        find_motion(BICYCLE, 0.005, 18.0, 2, near=(0.2, 2.0))
 
 
 def test_small_curvature_tends_to_the_plane() -> None:

@@ -90,3 +90,15 @@ def test_gradient_of_the_gap_is_the_normal_velocity_row(state: tuple, alpha: flo
 def test_wheels_that_cannot_reach_the_ground_are_refused() -> None:
     with pytest.raises(ValueError, match="cannot touch the ground"):
         consistent_state(BICYCLE, Plane(), (0, 0), float(np.pi / 2), 0.3, (0, 0, 1))
+
+
+def test_slip_tells_lateral_from_forward() -> None:
+    """An upright bicycle pushed ahead with locked wheels slides forward, pushed to the left laterally."""
+    q, _ = consistent_state(BICYCLE, Plane(), (0.0, 0.0), 0.0, 0.0, (0.0, 0.0, 0.0))
+    for push, direction in ((np.array([1.0, 0, 0]), 1), (np.array([0, 1.0, 0]), 0)):
+        qd = np.zeros(9)
+        qd[:3] = push
+        slip = observe(BICYCLE, Plane(), q[None], qd[None]).slip[0]
+        # Forward is the axle crossed with the normal, ahead; lateral the normal crossed with it, to the left.
+        assert np.allclose(slip[:, direction], 1.0, atol=1e-15)
+        assert np.allclose(slip[:, 1 - direction], 0.0, atol=1e-15)

@@ -34,6 +34,14 @@ def test_energy_gaps_and_rolling_are_kept(q2_plus: Motion) -> None:
     assert np.abs(seen.slip).max() <= 1e-11
 
 
+def test_constraints_are_kept_whatever_the_tolerance() -> None:
+    """Steps and outputs are projected: a coarse motion is wrong, but it rolls."""
+    coarse = simulate(BICYCLE, BOWL, *q2(0.1), TIMES, tolerance=1e-5)
+    seen = observe(BICYCLE, BOWL, coarse.q, coarse.qd)
+    assert np.abs(seen.gap).max() <= 1e-12
+    assert np.abs(seen.slip).max() <= 1e-11
+
+
 def test_two_tolerances_agree(q2_plus: Motion) -> None:
     loose = simulate(BICYCLE, BOWL, *q2(0.1), TIMES, tolerance=1e-11)
     assert np.linalg.norm(loose.q[:, :3] - q2_plus.q[:, :3], axis=1).max() <= 1e-9

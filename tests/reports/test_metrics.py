@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 from engines.engine import Trajectory
 from engines.steady import steady_trajectory
 from reference.bicycle import Bicycle
+from reference.contact import observe
 from reference.families import find_motion
 from reference.kinematics import REAR_ANGLE, YAW
 from reference.surface import Paraboloid
-from reports.metrics import fell_at, horizon, metrics, orientation_errors, position_errors
+from reports.metrics import fell_at, horizon, least_normal_force, metrics, orientation_errors, position_errors
 
 BICYCLE = Bicycle()
 BOWL = Paraboloid(0.005)
@@ -166,9 +167,29 @@ def test_horizon_is_where_the_growing_error_reaches_the_motions_size(exponent: f
 def test_an_error_that_has_grown_large_says_nothing_of_its_seed() -> None:
     seed, rate = 1e-6, 4.0
     error = seed * np.exp(rate * TIMES)
-    error[error > 0.05 * RADIUS] *= 100  # the law holds for small errors only
+    error[error > 0.05 * RADIUS] *= 0.01  # the law holds for small errors only
     found = horizon(moved(np.outer(error, [0.0, 0.0, 1.0])), EXACT, rate, RADIUS)
     assert found == pytest.approx(np.log(RADIUS / seed) / rate, rel=1e-12, abs=2 * ROUND_OFF / seed / rate)
+
+
+def test_an_error_that_outruns_the_law_ends_the_horizon() -> None:
+    error = 1e-6 * np.exp(0.1 * TIMES)
+    error[TIMES >= 1.0] = 2 * RADIUS  # a fall, say
+    assert horizon(moved(np.outer(error, [0.0, 0.0, 1.0])), EXACT, 0.1, RADIUS) == 1.0
+    everywhere = moved(np.full((len(TIMES), 3), RADIUS))
+    assert horizon(everywhere, EXACT, 0.1, RADIUS) == 0.0
+
+
+def test_least_normal_force_sees_a_ground_that_pulls() -> None:
+    assert EXACT.contact_force is not None
+    seen = observe(BICYCLE, BOWL, EXACT.q, EXACT.qd)
+    force = EXACT.contact_force.copy()
+    touching = replace(EXACT, contact_point=seen.point, contact_force=force)
+    expected = np.einsum("nwi,nwi->nw", force, seen.normal).min()
+    assert least_normal_force(touching, BOWL) == pytest.approx(expected, rel=1e-12)
+    force[3, 1] = -2 * seen.normal[3, 1]
+    assert least_normal_force(replace(touching, contact_force=force), BOWL) == pytest.approx(-2.0, rel=1e-12)
+    assert least_normal_force(replace(touching, contact_point=None), BOWL) is None
 
 
 @pytest.mark.parametrize("rate", [0.0, -0.4])
@@ -204,7 +225,16 @@ def test_a_run_that_ended_is_compared_as_far_as_it_went(count: int) -> None:
 def test_what_an_engine_does_not_give_is_null() -> None:
     measured = measure(replace(EXACT, contact_force=None))
     absent = ("contact_force_error", "contact_force_error_at", "energy_drift", "energy_drift_rate", "energy_variation")
-    for name in (*absent, "max_gap", "max_slip", "mean_slip", "real_time_factor", "horizon", "fell_at", "ended"):
+    for name in (
+        *absent,
+        "max_gap",
+        "max_slip",
+        "mean_slip",
+        "min_normal_force",
+        "real_time_factor",
+        "fell_at",
+        "ended",
+    ):
         assert measured[name] is None, name
     alone = measure(EXACT, reference=None)
     for name in ("position_error", "orientation_error", "rear_rate_error", "radius_drift_rate", "horizon"):

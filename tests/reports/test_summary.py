@@ -17,6 +17,7 @@ MEASURED: dict[str, Any] = {
     "energy_drift": 6.2e-8,
     "max_slip": 3.1e-12,
     "cpu_time": 0.24,
+    "min_normal_force": 300.0,
     "fell_at": None,
     "ended": None,
     "horizon": None,
@@ -57,6 +58,7 @@ def test_no_news_is_no_remark() -> None:
     ("change", "words"),
     [
         ({"fell_at": 2.5}, ["exudyn fell at 2.50 s"]),
+        ({"min_normal_force": -12.34}, ["exudyn: the ground pulls a wheel, by up to 12.3 N; no contact could"]),
         ({"fell_at": 0.0}, ["exudyn fell at 0.00 s"]),
         ({"ended": "Newton failed"}, ["exudyn ended early: Newton failed"]),
         ({"horizon": 7.25}, ["exudyn", "7.25 s", "instability"]),

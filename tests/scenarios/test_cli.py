@@ -329,8 +329,11 @@ def test_a_real_interrupt_ends_a_real_run_in_order(tmp_path: Path) -> None:
     # 60 s of exudyn are 15 s of work: it is under way when the reference's file is there.
     arguments = ["run", "q2", "--duration", "60", "--engine", "exudyn", "--out", str(tmp_path), "--json"]
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    # A background job inherits SIGINT ignored, and so would the command.
+    listening = "import os, signal, sys; signal.signal(2, signal.SIG_DFL); os.execv(sys.argv[1], sys.argv[1:])"
+    words = [sys.executable, "-c", listening]
     with subprocess.Popen(
-        [COMMAND, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+        [*words, COMMAND, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
     ) as process:
         give_up = time.monotonic() + 60
         while not list(tmp_path.glob("*/reference.parquet")):

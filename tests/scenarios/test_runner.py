@@ -23,7 +23,7 @@ METRICS = {
     *("position_error", "orientation_error", "rear_rate_error", "contact_force_error", "contact_force_error_at"),
     *("radius_drift_rate", "phase_drift_rate", "rear_rate_drift_rate"),
     *("energy_drift", "energy_drift_rate", "energy_variation", "max_gap", "max_slip", "mean_slip"),
-    *("steps", "cpu_time", "real_time_factor", "fell_at", "ended", "horizon"),
+    *("steps", "cpu_time", "real_time_factor", "min_normal_force", "fell_at", "ended", "horizon"),
 }
 
 
