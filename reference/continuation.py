@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from .circular import FORCE, LEAN, SIGMA, Steady, newton, plane_condition
 from .kernels.steady import UNKNOWNS
@@ -105,6 +105,23 @@ def _step(equations: Steady, point: Point, distance: float) -> tuple[Point, int]
     return (Point(u, direction * np.sign(turn)), iterations) if abs(turn) > 0.9 else None
 
 
+def _arc(equations: Steady, first: Point, second: Point) -> tuple[Callable[[float], Point], float]:
+    """Points of the curve by their distance along the first one's tangent, and the second one's distance."""
+    covector = metric(first.unknowns) * first.tangent
+    length = float(covector @ (second.unknowns - first.unknowns))
+    points = {0.0: first, length: second}
+
+    def at(distance: float) -> Point:
+        if distance not in points:
+            guess = first.unknowns + distance * first.tangent
+            u, _ = newton(equations, guess, plane_condition(first.unknowns, covector, distance))
+            direction = tangent(equations, u)
+            points[distance] = Point(u, direction * np.sign(direction @ covector))
+        return points[distance]
+
+    return at, length
+
+
 def root_between(equations: Steady, first: Point, second: Point, function: Callable[[Point], float]) -> Point:
     """Solve function = 0 between two neighbours of a followed curve where it has opposite signs.
 
@@ -121,17 +138,18 @@ def root_between(equations: Steady, first: Point, second: Point, function: Calla
     Point
         To round-off of the arc's length.
     """
-    covector = metric(first.unknowns) * first.tangent
-    length = float(covector @ (second.unknowns - first.unknowns))
-    points = {0.0: first, length: second}
-
-    def at(distance: float) -> Point:
-        if distance not in points:
-            guess = first.unknowns + distance * first.tangent
-            u, _ = newton(equations, guess, plane_condition(first.unknowns, covector, distance))
-            direction = tangent(equations, u)
-            points[distance] = Point(u, direction * np.sign(direction @ covector))
-        return points[distance]
-
+    at, length = _arc(equations, first, second)
     root: Any = brentq(lambda distance: function(at(distance)), 0.0, length, xtol=1e-15)
     return at(root)
+
+
+def least_between(equations: Steady, first: Point, second: Point, function: Callable[[Point], float]) -> Point:
+    """Find where a function is least between two near points of a followed curve, to some 1e-6 of their distance."""
+    at, length = _arc(equations, first, second)
+    found: Any = minimize_scalar(
+        lambda distance: function(at(distance)),
+        bounds=(0.0, length),
+        method="bounded",
+        options={"xatol": 1e-6 * length},
+    )
+    return at(float(found.x))

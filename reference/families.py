@@ -43,7 +43,7 @@ from .circular import (
     rear_rate_condition,
     unknown_condition,
 )
-from .continuation import FARTHEST, LARGEST_LEAN, LONGEST_STEP, Point, follow, root_between
+from .continuation import FARTHEST, LONGEST_STEP, Point, follow, root_between
 from .kernels import dynamics as kernel
 from .kernels.steady import UNKNOWNS
 from .kinematics import constants
@@ -55,6 +55,7 @@ FAMILIES = (1, 2, 3, 4)
 _POINT_A, _POINT_D, _POINT_G = (0.0, 1.33973991149), (0.62, 2.78), (-0.01206, 1.6019)
 # Rear rates of each family's anchors; None is the pivoting motion. The last one's curve is the family's.
 ANCHORS: dict[int, tuple[float | None, ...]] = {1: (15.0,), 2: (20.0,), 3: (20.0, None), 4: (None,)}
+_LARGEST_MOVE = 0.05  # of an unknown of order one, in a step of carrying an anchor
 _NEAR_ENOUGH = 0.2  # rad: a motion further from what was asked for is another one
 
 
@@ -102,18 +103,27 @@ def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
 
 
 def _carry(path: Callable[[float], Steady], u: np.ndarray, condition: Callable, what: str) -> np.ndarray:
-    """Carry a solution along a path of equations, 0 to 1, at a fixed condition; steps as long as converge."""
+    """Carry a solution along a path of equations, 0 to 1, at a fixed condition; steps as long as converge.
+
+    Newton's method may well converge to another branch: a step that moves an angle or a speed by much
+    more than a step should is taken again, shorter.
+    """
     reached, step = 0.0, 0.02
     while reached < 1:
         wanted = min(1.0, reached + step)
         try:
-            u, iterations = newton(path(wanted), u, condition, most=8)
+            new, iterations = newton(path(wanted), u, condition, most=8)
         except ValueError:
+            new, iterations = u, 99
+        moved = np.abs(new - u)[LEAN : SIGMA + 1] / (1 + np.abs(u[LEAN : SIGMA + 1]))
+        if iterations == 99 or moved.max() > _LARGEST_MOVE:
             step /= 2
             if step < 1e-6:
-                raise ValueError(f"its anchor is lost {100 * reached:.4g} % of the way to {what}") from None
-        else:
-            reached, step = wanted, step * (1.5 if iterations <= 5 else 1.0)
+                raise ValueError(f"its anchor is lost {100 * reached:.4g} % of the way to {what}")
+            continue
+        u, reached, step = new, wanted, step * (1.5 if iterations <= 5 else 1.0)
+    if u[SIGMA] < 0:
+        raise ValueError(f"its anchor is no motion at {what}: the squared speed would be negative")
     return u
 
 
@@ -174,8 +184,26 @@ def anchor(
     if bicycle != Bicycle():
         u = _carry(lambda s: Steady(_between(bicycle, s), Paraboloid(0.0)), u, condition, "this bicycle")
     if alpha > 0:
-        u = _carry(lambda s: Steady(bicycle, Paraboloid(s * alpha)), u, condition, f"alpha = {alpha!r}")
+        try:
+            u = _carry(lambda s: Steady(bicycle, Paraboloid(s * alpha)), u, condition, f"alpha = {alpha!r}")
+        except ValueError:
+            if rear_rate is not None:
+                raise
+            u = _other_pivot(bicycle, alpha)
     return Steady(bicycle, bowl), u, directions
+
+
+def _other_pivot(bicycle: Bicycle, alpha: float) -> np.ndarray:
+    """The pivoting motion in which family 2 ends on steep bowls.
+
+    The one known from the plane comes to rest as alpha grows (the benchmark's at 0.42); another appears
+    further on (at 0.46), first infinitely fast.
+    """
+    branch = trace(bicycle, alpha, 2)
+    for end, point in zip(branch.ends, (branch.points[0], branch.points[-1]), strict=True):
+        if end == "pivot":
+            return point.unknowns
+    raise ValueError(f"there is no pivoting motion at alpha = {alpha!r}")
 
 
 def rear_rate_slope(point: Point) -> float:
@@ -240,7 +268,7 @@ def _kind_of_end(point: Point) -> str:
         return "pivot"
     if np.linalg.norm(u[:3]) > 0.3 * FARTHEST:
         return "large circle"
-    return "flat" if abs(u[LEAN]) > LARGEST_LEAN - 0.2 else "fast front wheel"
+    return "flat" if abs(u[LEAN]) > 1.0 else "fast front wheel"
 
 
 def trace(bicycle: Bicycle, alpha: float, family: int, longest: float = LONGEST_STEP) -> Family:
@@ -320,16 +348,24 @@ def motions(bicycle: Bicycle, alpha: float, family: int, rear_rate: float) -> li
     Raises
     ------
     ValueError
-        If the family's anchor cannot be reached at this alpha.
+        If none of the family's anchors can be reached at this alpha.
     """
     found: list[CircularMotion] = []
+    failure, reached = None, False
     for anchor_rate in ANCHORS[family]:
-        equations, start, directions = anchor(bicycle, alpha, family, anchor_rate)
+        try:
+            equations, start, directions = anchor(bicycle, alpha, family, anchor_rate)
+        except ValueError as error:
+            failure = error
+            continue
+        reached = True
         for direction in directions:
             for u in _crossings(equations, follow(equations, start, direction), rear_rate):
                 motion = equations.motion(u)
                 if not any(np.hypot(motion.lean - m.lean, motion.steer - m.steer) < 1e-7 for m in found):
                     found.append(motion)
+    if failure is not None and not reached:
+        raise failure
     return found
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from .circular import CircularMotion, Steady
-from .continuation import Point, root_between
+from .continuation import Point, least_between, root_between
 from .families import Family
 from .stability import Linearisation, growth_rate, linearise, structural_eigenvalues
 
@@ -50,18 +50,20 @@ def growth_along(equations: Steady, point: Point) -> float:
 def stable_sections(family: Family) -> list[tuple[SectionEnd, SectionEnd]]:
     """Lyapunov-stable sections of a family, both ends solved to round-off.
 
+    A section may lie between two points that are both unstable: wherever the growth rate has a least
+    value among the points, its least value between them is looked for.
+
     Parameters
     ----------
     family : Family
-        Points dense enough that no section lies between two neighbours.
 
     Returns
     -------
     list of (SectionEnd, SectionEnd)
         In the order of the family's points.
     """
-    equations, points = family.equations, family.points
-    growth = [growth_along(equations, point) for point in points]
+    equations = family.equations
+    points, growth = _with_least(family)
     ends: list[SectionEnd] = []
     if growth[0] < 0:
         ends.append(_end(equations, points[0], "end"))
@@ -72,6 +74,29 @@ def stable_sections(family: Family) -> list[tuple[SectionEnd, SectionEnd]]:
     if growth[-1] < 0:
         ends.append(_end(equations, points[-1], "end"))
     return list(zip(ends[::2], ends[1::2], strict=True))
+
+
+def _with_least(family: Family) -> tuple[list[Point], list[float]]:
+    """Points and growth rates of a family, with those points added where the growth rate dips below zero."""
+    equations = family.equations
+    growth = [growth_along(equations, point) for point in family.points]
+    points, rates = [family.points[0]], [growth[0]]
+    for i in range(1, len(growth)):
+        before, here = family.points[i - 1], family.points[i]
+        # The dip is on one side of the least point or the other.
+        if min(growth[i - 1], growth[i]) > 0 and (_least(growth, i - 1) or _least(growth, i)):
+            low = least_between(equations, before, here, lambda point: growth_along(equations, point))
+            rate = growth_along(equations, low)
+            if rate < 0:
+                points.append(low)
+                rates.append(rate)
+        points.append(here)
+        rates.append(growth[i])
+    return points, rates
+
+
+def _least(values: list[float], i: int) -> bool:
+    return 0 < i < len(values) - 1 and values[i] <= min(values[i - 1], values[i + 1])
 
 
 def _end(equations: Steady, point: Point, cause: str | None = None) -> SectionEnd:

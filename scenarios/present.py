@@ -208,6 +208,8 @@ def show_families(console: Console, document: Mapping[str, Any]) -> None:
             rates, causes = section["rear_rate"], section["cause"]
             line = " to ".join(f"{rate:.9f} ({cause})" for rate, cause in zip(rates, causes, strict=True))
             console.print(f"Lyapunov stable: rear rate {line}", style="green", markup=False, highlight=False)
+    for number, reason in document["absent"].items():
+        console.print(f"family {number}: no curve: {reason}", style="yellow", markup=False, soft_wrap=True)
 
 
 STATUS_STYLES = {"holds": "green", "better": "cyan", "changed": "red", "worse": "red", "missing": "red"}

@@ -14,6 +14,7 @@ from reference.families import FAMILIES, Family, trace
 from reference.sections import SectionEnd, modes, stable_sections
 from reference.special import special_points
 from reference.stability import growth_rate
+from reference.surface import Paraboloid
 
 from .runner import write_json
 from .scenario import ScenarioError
@@ -32,20 +33,24 @@ def families_document(alpha: float) -> dict[str, Any]:
     Returns
     -------
     dict
-        The JSON document of `velodrome families`.
+        The JSON document of `velodrome families`; ``absent`` says why a family has no curve there.
 
     Raises
     ------
     ScenarioError
-        If alpha is no shape, or a family cannot be reached there.
+        If alpha is no shape.
     """
-    bicycle, families = Bicycle(), []
+    bicycle, families, absent = Bicycle(), [], {}
+    try:
+        Paraboloid(alpha)
+    except ValueError as error:
+        raise ScenarioError(str(error)) from error
     for number in FAMILIES:
         try:
             families.append(_family(trace(bicycle, alpha, number, LONGEST_STEP)))
         except ValueError as error:
-            raise ScenarioError(f"family {number} at alpha = {alpha!r}: {error}") from error
-    return {"alpha": alpha, "families": families}
+            absent[str(number)] = str(error)
+    return {"alpha": alpha, "families": families, "absent": absent}
 
 
 def write_families(document: Mapping[str, Any], out: Path) -> None:

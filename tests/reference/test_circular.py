@@ -2,12 +2,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
-from scipy.optimize import minimize_scalar
 
 from reference.bicycle import Bicycle
 from reference.circular import (
-    STEER,
     Steady,
     nearest_condition,
     newton,
@@ -71,29 +68,6 @@ def test_straight_motions_are_the_limits_of_large_circles(name: str, guess: tupl
     far = level.motion(list(follow(level, u, outwards))[-1].unknowns)
     assert np.hypot(*far.position[:2]) > 900
     assert rounds_to(far.front_rate, PRINTED[name]["front_rate"])
-
-
-def test_cusp_d_is_an_extremum_of_the_front_rate() -> None:
-    """D: along family 2 the size of the front rate is least near the printed point.
-
-    Lean, steer and radius all turn around close by, so the curve is followed by its arc. The printed
-    steer 2.78 is cut off, not rounded: it is 2.7857.
-    """
-    level, start, directions = anchor(BICYCLE, 0.0, 2, 20.0)
-    points = [point.unknowns for point in follow(level, start, directions[1])]
-    curve = [level.motion(u) for u in points if 2.783 < u[STEER] < 2.8]
-    values = np.array([[motion.lean, motion.steer, motion.front_rate] for motion in curve])
-    # Continuation slows down around the cusp: its points lie some 0.01 apart, where a spline of the
-    # smooth curve errs by 0.01^4 times fourth derivatives, far below the printed digits.
-    through = CubicSpline(np.arange(len(values)), values)
-    best = minimize_scalar(lambda i: abs(through(i)[2]), bounds=(0, len(values) - 1), method="bounded")
-    lean, steer, front_rate = through(best.x)
-    point = PRINTED["D"]
-    assert 1 < best.x < len(values) - 2
-    assert rounds_to(lean, point["lean"])
-    assert rounds_to(front_rate, point["front_rate"])
-    assert np.floor(steer * 100) / 100 == float(point["steer"])
-    assert steer == pytest.approx(2.7857, abs=1e-3)
 
 
 @pytest.mark.parametrize(("alpha", "family", "rear_rate"), [(0.005, 2, 18.0), (0.2, 3, 20.0), (0.05, 4, 12.0)])

@@ -103,7 +103,16 @@ def test_a_cusp_is_a_turning_point_of_the_front_rate() -> None:
 
 @pytest.mark.parametrize(
     ("alpha", "stable"),
-    [(0.0, {2, 4}), (0.005, {2, 4}), (0.011, {2}), (1 / 33, {2}), (0.05, set()), (0.2, set()), (1.0, set())],
+    [
+        (0.0, {2, 4}),
+        (0.005, {2, 4}),
+        (0.009, {2, 4}),
+        (0.011, {2}),
+        (1 / 33, {2}),
+        (0.05, set()),
+        (0.2, set()),
+        (1.0, set()),
+    ],
 )
 def test_which_families_have_stable_sections(alpha: float, stable: set[int]) -> None:
     """Section 4.2 of the paper names those at 0 (2 and 4), 1/20, 1/5, 1 (none) and 1/200.
@@ -112,6 +121,23 @@ def test_which_families_have_stable_sections(alpha: float, stable: set[int]) -> 
     """
     found = {number for number in FAMILIES if stable_sections(family(alpha, number, 0.05))}
     assert found == stable
+
+
+def test_a_section_between_two_unstable_points_is_found() -> None:
+    """At alpha = 0.009 family 4 is stable over 0.002 rad of lean, less than the points' distance."""
+    ((start, end),) = stable_sections(family(0.009, 4, 0.1))
+    ((same, _),) = stable_sections(family(0.009, 4, 0.03))
+    assert abs(start.motion.lean - end.motion.lean) < 0.0025
+    assert start.motion.rear_rate == pytest.approx(same.motion.rear_rate, abs=1e-8)
+
+
+def test_the_pivoting_motion_is_gone_where_it_would_have_to_stand_still() -> None:
+    """From alpha = 0.420 to 0.464 there is none; further on another one, that family 2 ends in."""
+    assert family(0.415, 3).ends[0] == "pivot"
+    with pytest.raises(ValueError, match="no pivoting motion"):
+        trace(BICYCLE, 0.44, 3)
+    assert family(0.5, 3).ends[0] == "pivot"
+    assert "pivot" in family(0.5, 2).ends
 
 
 def test_ends_of_a_stable_section_are_crossings() -> None:
