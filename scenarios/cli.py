@@ -136,6 +136,19 @@ def families_command(
         present.show_families(Console(), document)
 
 
+@app.command("critical")
+def critical_command(as_json: Json = False) -> None:
+    """The critical α: cusps collide, families merge, their last stable sections vanish (a minute or two)."""
+    from .survey import critical_document
+
+    with present.Progress() as progress:
+        document = critical_document(progress.watch)
+    if as_json:
+        _print_json(document)
+    else:
+        present.show_critical(Console(), document)
+
+
 @app.command("check")
 def check_command(
     update: Annotated[bool, typer.Option("--update", help="Write this run's values as the new baselines.")] = False,

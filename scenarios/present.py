@@ -212,6 +212,23 @@ def show_families(console: Console, document: Mapping[str, Any]) -> None:
         console.print(f"family {number}: no curve: {reason}", style="yellow", markup=False, soft_wrap=True)
 
 
+def show_critical(console: Console, document: Mapping[str, Any]) -> None:
+    """Print the critical shapes of the bowl."""
+    table = Table("families", "what happens", box=None, pad_edge=False)
+    for title in ("alpha", "rear rate", "lean", "steer"):
+        table.add_column(title, justify="right", no_wrap=True)
+    rows = [("2, 4", "cusps D, I meet", document["cusp_collision"])]
+    rows += [(", ".join(map(str, point["families"])), "curves touch", point) for point in document["merging"]]
+    rows += [(n, "last stable", point) for n, point in document["last_stable"].items() if point is not None]
+    for families, what, point in rows:
+        numbers = (f"{point[key]:.9f}" for key in ("rear_rate", "lean", "steer"))
+        table.add_row(families, what, f"{point['alpha']:.11f}", *numbers)
+    console.print(table)
+    for number, point in document["last_stable"].items():
+        if point is None:
+            console.print(f"family {number} has no stable section", markup=False, highlight=False)
+
+
 STATUS_STYLES = {"holds": "green", "better": "cyan", "changed": "red", "worse": "red", "missing": "red"}
 
 

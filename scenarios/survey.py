@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from reference.bicycle import Bicycle
 from reference.contact import observe
+from reference.critical import CriticalPoint, last_stable, reconnections
 from reference.families import FAMILIES, Family, trace
 from reference.sections import SectionEnd, modes, stable_sections
 from reference.special import special_points
@@ -51,6 +52,47 @@ def families_document(alpha: float) -> dict[str, Any]:
         except ValueError as error:
             absent[str(number)] = str(error)
     return {"alpha": alpha, "families": families, "absent": absent}
+
+
+def critical_document(watch: Callable[[str, float, float], None]) -> dict[str, Any]:
+    """Compute the critical alpha of the benchmark bicycle.
+
+    Parameters
+    ----------
+    watch : callable
+        Called with what is looked for, the alpha reached and the largest.
+
+    Returns
+    -------
+    dict
+        The JSON document of `velodrome critical`.
+    """
+    bicycle = Bicycle()
+    merging = reconnections(bicycle, lambda alpha: watch("merging", alpha, 1.0))
+    stable: dict[str, Any] = {}
+    for number in FAMILIES:
+        watch("last stable", float(number), float(len(FAMILIES)))
+        point = last_stable(bicycle, number)
+        stable[str(number)] = None if point is None else _critical(point)
+    collision = next(point for point in merging if point.families == (2, 4))
+    return {
+        "cusp_collision": _critical(collision),
+        "last_stable": stable,
+        "merging": [{"families": list(point.families)} | _critical(point) for point in merging],
+    }
+
+
+def _critical(point: CriticalPoint) -> dict[str, Any]:
+    motion = point.motion
+    return {
+        "alpha": point.alpha,
+        "rear_rate": motion.rear_rate,
+        "front_rate": motion.front_rate,
+        "lean": motion.lean,
+        "steer": motion.steer,
+        "kind": point.kind,
+        "residual": point.residual,
+    }
 
 
 def write_families(document: Mapping[str, Any], out: Path) -> None:

@@ -1,0 +1,275 @@
+"""Critical shapes of the bowl: where families exchange parts, and where their last stable section vanishes.
+
+Two curves touch where the Jacobian of the steady equations loses one more rank. With one redundant
+equation left out (power balance makes the spin of a wheel that turns follow from the others), the
+remaining 21 equations F(u, alpha) = 0 in 22 unknowns have full rank on a curve, and the touching point
+is a regular root of
+
+    F(u, alpha) = 0,    w . dF/du = 0,    |w|^2 = 1
+
+in u (22), alpha and w (21). A stable section vanishes where its two ends meet: where one pair of
+eigenvalues touches the imaginary axis, or where two pairs cross it at the same point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from .bicycle import Bicycle
+from .circular import FRONT_SPEED, LEAN, REAR_SPEED, SIGMA, STEER, CircularMotion, Steady, newton, plane_condition
+from .continuation import Point, metric
+from .families import FAMILIES, trace
+from .kernels.steady import UNKNOWNS
+from .sections import SectionEnd, linearise_point, stable_sections
+from .stability import linearise
+from .surface import Paraboloid
+
+_REAR_SPIN, _FRONT_SPIN = 7, 8  # rows of the wheels' spins among the equations
+_ROWS = 21
+_STEP = 1e-6  # of second derivatives by central differences: they only steer Newton's method
+_SCAN = np.linspace(0.0, 1.0, 41)
+_BRACKET = 2e-3
+_SECTION_BRACKET = 2e-7
+
+
+@dataclass(frozen=True)
+class CriticalPoint:
+    """A motion at a critical alpha.
+
+    Attributes
+    ----------
+    families : tuple of int
+    alpha : float
+        [1/m].
+    motion : CircularMotion
+    residual : float
+        Largest of the defining equations; the growth rate [1/s] where a section vanishes.
+    kind : str
+        ``reconnection``; ``tangency`` or ``crossing`` where a stable section vanishes.
+    """
+
+    families: tuple[int, ...]
+    alpha: float
+    motion: CircularMotion
+    residual: float
+    kind: str
+
+
+def reconnections(
+    bicycle: Bicycle, progress: Callable[[float], None] = lambda _: None, largest: float = 1.0
+) -> list[CriticalPoint]:
+    """All alpha up to ``largest`` at which family 1 or 2 exchanges a part with another family.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    progress : callable
+        Called with the alpha reached.
+    largest : float
+        [1/m].
+
+    Returns
+    -------
+    list of CriticalPoint
+        With rising alpha.
+    """
+    found = []
+    for number in (1, 2):
+        for low, high in _changes(bicycle, number, largest, progress):
+            point = _touching_point(bicycle, number, low, high)
+            # Both families of a pair lead to the same point.
+            if point is not None and not any(abs(point.alpha - other.alpha) < 1e-9 for other in found):
+                found.append(point)
+    return sorted(found, key=lambda point: point.alpha)
+
+
+def _passing(bicycle: Bicycle, motion: CircularMotion, low: float, high: float) -> tuple[int, ...]:
+    """Families whose curve passes by a touching point on either side of its alpha."""
+    passing = []
+    for number in FAMILIES:
+        gaps = []
+        for alpha in (low, high):
+            try:
+                points = trace(bicycle, alpha, number, 0.03).points
+            except ValueError:
+                continue
+            gaps += [np.hypot(p.unknowns[LEAN] - motion.lean, p.unknowns[STEER] - motion.steer) for p in points]
+        # Points lie 0.03 apart, curves some root of the bracket from the touching point.
+        if gaps and min(gaps) < 0.06:
+            passing.append(number)
+    return tuple(passing)
+
+
+def _ends(bicycle: Bicycle, alpha: float, number: int) -> tuple[str, str] | None:
+    try:
+        return trace(bicycle, alpha, number).ends
+    except ValueError:
+        return None
+
+
+def _changes(
+    bicycle: Bicycle, number: int, largest: float, progress: Callable[[float], None]
+) -> Iterator[tuple[float, float]]:
+    """Brackets of alpha in which the ends of a family change."""
+    grid = [float(alpha) for alpha in _SCAN if alpha <= largest]
+    before = _ends(bicycle, grid[0], number)
+    for i in range(1, len(grid)):
+        here = _ends(bicycle, grid[i], number)
+        progress(grid[i])
+        if here != before:
+            low, high = grid[i - 1], grid[i]
+            while high - low > _BRACKET:
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if _ends(bicycle, middle, number) == before else (low, middle)
+            yield low, high
+        before = here
+
+
+def _touching_point(bicycle: Bicycle, number: int, low: float, high: float) -> CriticalPoint | None:
+    """Solve for the touching point near a family; None where its ends change without one."""
+    family = trace(bicycle, low, number, 0.05)
+    rank = [float(np.linalg.svd(family.equations.jacobian(point.unknowns))[1][-2]) for point in family.points]
+    dips = [i for i in range(1, len(rank) - 1) if rank[i] <= min(rank[i - 1], rank[i + 1])]
+    for i in sorted(dips, key=lambda i: rank[i]):
+        try:
+            unknowns, alpha, residual = _solve_touching(bicycle, family.points[i].unknowns, low)
+        except (ValueError, np.linalg.LinAlgError):
+            continue
+        if low - 5 * _BRACKET < alpha < high + 5 * _BRACKET and unknowns[SIGMA] > 0:
+            motion = Steady(bicycle, Paraboloid(alpha)).motion(unknowns)
+            return CriticalPoint(_passing(bicycle, motion, low, high), alpha, motion, residual, "reconnection")
+    return None
+
+
+def _solve_touching(bicycle: Bicycle, unknowns: np.ndarray, alpha: float) -> tuple[np.ndarray, float, float]:
+    """Newton's method on the 44 equations; returns the unknowns, alpha and the residual."""
+    dropped = _FRONT_SPIN if abs(unknowns[FRONT_SPEED]) > abs(unknowns[REAR_SPEED]) else _REAR_SPIN
+    rows = [i for i in range(UNKNOWNS) if i != dropped]
+
+    def equations(x: np.ndarray) -> np.ndarray:
+        at, w = Steady(bicycle, Paraboloid(float(x[UNKNOWNS]))), x[UNKNOWNS + 1 :]
+        u = x[:UNKNOWNS]
+        return np.concatenate([at.residual(u)[rows], w @ at.jacobian(u)[rows], [w @ w - 1]])
+
+    start = Steady(bicycle, Paraboloid(alpha)).jacobian(unknowns)[rows]
+    x = np.concatenate([unknowns, [alpha], np.linalg.svd(start)[0][:, -1]])
+    values = equations(x)
+    for _ in range(30):
+        step = np.linalg.solve(_difference_jacobian(equations, x), -values)
+        size = float(np.abs(step / (1 + np.abs(x))).max())
+        x = x + step * min(1.0, 0.2 / size)
+        values = equations(x)
+        # The equations' round-off, 1e-14, times their condition, some 1e3.
+        if size < 1e-10:
+            return x[:UNKNOWNS], float(x[UNKNOWNS]), float(np.abs(values).max())
+    raise ValueError("no touching point near the guess")
+
+
+def _difference_jacobian(function: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> np.ndarray:
+    columns = []
+    for j in range(len(x)):
+        e = np.zeros(len(x))
+        e[j] = _STEP * (1 + abs(x[j]))
+        columns.append((function(x + e) - function(x - e)) / (2 * e[j]))
+    return np.array(columns).T
+
+
+def last_stable(bicycle: Bicycle, number: int, largest: float = 1.0) -> CriticalPoint | None:
+    """Where the last Lyapunov-stable section of a family vanishes as alpha grows.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    number : int
+        Family.
+    largest : float
+        Largest alpha looked at [1/m].
+
+    Returns
+    -------
+    CriticalPoint or None
+        None where the family has no stable section at any alpha of a scan.
+    """
+    grid = [0.0, 0.0025, 0.005, 0.0075, *(float(alpha) for alpha in _SCAN[1:] if alpha <= largest)]
+    grid = sorted({*grid, 0.01, 0.015, 0.02, 0.03, 0.035, 0.04})
+    stable = [alpha for alpha in grid if _sections(bicycle, alpha, number)]
+    if not stable:
+        return None
+    low = stable[-1]
+    high = next((alpha for alpha in grid if alpha > low), None)
+    if high is None:
+        raise ValueError(f"family {number} is stable beyond alpha = {largest!r}")
+    while high - low > _SECTION_BRACKET:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _sections(bicycle, middle, number) else (low, middle)
+    return _vanishing(bicycle, number, low)
+
+
+def _sections(bicycle: Bicycle, alpha: float, number: int) -> list[tuple[SectionEnd, SectionEnd]]:
+    try:
+        return stable_sections(trace(bicycle, alpha, number, 0.05))
+    except ValueError:
+        return []
+
+
+def _vanishing(bicycle: Bicycle, number: int, alpha: float) -> CriticalPoint:
+    """Solve for the point at which the ends of the section at alpha, just before it vanishes, meet."""
+    ends = _sections(bicycle, alpha, number)[-1]
+    family = trace(bicycle, alpha, number, 0.02)
+    middle = 0.5 * (ends[0].motion.lean + ends[1].motion.lean), 0.5 * (ends[0].motion.steer + ends[1].motion.steer)
+    near = min(family.points, key=lambda p: np.hypot(p.unknowns[LEAN] - middle[0], p.unknowns[STEER] - middle[1]))
+    covector = metric(near.unknowns) * near.tangent
+
+    def eigenvalues(distance: float, shape: float) -> tuple[CircularMotion, np.ndarray]:
+        equations = Steady(bicycle, Paraboloid(shape))
+        guess = near.unknowns + distance * near.tangent
+        u, _ = newton(equations, guess, plane_condition(near.unknowns, covector, distance), most=30)
+        motion, reduced = linearise_point(equations, Point(u, near.tangent))
+        return motion, reduced.eigenvalues
+
+    tracked = [end.eigenvalue.imag for end in ends]
+    # One pair that touches the axis has nearly one frequency at both ends, far from the other pair's.
+    surface = Paraboloid(alpha)
+    others = [
+        abs(value.imag - imaginary)
+        for end, imaginary in zip(ends, tracked, strict=True)
+        for value in linearise(bicycle, surface, *end.motion.state()).eigenvalues
+        if value.imag > 1e-3 and abs(value.imag - imaginary) > 1e-6
+    ]
+    kind = "tangency" if abs(tracked[0] - tracked[1]) < 0.5 * min(others) else "crossing"
+
+    def growth(x: np.ndarray, imaginary: float) -> float:
+        values = eigenvalues(float(x[0]), float(x[1]))[1]
+        upper = [value for value in values if value.imag > 1e-3]
+        return min(upper, key=lambda value: abs(value.imag - imaginary) + abs(value.real)).real
+
+    def equations(x: np.ndarray) -> np.ndarray:
+        if kind == "crossing":
+            return np.array([growth(x, imaginary) for imaginary in tracked])
+        mean, h = 0.5 * (tracked[0] + tracked[1]), np.array([1e-5, 0.0])
+        return np.array([growth(x, mean), (growth(x + h, mean) - growth(x - h, mean)) / 2e-5])
+
+    def worst(distance: float) -> float:
+        return max(value.real for value in eigenvalues(distance, alpha)[1] if value.imag > 1e-3)
+
+    # The section is shorter than the points' distance: start where the growth is least around the point.
+    rough = min(np.linspace(-0.03, 0.03, 61), key=worst)
+    fine: Any = minimize_scalar(worst, bounds=(rough - 1e-3, rough + 1e-3), method="bounded", options={"xatol": 1e-8})
+    x = np.array([float(fine.x), alpha])
+    for _ in range(20):
+        values = equations(x)
+        step = np.linalg.solve(_difference_jacobian(equations, x), -values)
+        x = x + step
+        # The derivative along the arc is known to 1e-6; alpha depends on it in second order only.
+        if abs(step[1]) < 1e-12 and abs(step[0]) < 1e-5:
+            break
+    motion, _ = eigenvalues(float(x[0]), float(x[1]))
+    # Growth at the point; at a tangency its slope is the other equation, whose round-off moves the point
+    # along the arc only.
+    left = equations(x)[:1] if kind == "tangency" else equations(x)
+    return CriticalPoint((number,), float(x[1]), motion, float(np.abs(left).max()), kind)
