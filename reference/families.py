@@ -111,20 +111,27 @@ def _carry(path: Callable[[float], Steady], u: np.ndarray, condition: Callable, 
     reached, step = 0.0, 0.02
     while reached < 1:
         wanted = min(1.0, reached + step)
-        try:
-            new, iterations = newton(path(wanted), u, condition, most=8)
-        except ValueError:
-            new, iterations = u, 99
-        moved = np.abs(new - u)[LEAN : SIGMA + 1] / (1 + np.abs(u[LEAN : SIGMA + 1]))
-        if iterations == 99 or moved.max() > _LARGEST_MOVE:
+        carried = _step_on(path(wanted), u, condition)
+        if carried is None:
             step /= 2
             if step < 1e-6:
                 raise ValueError(f"its anchor is lost {100 * reached:.4g} % of the way to {what}")
             continue
-        u, reached, step = new, wanted, step * (1.5 if iterations <= 5 else 1.0)
+        (u, iterations), reached = carried, wanted
+        step *= 1.5 if iterations <= 5 else 1.0
     if u[SIGMA] < 0:
         raise ValueError(f"its anchor is no motion at {what}: the squared speed would be negative")
     return u
+
+
+def _step_on(equations: Steady, u: np.ndarray, condition: Callable) -> tuple[np.ndarray, int] | None:
+    """Solution of neighbouring equations and the iterations it took; None where it fails or jumps."""
+    try:
+        new, iterations = newton(equations, u, condition, most=8)
+    except ValueError:
+        return None
+    moved = np.abs(new - u)[LEAN : SIGMA + 1] / (1 + np.abs(u[LEAN : SIGMA + 1]))
+    return (new, iterations) if moved.max() <= _LARGEST_MOVE else None
 
 
 def _between(bicycle: Bicycle, fraction: float) -> Bicycle:
@@ -351,21 +358,20 @@ def motions(bicycle: Bicycle, alpha: float, family: int, rear_rate: float) -> li
         If none of the family's anchors can be reached at this alpha.
     """
     found: list[CircularMotion] = []
-    failure, reached = None, False
+    failures = []
     for anchor_rate in ANCHORS[family]:
         try:
             equations, start, directions = anchor(bicycle, alpha, family, anchor_rate)
         except ValueError as error:
-            failure = error
+            failures.append(error)
             continue
-        reached = True
         for direction in directions:
             for u in _crossings(equations, follow(equations, start, direction), rear_rate):
                 motion = equations.motion(u)
                 if not any(np.hypot(motion.lean - m.lean, motion.steer - m.steer) < 1e-7 for m in found):
                     found.append(motion)
-    if failure is not None and not reached:
-        raise failure
+    if len(failures) == len(ANCHORS[family]):
+        raise failures[-1]
     return found
 
 

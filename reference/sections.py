@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 from .circular import CircularMotion, Steady
 from .continuation import Point, least_between, root_between
 from .families import Family
-from .stability import Linearisation, growth_rate, linearise, structural_eigenvalues
+from .stability import Linearisation, free_eigenvalues, growth_rate, linearise
 
 MODES = ("family", "castering", "capsize", "weave", "orbital")
 
@@ -101,10 +101,8 @@ def _least(values: list[float], i: int) -> bool:
 
 def _end(equations: Steady, point: Point, cause: str | None = None) -> SectionEnd:
     motion, reduced = linearise_point(equations, point)
-    rest = list(reduced.eigenvalues)
-    for known in structural_eigenvalues(equations.surface, motion.yaw_rate):
-        rest.remove(min(rest, key=lambda value: abs(value - known)))
-    critical = max(rest, key=lambda value: (value.real, value.imag))
+    free = free_eigenvalues(equations.surface, reduced.eigenvalues, motion.yaw_rate)
+    critical = max(free, key=lambda value: (value.real, value.imag))
     critical = complex(critical.real, abs(critical.imag))
     # Two zeros that meet split by the root of round-off, 1e-7; the slowest pair that crosses turns at 1/s.
     return SectionEnd(cause or ("hopf" if critical.imag > 1e-3 else "energy"), motion, critical)

@@ -19,7 +19,7 @@ from .families import Family, front_rate_slope, rear_rate_slope
 from .kernels.steady import STEP, steady_energy
 from .kinematics import FRONT_ANGLE, constants
 from .stability import VARIABLES, linearise
-from .surface import Plane
+from .surface import Plane, is_level
 
 LEAN, STEER, LEAN_RATE, STEER_RATE = (VARIABLES.index(name) for name in ("lean", "steer", "lean_rate", "steer_rate"))
 STRAIGHT = {1: ("B", 0.0), 2: ("C", np.pi)}
@@ -84,8 +84,7 @@ def special_points(family: Family) -> list[SpecialPoint]:
     found.sort(key=lambda item: item[0])
     ordered = [(kind, equations.motion(point.unknowns)) for _, kind, point in found]
     points = [SpecialPoint(name, kind, *_figures(motion)) for name, kind, motion in _named(family, ordered)]
-    level = not np.any(equations.surface.parameters)
-    if level and family.number in STRAIGHT:
+    if is_level(equations.surface) and family.number in STRAIGHT:
         points.append(straight_motion(equations.bicycle, *STRAIGHT[family.number]))
     return points
 

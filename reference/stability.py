@@ -10,7 +10,7 @@ from .bicycle import Bicycle
 from .dae import contact_parameters
 from .kernels import steady as kernel
 from .kinematics import LEAN, REAR_ANGLE, STEER, YAW, constants
-from .surface import Surface
+from .surface import Surface, is_level
 
 VARIABLES = ("x", "y", "lean", "steer", "lean_rate", "steer_rate", "rear_rate")
 
@@ -74,13 +74,17 @@ def structural_eigenvalues(surface: Surface, yaw_rate: float) -> list[complex]:
     Circular motions come in one-parameter families, hence a zero; on a level plane the circle's centre
     is free too, hence a pair of +-i times the yaw rate.
     """
-    level = not np.any(surface.parameters)
-    return [0j, complex(0, yaw_rate), complex(0, -yaw_rate)] if level else [0j]
+    return [0j, complex(0, yaw_rate), complex(0, -yaw_rate)] if is_level(surface) else [0j]
+
+
+def free_eigenvalues(surface: Surface, eigenvalues: np.ndarray, yaw_rate: float) -> list[complex]:
+    """Eigenvalues that symmetry does not fix: all but the nearest to each structural one."""
+    rest = list(eigenvalues)
+    for known in structural_eigenvalues(surface, yaw_rate):
+        rest.remove(min(rest, key=lambda value: abs(value - known)))
+    return rest
 
 
 def growth_rate(surface: Surface, eigenvalues: np.ndarray, yaw_rate: float) -> float:
     """Largest real part among the eigenvalues that symmetry does not fix [1/s]; negative: Lyapunov stable."""
-    rest = list(eigenvalues)
-    for known in structural_eigenvalues(surface, yaw_rate):
-        rest.remove(min(rest, key=lambda value: abs(value - known)))
-    return max(value.real for value in rest)
+    return max(value.real for value in free_eigenvalues(surface, eigenvalues, yaw_rate))

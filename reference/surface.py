@@ -127,6 +127,11 @@ class Paraboloid:
         return np.array([float(self.alpha)])
 
 
+def is_level(surface: Surface) -> bool:
+    """Whether a surface is the plane z = 0, as its parameters tell: all that shape it are zero."""
+    return not np.any(surface.parameters)
+
+
 @jit
 def _evaluate(function, parameters, x, y):
     out = np.empty((x.size, 6))

@@ -18,9 +18,9 @@ from reference.kinematics import REAR_ANGLE
 from reports.drift import Scale, Verdict, judge, limits, missing, quantities
 from reports.metrics import metrics, position_errors
 
-from .runner import Watch, configure, library_versions, plan_run, write_json
+from .runner import Watch, configure, library_versions, write_json
 from .scenario import ScenarioError, library_names, load_scenario
-from .start import Start
+from .start import Start, make_start
 
 BASELINES = Path(next(iter(reports.__path__))) / "baselines"
 GATED_TAG = "gated"
@@ -97,7 +97,7 @@ def check(
     fresh: dict[str, dict[str, Any]] = {}
     for name in gated_names():
         _, scenario = load_scenario(name, {"simulation.duration": DURATION, "simulation.output_rate": OUTPUT_RATE})
-        start = plan_run(name, scenario, []).start
+        start = make_start(scenario)
         baseline = read_baseline(name)
         entries: dict[str, Any] = {}
         # Engines of the baseline count too: one that is gone did not run.

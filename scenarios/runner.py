@@ -7,7 +7,7 @@ import os
 import platform
 import signal
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -165,10 +165,11 @@ def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None]) -> Out
         note("interrupted: finished engines are kept")
     with _deaf_to_interrupts():
         measured = measure(plan, trajectories)
+        verdicts = judge(plan, measured)
         write_json(folder / "metrics.json", measured)
-        _record(folder, plan, trajectories, measured, failures)
+        _record(folder, plan, trajectories, measured, failures, verdicts)
         _write_manifest(folder, plan, trajectories, failures, complete=not interrupted)
-    return Outcome(folder, measured, failures, judge(plan, measured), interrupted)
+    return Outcome(folder, measured, failures, verdicts, interrupted)
 
 
 def _reason(error: Exception) -> str:
@@ -218,6 +219,7 @@ def _record(
     trajectories: Mapping[str, Trajectory],
     measured: Mapping[str, Mapping[str, Any]],
     failures: Mapping[str, str],
+    verdicts: Sequence[Mapping[str, Any]],
 ) -> None:
     if not trajectories:
         return
@@ -226,7 +228,7 @@ def _record(
 
     problem = plan.start.problem
     facts = (plan.start.growth_rate, plan.scenario.simulation.duration)
-    text = summary(plan.scenario.title, measured, failures, judge(plan, measured), *facts)
+    text = summary(plan.scenario.title, measured, failures, verdicts, *facts)
     write_recording(
         folder / "comparison.rrd", plan.scenario.title, problem.bicycle, problem.surface, dict(trajectories), text
     )

@@ -15,7 +15,7 @@ from altered import Altered, raising
 
 from engines.engine import Engine, EngineError, Problem, Settings, Trajectory, engine_names
 from reports.drift import Verdict
-from scenarios import gate, runner
+from scenarios import gate
 from scenarios.runner import configure
 from scenarios.scenario import Scenario, ScenarioError
 from scenarios.start import Start, make_start
@@ -33,7 +33,7 @@ def starting(scenario: str) -> Start:
 @pytest.fixture(autouse=True)
 def one_start(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compute the gated motion once: it is the engines that are altered."""
-    monkeypatch.setattr(runner, "make_start", lambda scenario: starting(scenario.model_dump_json()))
+    monkeypatch.setattr(gate, "make_start", lambda scenario: starting(scenario.model_dump_json()))
 
 
 def verdicts_on(wanted: str, chosen: Chosen = configure) -> list[Verdict]:
