@@ -82,7 +82,7 @@ def upright() -> State:
 def in_circles() -> tuple[Paraboloid, State]:
     """Surface and start of q2-plus."""
     bowl = Paraboloid(0.005)
-    _, motion = find_motion(BICYCLE, bowl.alpha, 18.0, 2)
+    _, motion = find_motion(BICYCLE, bowl, 18.0, 2)
     q, _ = motion.state()
     guess = (q[2], q[5])
     return bowl, consistent_state(BICYCLE, bowl, (q[0], q[1]), q[4], q[6], (0.1, 0.0, 18.0), guess=guess)

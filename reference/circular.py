@@ -9,7 +9,7 @@ import numpy as np
 from .bicycle import Bicycle
 from .kernels import steady as kernel
 from .kinematics import constants
-from .surface import Surface
+from .surface import SurfaceOfRevolution
 
 LEAN, PITCH, STEER, YAW_SPEED, REAR_SPEED, FRONT_SPEED, SIGMA = range(3, 10)
 CONTACT, FORCE = slice(10, 16), slice(16, 22)
@@ -63,7 +63,7 @@ class Steady:
     """The equations of circular motions of one bicycle on one surface of revolution."""
 
     bicycle: Bicycle
-    surface: Surface
+    surface: SurfaceOfRevolution
 
     def residual(self, unknowns: np.ndarray) -> np.ndarray:
         """Residual of the 21 equations and the normalisation of the speeds, shape (22,)."""

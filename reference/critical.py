@@ -95,7 +95,7 @@ def _passing(bicycle: Bicycle, motion: CircularMotion, low: float, high: float) 
         gaps = []
         for alpha in (low, high):
             try:
-                points = trace(bicycle, alpha, number, 0.03).points
+                points = trace(bicycle, Paraboloid(alpha), number, 0.03).points
             except ValueError:
                 continue
             gaps += [np.hypot(p.unknowns[LEAN] - motion.lean, p.unknowns[STEER] - motion.steer) for p in points]
@@ -107,7 +107,7 @@ def _passing(bicycle: Bicycle, motion: CircularMotion, low: float, high: float) 
 
 def _ends(bicycle: Bicycle, alpha: float, number: int) -> tuple[str, str] | None:
     try:
-        return trace(bicycle, alpha, number).ends
+        return trace(bicycle, Paraboloid(alpha), number).ends
     except ValueError:
         return None
 
@@ -132,7 +132,7 @@ def _changes(
 
 def _touching_point(bicycle: Bicycle, number: int, low: float, high: float) -> CriticalPoint | None:
     """Solve for the touching point near a family; None where its ends change without one."""
-    family = trace(bicycle, low, number, 0.05)
+    family = trace(bicycle, Paraboloid(low), number, 0.05)
     rank = [float(np.linalg.svd(family.equations.jacobian(point.unknowns))[1][-2]) for point in family.points]
     dips = [i for i in range(1, len(rank) - 1) if rank[i] <= min(rank[i - 1], rank[i + 1])]
     for i in sorted(dips, key=lambda i: rank[i]):
@@ -212,7 +212,7 @@ def last_stable(bicycle: Bicycle, number: int, largest: float = 1.0) -> Critical
 
 def _sections(bicycle: Bicycle, alpha: float, number: int) -> list[tuple[SectionEnd, SectionEnd]]:
     try:
-        return stable_sections(trace(bicycle, alpha, number, 0.05))
+        return stable_sections(trace(bicycle, Paraboloid(alpha), number, 0.05))
     except ValueError:
         return []
 
@@ -220,7 +220,7 @@ def _sections(bicycle: Bicycle, alpha: float, number: int) -> list[tuple[Section
 def _vanishing(bicycle: Bicycle, number: int, alpha: float) -> CriticalPoint:
     """Solve for the point at which the ends of the section at alpha, just before it vanishes, meet."""
     ends = _sections(bicycle, alpha, number)[-1]
-    family = trace(bicycle, alpha, number, 0.02)
+    family = trace(bicycle, Paraboloid(alpha), number, 0.02)
     middle = 0.5 * (ends[0].motion.lean + ends[1].motion.lean), 0.5 * (ends[0].motion.steer + ends[1].motion.steer)
     near = min(family.points, key=lambda p: np.hypot(p.unknowns[LEAN] - middle[0], p.unknowns[STEER] - middle[1]))
     covector = metric(near.unknowns) * near.tangent

@@ -1,10 +1,10 @@
 """Solution families: curves of circular motions, reached from the paper's named points.
 
-Random starts land on spurious roots, and the families reconnect as alpha grows. So every family is
+Random starts land on spurious roots, and the families reconnect as a bowl deepens. So every family is
 a curve with an *anchor*: a point of the benchmark bicycle on the level plane, reached from a named
-one, carried by continuation to the wanted bicycle and alpha; from there the curve is followed by
+one, carried by continuation to the wanted bicycle and surface; from there the curve is followed by
 pseudo-arclength. Where families have joined or exchanged parts, an anchor stays on its part: family 3
-has two, since its part of forward circles joins family 1 between alpha = 1/5 and 1/2.
+has two, since its part of forward circles joins family 1 on steep bowls (paraboloids from alpha = 0.384).
 
 =======  =====================================  ============================================
 family   anchor                                 followed towards
@@ -47,7 +47,7 @@ from .continuation import FARTHEST, LONGEST_STEP, Point, follow, root_between
 from .kernels import dynamics as kernel
 from .kernels.steady import UNKNOWNS
 from .kinematics import constants
-from .surface import Paraboloid
+from .surface import Plane, SurfaceOfRevolution, is_level
 
 FAMILIES = (1, 2, 3, 4)
 
@@ -81,7 +81,7 @@ def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
     ValueError
         If the wheels cannot both touch the plane at these angles.
     """
-    surface, c = Paraboloid(0.0), constants(bicycle)
+    surface, c = Plane(), constants(bicycle)
     function, parameters = surface.function.real, surface.parameters
     q, p = np.zeros(9), np.empty(6)
     q[[2, 4, 6]] = bicycle.front_wheel_radius * np.cos(lean), lean, steer
@@ -143,7 +143,7 @@ def _between(bicycle: Bicycle, fraction: float) -> Bicycle:
 @cache
 def _on_the_plane(family: int, rear_rate: float | None) -> np.ndarray:
     """The benchmark's anchor on the level plane, from the paper's named points."""
-    level = Steady(Bicycle(), Paraboloid(0.0))
+    level = Steady(Bicycle(), Plane())
     if rear_rate is None or family == 3:
         start, _ = newton(level, start_on_plane(level.bicycle, *_POINT_G), unknown_condition(REAR_SPEED, 0.0), most=30)
         towards = -np.eye(UNKNOWNS)[STEER]
@@ -157,15 +157,14 @@ def _on_the_plane(family: int, rear_rate: float | None) -> np.ndarray:
 
 
 def anchor(
-    bicycle: Bicycle, alpha: float, family: int, rear_rate: float | None
+    bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float | None
 ) -> tuple[Steady, np.ndarray, list[np.ndarray]]:
-    """Carry an anchor of a family to a bicycle and alpha.
+    """Carry an anchor of a family to a bicycle and a surface.
 
     Parameters
     ----------
     bicycle : Bicycle
-    alpha : float
-        Shape of the paraboloid [1/m].
+    surface : SurfaceOfRevolution
     family : int
         1 to 4.
     rear_rate : float or None
@@ -183,34 +182,34 @@ def anchor(
     ValueError
         If the anchor is lost on the way.
     """
-    bowl, axis, u = Paraboloid(alpha), np.eye(UNKNOWNS), _on_the_plane(family, rear_rate)
+    axis, u = np.eye(UNKNOWNS), _on_the_plane(family, rear_rate)
     if rear_rate is None:
         condition, directions = unknown_condition(REAR_SPEED, 0.0), [axis[STEER] if family == 4 else -axis[STEER]]
     else:
         condition, directions = rear_rate_condition(rear_rate), [axis[STEER], -axis[STEER]]
     if bicycle != Bicycle():
-        u = _carry(lambda s: Steady(_between(bicycle, s), Paraboloid(0.0)), u, condition, "this bicycle")
-    if alpha > 0:
+        u = _carry(lambda s: Steady(_between(bicycle, s), Plane()), u, condition, "this bicycle")
+    if not is_level(surface):
         try:
-            u = _carry(lambda s: Steady(bicycle, Paraboloid(s * alpha)), u, condition, f"alpha = {alpha!r}")
+            u = _carry(lambda s: Steady(bicycle, surface.flattened(s)), u, condition, str(surface))
         except ValueError:
             if rear_rate is not None:
                 raise
-            u = _other_pivot(bicycle, alpha)
-    return Steady(bicycle, bowl), u, directions
+            u = _other_pivot(bicycle, surface)
+    return Steady(bicycle, surface), u, directions
 
 
-def _other_pivot(bicycle: Bicycle, alpha: float) -> np.ndarray:
+def _other_pivot(bicycle: Bicycle, surface: SurfaceOfRevolution) -> np.ndarray:
     """The pivoting motion in which family 2 ends on steep bowls.
 
-    The one known from the plane comes to rest as alpha grows (the benchmark's at 0.42); another appears
-    further on (at 0.46), first infinitely fast.
+    The one known from the plane comes to rest as a bowl deepens (the benchmark's on a paraboloid at
+    alpha = 0.42); another appears further on (at 0.46), first infinitely fast.
     """
-    branch = trace(bicycle, alpha, 2)
+    branch = trace(bicycle, surface, 2)
     for end, point in zip(branch.ends, (branch.points[0], branch.points[-1]), strict=True):
         if end == "pivot":
             return point.unknowns
-    raise ValueError(f"there is no pivoting motion at alpha = {alpha!r}")
+    raise ValueError(f"there is no pivoting motion on {surface}")
 
 
 def rear_rate_slope(point: Point) -> float:
@@ -278,7 +277,7 @@ def _kind_of_end(point: Point) -> str:
     return "flat" if abs(u[LEAN]) > 1.0 else "fast front wheel"
 
 
-def trace(bicycle: Bicycle, alpha: float, family: int, longest: float = LONGEST_STEP) -> Family:
+def trace(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, longest: float = LONGEST_STEP) -> Family:
     """Follow a family through its anchor to both ends.
 
     A curve ends at the static equilibrium, at the pivoting motion (where families 3 and 4 meet), near
@@ -287,8 +286,7 @@ def trace(bicycle: Bicycle, alpha: float, family: int, longest: float = LONGEST_
     Parameters
     ----------
     bicycle : Bicycle
-    alpha : float
-        Shape of the paraboloid [1/m].
+    surface : SurfaceOfRevolution
     family : int
         1 to 4.
     longest : float
@@ -301,9 +299,9 @@ def trace(bicycle: Bicycle, alpha: float, family: int, longest: float = LONGEST_
     Raises
     ------
     ValueError
-        If the family's anchor cannot be reached at this alpha.
+        If the family's anchor cannot be reached on this surface.
     """
-    equations, start, directions = anchor(bicycle, alpha, family, ANCHORS[family][-1])
+    equations, start, directions = anchor(bicycle, surface, family, ANCHORS[family][-1])
     forward = _end_exactly(equations, list(_to_an_end(follow(equations, start, directions[0], longest))))
     if len(directions) == 1:
         return Family(family, equations, forward)
@@ -334,14 +332,13 @@ def _end_exactly(equations: Steady, points: list[Point]) -> list[Point]:
     return points
 
 
-def motions(bicycle: Bicycle, alpha: float, family: int, rear_rate: float) -> list[CircularMotion]:
+def motions(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float) -> list[CircularMotion]:
     """All motions of a family at a rear-wheel rate, nearest to the family's anchor first.
 
     Parameters
     ----------
     bicycle : Bicycle
-    alpha : float
-        Shape of the paraboloid [1/m].
+    surface : SurfaceOfRevolution
     family : int
         1 to 4.
     rear_rate : float
@@ -355,13 +352,13 @@ def motions(bicycle: Bicycle, alpha: float, family: int, rear_rate: float) -> li
     Raises
     ------
     ValueError
-        If none of the family's anchors can be reached at this alpha.
+        If none of the family's anchors can be reached on this surface.
     """
     found: list[CircularMotion] = []
     failures = []
     for anchor_rate in ANCHORS[family]:
         try:
-            equations, start, directions = anchor(bicycle, alpha, family, anchor_rate)
+            equations, start, directions = anchor(bicycle, surface, family, anchor_rate)
         except ValueError as error:
             failures.append(error)
             continue
@@ -377,7 +374,7 @@ def motions(bicycle: Bicycle, alpha: float, family: int, rear_rate: float) -> li
 
 def find_motion(
     bicycle: Bicycle,
-    alpha: float,
+    surface: SurfaceOfRevolution,
     rear_rate: float,
     family: int | None = None,
     near: tuple[float, float] | None = None,
@@ -387,8 +384,7 @@ def find_motion(
     Parameters
     ----------
     bicycle : Bicycle
-    alpha : float
-        Shape of the paraboloid [1/m].
+    surface : SurfaceOfRevolution
     rear_rate : float
         Rear-wheel rate, positive [rad/s].
     family : int, optional
@@ -418,10 +414,10 @@ def find_motion(
     found, failures = [], []
     for number in FAMILIES if family is None else (family,):
         try:
-            found += [(number, motion) for motion in motions(bicycle, alpha, number, rear_rate)]
+            found += [(number, motion) for motion in motions(bicycle, surface, number, rear_rate)]
         except ValueError as error:
             failures.append(f"family {number}: {error}")
-    wanted = f"rear rate {rear_rate!r} rad/s at alpha = {alpha!r}"
+    wanted = f"rear rate {rear_rate!r} rad/s on {surface}"
     if not found:
         reason = "; ".join(failures) or "their curves, as followed from their anchors, do not reach it"
         where = f"family {family}" if family is not None else "any family"

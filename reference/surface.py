@@ -66,6 +66,14 @@ class Surface(Protocol):
         ...
 
 
+class SurfaceOfRevolution(Surface, Protocol):
+    """A ground z = g(r) about the z axis: circular motions ride on it."""
+
+    def flattened(self, fraction: float) -> SurfaceOfRevolution:
+        """The ground on the way from the level plane (fraction 0) to this one (1), smooth in the fraction."""
+        ...
+
+
 @surface_function
 def _paraboloid(x, y, parameters):
     alpha = parameters[0]
@@ -92,6 +100,10 @@ class Plane:
     def parameters(self) -> np.ndarray:
         """No parameters; one unused entry, shape (1,)."""
         return np.zeros(1)
+
+    def flattened(self, fraction: float) -> Plane:
+        """The plane itself, which is level."""
+        return self
 
 
 @dataclass(frozen=True)
@@ -125,6 +137,10 @@ class Paraboloid:
     def parameters(self) -> np.ndarray:
         """Array of alpha, shape (1,)."""
         return np.array([float(self.alpha)])
+
+    def flattened(self, fraction: float) -> Paraboloid:
+        """The paraboloid of a fraction of alpha."""
+        return Paraboloid(fraction * self.alpha)
 
 
 def is_level(surface: Surface) -> bool:

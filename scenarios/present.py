@@ -125,7 +125,7 @@ def circular(alpha: float, rear_rate: float, family: int | None, near: tuple[flo
     bicycle = Bicycle()
     try:
         surface = Paraboloid(alpha)
-        number, motion = find_motion(bicycle, alpha, rear_rate, family, near)
+        number, motion = find_motion(bicycle, surface, rear_rate, family, near)
         q, qd = motion.state()
         reduced = linearise(bicycle, surface, q, qd)
     except ValueError as error:

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from reference.bicycle import Bicycle
+from reference.surface import Paraboloid, Plane
 
 LIBRARY = files("scenarios") / "library"
 
@@ -43,12 +44,20 @@ class PlaneTable(_Table):
 
     kind: Literal["plane"]
 
+    def make(self) -> Plane:
+        """The surface."""
+        return Plane()
+
 
 class ParaboloidTable(_Table):
     """The bowl z = alpha (x^2 + y^2)."""
 
     kind: Literal["paraboloid"]
     alpha: float = Field(ge=0, description="shape [1/m]")
+
+    def make(self) -> Paraboloid:
+        """The surface."""
+        return Paraboloid(self.alpha)
 
 
 class Near(_Table):

@@ -13,9 +13,9 @@ from reference.dae import consistent_state
 from reference.families import find_motion
 from reference.kinematics import LEAN, REAR_ANGLE, STEER, YAW, body_positions
 from reference.stability import growth_rate, linearise
-from reference.surface import Paraboloid, Plane, Surface, evaluate
+from reference.surface import Surface, SurfaceOfRevolution, evaluate
 
-from .scenario import CircularTable, ParaboloidTable, Scenario, ScenarioError
+from .scenario import CircularTable, Scenario, ScenarioError
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,6 @@ class Start:
     size: float
 
 
-def make_surface(scenario: Scenario) -> Surface:
-    """Surface of a scenario."""
-    table = scenario.surface
-    return Paraboloid(table.alpha) if isinstance(table, ParaboloidTable) else Plane()
-
-
 def make_start(scenario: Scenario) -> Start:
     """Compute a scenario's start.
 
@@ -55,7 +49,7 @@ def make_start(scenario: Scenario) -> Start:
     ScenarioError
         If there is no such motion, or its disturbed state cannot be reached.
     """
-    bicycle, surface = scenario.make_bicycle(), make_surface(scenario)
+    bicycle, surface = scenario.make_bicycle(), scenario.surface.make()
     try:
         # Numbers that no bicycle has may overflow on the way; what comes of them is checked.
         with np.errstate(all="ignore"):
@@ -74,13 +68,12 @@ def make_start(scenario: Scenario) -> Start:
 
 
 def _undisturbed(
-    scenario: Scenario, bicycle: Bicycle, surface: Surface
+    scenario: Scenario, bicycle: Bicycle, surface: SurfaceOfRevolution
 ) -> tuple[int | None, CircularMotion | None, np.ndarray, np.ndarray]:
     table = scenario.motion
     if isinstance(table, CircularTable):
-        alpha = surface.alpha if isinstance(surface, Paraboloid) else 0.0
         near = (table.near.lean, table.near.steer) if table.near is not None else None
-        family, motion = find_motion(bicycle, alpha, table.rear_rate, table.family, near)
+        family, motion = find_motion(bicycle, surface, table.rear_rate, table.family, near)
         return family, motion, *motion.state()
     rates = (0.0, 0.0, table.speed / bicycle.rear_wheel_radius)
     q, qd = consistent_state(bicycle, surface, (float(bicycle.reference_point[0]), 0.0), 0.0, 0.0, rates)

@@ -43,12 +43,12 @@ def families_document(alpha: float) -> dict[str, Any]:
     """
     bicycle, families, absent = Bicycle(), [], {}
     try:
-        Paraboloid(alpha)
+        surface = Paraboloid(alpha)
     except ValueError as error:
         raise ScenarioError(str(error)) from error
     for number in FAMILIES:
         try:
-            families.append(_family(trace(bicycle, alpha, number, LONGEST_STEP)))
+            families.append(_family(trace(bicycle, surface, number, LONGEST_STEP)))
         except ValueError as error:
             absent[str(number)] = str(error)
     return {"alpha": alpha, "families": families, "absent": absent}

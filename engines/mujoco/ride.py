@@ -22,7 +22,7 @@ from engines.mujoco.tangent import place
 from reference.bicycle import BODIES
 from reference.kernels.dynamics import guess_contacts
 from reference.kinematics import WHEELS, constants
-from reference.surface import Paraboloid, Plane, Surface
+from reference.surface import is_level
 
 REPORT_INTERVAL = 0.05
 # How often a bicycle on a resting plane is looked at: a wheel turns by far less than half a turn meanwhile.
@@ -102,11 +102,6 @@ class Ground:
         return self._place(*self._arguments)
 
 
-def is_flat(surface: Surface) -> bool:
-    """Whether one resting plane is the whole ground."""
-    return isinstance(surface, Plane) or (isinstance(surface, Paraboloid) and surface.alpha == 0)
-
-
 @dataclass(frozen=True)
 class Rig:
     """A model with its state and its ground.
@@ -137,7 +132,7 @@ def build(problem: Problem, settings: NativeSettings) -> Rig:
     EngineError
         If MuJoCo refuses the model or a wheel has no contact point.
     """
-    moving = not is_flat(problem.surface)
+    moving = not is_level(problem.surface)
     try:
         model = mujoco.MjModel.from_xml_string(mjcf(problem.bicycle, settings, moving))
     except ValueError as error:

@@ -21,7 +21,7 @@ OPTIONAL = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "
 
 def problem(duration: float = 0.1) -> Problem:
     bicycle = Bicycle()
-    _, motion = find_motion(bicycle, 0.005, 18.0, 2)
+    _, motion = find_motion(bicycle, Paraboloid(0.005), 18.0, 2)
     q, qd = motion.state()
     return Problem(bicycle, Paraboloid(0.005), q, qd, np.arange(round(100 * duration) + 1) / 100)
 

@@ -22,7 +22,7 @@ PRINTED = published("xiong2020")
 def test_points_p_round_to_the_print(name: str) -> None:
     point = PRINTED[name]
     near = (float(point["lean"]), float(point["steer"]))
-    family, motion = find_motion(BICYCLE, point["alpha"], point["rear_rate"], point["family"], near)
+    family, motion = find_motion(BICYCLE, Paraboloid(point["alpha"]), point["rear_rate"], point["family"], near)
     assert family == point["family"]
     for field in ("lean", "steer", "front_rate"):
         assert rounds_to(getattr(motion, field), point[field]), field
@@ -32,7 +32,7 @@ def test_points_p_round_to_the_print(name: str) -> None:
 @pytest.mark.parametrize(("name", "family"), [("Q1", 1), ("Q2", 2)])
 def test_points_q_round_to_the_print(name: str, family: int) -> None:
     point = PRINTED[name]
-    _, motion = find_motion(BICYCLE, point["alpha"], 18.0, family)
+    _, motion = find_motion(BICYCLE, Paraboloid(point["alpha"]), 18.0, family)
     values = [*motion.position[:2], motion.lean, motion.steer, 0.0, 0.0, motion.rear_rate]
     for value, printed in zip(values, point["v"], strict=True):
         assert rounds_to(value, printed)
@@ -40,17 +40,17 @@ def test_points_q_round_to_the_print(name: str, family: int) -> None:
 
 
 def test_family_two_has_two_motions_at_q2_and_near_tells_them_apart() -> None:
-    both = motions(BICYCLE, 0.005, 2, 18.0)
+    both = motions(BICYCLE, Paraboloid(0.005), 2, 18.0)
     assert [round(motion.lean, 3) for motion in both] == [0.737, 0.693]
-    _, other = find_motion(BICYCLE, 0.005, 18.0, 2, near=(0.69, 2.87))
+    _, other = find_motion(BICYCLE, Paraboloid(0.005), 18.0, 2, near=(0.69, 2.87))
     assert other.lean == both[1].lean
     # Without a family the nearest of all is found as well.
-    family, same = find_motion(BICYCLE, 0.005, 18.0, near=(0.69, 2.87))
+    family, same = find_motion(BICYCLE, Paraboloid(0.005), 18.0, near=(0.69, 2.87))
     assert (family, same.lean) == (2, both[1].lean)
 
 
 def test_point_g_is_the_printed_pivoting_motion() -> None:
-    equations, u, _ = anchor(BICYCLE, 0.0, 3, None)
+    equations, u, _ = anchor(BICYCLE, Paraboloid(0.0), 3, None)
     motion, point = equations.motion(u), PRINTED["G"]
     assert abs(motion.rear_rate) < 1e-12
     assert rounds_to(motion.lean, point["lean"])
@@ -74,7 +74,7 @@ def test_straight_motions_are_the_limits_of_large_circles(name: str, guess: tupl
 def test_a_circular_motion_solves_the_equations_of_motion(alpha: float, family: int, rear_rate: float) -> None:
     """All 21 equations of the unrotated system, with the accelerations of turning about z."""
     surface = Paraboloid(alpha)
-    _, motion = find_motion(BICYCLE, alpha, rear_rate, family)
+    _, motion = find_motion(BICYCLE, Paraboloid(alpha), rear_rate, family)
     q, qd = motion.state()
     turning = np.zeros(9)
     turning[:2] = -(motion.yaw_rate**2) * motion.position[:2]
@@ -90,7 +90,7 @@ def test_a_circular_motion_solves_the_equations_of_motion(alpha: float, family: 
 def test_families_one_and_three_are_continuous_in_alpha() -> None:
     """Their curves join between alpha = 1/5 and 1/2; the motions at a rear rate stay and move smoothly."""
     for family, rear_rate in ((1, 12.0), (3, 20.0)):
-        found = [find_motion(BICYCLE, alpha, rear_rate, family)[1] for alpha in np.arange(0.2, 1.01, 0.1)]
+        found = [find_motion(BICYCLE, Paraboloid(alpha), rear_rate, family)[1] for alpha in np.arange(0.2, 1.01, 0.1)]
         angles = np.array([[motion.lean, motion.steer] for motion in found])
         # Lean and steer move by some 0.1 over the whole range.
         assert np.abs(np.diff(angles, axis=0)).max() < 0.1
@@ -101,8 +101,8 @@ def test_families_one_and_three_are_continuous_in_alpha() -> None:
 def test_another_bicycle_is_reached_from_the_benchmark(change: dict[str, float]) -> None:
     """Motions of bicycles nearby are neighbours of the benchmark's, not another family's."""
     for alpha, rear_rate, family in ((0.005, 19.0, 2), (0.2, 20.0, 3)):
-        there = find_motion(BICYCLE, alpha, rear_rate, family)[1]
-        here = find_motion(replace(BICYCLE, **change), alpha, rear_rate, family)[1]
+        there = find_motion(BICYCLE, Paraboloid(alpha), rear_rate, family)[1]
+        here = find_motion(replace(BICYCLE, **change), Paraboloid(alpha), rear_rate, family)[1]
         assert here.residual < 1e-12
         # Parameters differ by up to a quarter; angles are functions of order one of their logarithms.
         assert np.hypot(here.lean - there.lean, here.steer - there.steer) < 0.25
@@ -110,13 +110,13 @@ def test_another_bicycle_is_reached_from_the_benchmark(change: dict[str, float])
 
 def test_near_is_refused_where_nothing_is_near() -> None:
     with pytest.raises(ValueError, match=r"within 0\.2 rad of near; the nearest is at 0\.7"):
-        find_motion(BICYCLE, 0.005, 18.0, 2, near=(0.2, 2.0))
+        find_motion(BICYCLE, Paraboloid(0.005), 18.0, 2, near=(0.2, 2.0))
 
 
 def test_small_curvature_tends_to_the_plane() -> None:
     """Families at alpha -> 0 tend to the plane's linearly in alpha."""
-    plane = find_motion(BICYCLE, 0.0, 18.0, 2)[1]
-    gaps = [abs(find_motion(BICYCLE, alpha, 18.0, 2)[1].lean - plane.lean) for alpha in (1e-4, 1e-5)]
+    plane = find_motion(BICYCLE, Paraboloid(0.0), 18.0, 2)[1]
+    gaps = [abs(find_motion(BICYCLE, Paraboloid(alpha), 18.0, 2)[1].lean - plane.lean) for alpha in (1e-4, 1e-5)]
     # Linear with a quadratic correction of relative size alpha x lengths of some metres x O(10).
     assert gaps[0] / gaps[1] == pytest.approx(10, rel=1e-2)
 
@@ -124,13 +124,13 @@ def test_small_curvature_tends_to_the_plane() -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ((0.005, -1.0, 2, None), "rear rate"),
-        ((0.005, 18.0, 5, None), "family"),
-        ((0.005, 18.0, None, None), "needs a family"),
-        ((0.005, 18.0, None, (np.nan, 0.0)), "near"),
-        ((0.005, 500.0, 1, None), "no circular motion"),
+        ((-1.0, 2, None), "rear rate"),
+        ((18.0, 5, None), "family"),
+        ((18.0, None, None), "needs a family"),
+        ((18.0, None, (np.nan, 0.0)), "near"),
+        ((500.0, 1, None), "no circular motion"),
     ],
 )
 def test_impossible_wishes_are_refused(arguments: tuple, words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        find_motion(BICYCLE, *arguments)
+        find_motion(BICYCLE, Paraboloid(0.005), *arguments)

@@ -6,13 +6,14 @@ from reference.bicycle import Bicycle
 from reference.critical import CriticalPoint, last_stable, reconnections
 from reference.families import find_motion, trace
 from reference.sections import stable_sections
+from reference.surface import Paraboloid
 
 BICYCLE = Bicycle()
 
 
 def exchanged(point: CriticalPoint, number: int, share: float) -> bool:
     """Whether a family ends elsewhere just above the point's alpha than just below."""
-    below, above = (trace(BICYCLE, point.alpha * (1 + sign * share), number, 0.02).ends for sign in (-1, 1))
+    below, above = (trace(BICYCLE, Paraboloid(point.alpha * (1 + sign * share)), number, 0.02).ends for sign in (-1, 1))
     return below != above
 
 
@@ -29,7 +30,7 @@ def test_families_two_and_four_touch_where_the_cusps_meet() -> None:
     # The touching point is a motion of both families' curves nearby.
     for number in (2, 4):
         near = (point.motion.lean, point.motion.steer)
-        found = find_motion(BICYCLE, point.alpha * 0.999, point.motion.rear_rate * 1.02, number, near)[1]
+        found = find_motion(BICYCLE, Paraboloid(point.alpha * 0.999), point.motion.rear_rate * 1.02, number, near)[1]
         assert abs(found.lean - point.motion.lean) < 0.05
 
 
@@ -50,7 +51,9 @@ def test_last_stable_sections_vanish_there(number: int) -> None:
     assert point is not None
     # A growth rate is known to some 1e-11, and changes with alpha by tens: alpha to 1e-11.
     assert point.residual < 1e-9
-    below, above = (stable_sections(trace(BICYCLE, point.alpha * (1 + sign * 1e-5), number, 0.05)) for sign in (-1, 1))
+    below, above = (
+        stable_sections(trace(BICYCLE, Paraboloid(point.alpha * (1 + sign * 1e-5)), number, 0.05)) for sign in (-1, 1)
+    )
     assert len(below) == 1
     assert not above
 

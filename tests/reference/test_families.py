@@ -11,6 +11,7 @@ from reference.continuation import root_between
 from reference.families import FAMILIES, Family, front_rate_slope, trace
 from reference.sections import growth_along, linearise_point, modes, stable_sections
 from reference.special import SpecialPoint, special_points
+from reference.surface import Paraboloid
 from tests.literature import published, rounds_to
 
 BICYCLE = Bicycle()
@@ -20,7 +21,7 @@ ALPHAS = (0.0, 0.005, 0.011, 1 / 33, 0.05, 0.2, 0.5, 1.0)
 
 @cache
 def family(alpha: float, number: int, longest: float = 0.1) -> Family:
-    return trace(BICYCLE, alpha, number, longest)
+    return trace(BICYCLE, Paraboloid(alpha), number, longest)
 
 
 def special(alpha: float, number: int, name: str) -> SpecialPoint:
@@ -135,7 +136,7 @@ def test_the_pivoting_motion_is_gone_where_it_would_have_to_stand_still() -> Non
     """From alpha = 0.420 to 0.464 there is none; further on another one, that family 2 ends in."""
     assert family(0.415, 3).ends[0] == "pivot"
     with pytest.raises(ValueError, match="no pivoting motion"):
-        trace(BICYCLE, 0.44, 3)
+        trace(BICYCLE, Paraboloid(0.44), 3)
     assert family(0.5, 3).ends[0] == "pivot"
     assert "pivot" in family(0.5, 2).ends
 

@@ -16,7 +16,7 @@ TIMES = np.arange(2001) / 100
 
 
 def q2(lean_rate: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    _, motion = find_motion(BICYCLE, 0.005, 18.0, 2)
+    _, motion = find_motion(BICYCLE, Paraboloid(0.005), 18.0, 2)
     q, _ = motion.state()
     return consistent_state(BICYCLE, BOWL, (q[0], q[1]), q[4], q[6], (lean_rate, 0.0, 18.0), guess=(q[2], q[5]))
 
@@ -71,7 +71,7 @@ def test_the_papers_integrator_converges_with_order_two(q2_plus: Motion) -> None
 
 
 def test_the_paper_s_stable_motion_stays_and_the_unstable_one_leaves() -> None:
-    _, q1 = find_motion(BICYCLE, 0.005, 18.0, 1)
+    _, q1 = find_motion(BICYCLE, Paraboloid(0.005), 18.0, 1)
     state = q1.state()
     rate = linearise(BICYCLE, BOWL, *state).eigenvalues[-1].real
     kicked = consistent_state(

@@ -72,7 +72,7 @@ def test_upright_jacobian_is_the_canonical_equation(speed: float) -> None:
 @pytest.mark.parametrize(("name", "family", "stable"), [("Q1", 1, False), ("Q2", 2, True)])
 def test_eigenvalues_of_q_round_to_the_print(name: str, family: int, stable: bool) -> None:
     point, surface = PRINTED[name], Paraboloid(0.005)
-    _, motion = find_motion(BICYCLE, 0.005, 18.0, family)
+    _, motion = find_motion(BICYCLE, Paraboloid(0.005), 18.0, family)
     reduced = linearise(BICYCLE, surface, *motion.state())
     found = list(reduced.eigenvalues)
     for text in point["eigenvalues"]:
@@ -90,7 +90,7 @@ def test_eigenvalues_of_q_round_to_the_print(name: str, family: int, stable: boo
 @pytest.mark.parametrize(("family", "rear_rate"), [(1, 12.0), (1, 18.0), (2, 18.0), (3, 9.0), (4, 6.0)])
 def test_on_the_plane_the_circles_centre_is_free(family: int, rear_rate: float) -> None:
     """alpha = 0: the spectrum contains 0 and +-i times the yaw rate."""
-    _, motion = find_motion(BICYCLE, 0.0, rear_rate, family)
+    _, motion = find_motion(BICYCLE, Paraboloid(0.0), rear_rate, family)
     reduced = linearise(BICYCLE, Plane(), *motion.state())
     for expected in (0, 1j * motion.yaw_rate, -1j * motion.yaw_rate):
         assert np.abs(reduced.eigenvalues - expected).min() < 1e-8
@@ -99,7 +99,7 @@ def test_on_the_plane_the_circles_centre_is_free(family: int, rear_rate: float) 
 def test_jacobian_is_the_derivative_of_the_field() -> None:
     """Against central differences through the public interface, extrapolated once in the step."""
     surface = Paraboloid(0.2)
-    _, motion = find_motion(BICYCLE, 0.2, 10.0, 1)
+    _, motion = find_motion(BICYCLE, Paraboloid(0.2), 10.0, 1)
     q, qd = motion.state()
     jacobian = linearise(BICYCLE, surface, q, qd).jacobian
     v = np.array([q[0], q[1], q[LEAN], q[STEER], 0.0, 0.0, qd[REAR_ANGLE]])

@@ -25,7 +25,7 @@ SETTINGS = {"step": 0.001, "tolerance": 1e-10}
 ENTRY = {"version": "1.0", "settings": SETTINGS, "quantities": {"short_error": 1e-5, "max_slip": None}}
 ALLOWED = {"short_error": 1e-7, "max_slip": 1e-6}
 BICYCLE = Bicycle()
-_, MOTION = find_motion(BICYCLE, 0.005, 18.0, 2)
+_, MOTION = find_motion(BICYCLE, Paraboloid(0.005), 18.0, 2)
 EXACT = steady_trajectory(BICYCLE, MOTION, np.arange(41) / 10)
 
 

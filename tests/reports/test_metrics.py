@@ -22,7 +22,7 @@ from reports.metrics import fell_at, horizon, least_normal_force, metrics, orien
 
 BICYCLE = Bicycle()
 BOWL = Paraboloid(0.005)
-_, MOTION = find_motion(BICYCLE, 0.005, 18.0, 2)
+_, MOTION = find_motion(BICYCLE, Paraboloid(0.005), 18.0, 2)
 RADIUS = float(np.hypot(*MOTION.position[:2]))
 TIMES = np.arange(401) / 100  # three turns: the polar angle passes pi
 N = len(TIMES)

@@ -18,6 +18,7 @@ from altered import Altered, raising
 from engines.engine import Engine, EngineError, Settings, engine_names, load_engine
 from reference.bicycle import Bicycle
 from reference.families import find_motion
+from reference.surface import Paraboloid
 from reports.drift import Verdict, missing
 from scenarios import cli, runner
 from scenarios.scenario import library_names
@@ -118,7 +119,7 @@ def test_circular_rounds_to_the_printed_eigenvalues(name: str, stable: bool, vel
 def test_circular_has_exactly_its_fields_in_full_precision(velodrome) -> None:
     found = velodrome("circular", *Q2, "--family", "2", "--json").json()
     assert set(found) == CIRCULAR_FIELDS
-    _, motion = find_motion(Bicycle(), 0.005, 18.0, 2)
+    _, motion = find_motion(Bicycle(), Paraboloid(0.005), 18.0, 2)
     for field in ("front_rate", "yaw_rate", "lean", "steer", "pitch", "residual"):
         assert found[field] == getattr(motion, field), field
     assert found["position"] == motion.position.tolist()
