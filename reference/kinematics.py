@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from .bicycle import BODIES, Bicycle
 from .kernels import kinematics as kernel
@@ -100,6 +99,9 @@ def body_velocities(bicycle: Bicycle, q: np.ndarray, qd: np.ndarray) -> np.ndarr
 def quaternions(matrices: np.ndarray) -> np.ndarray:
     """Unit quaternions (w, x, y, z) of rotation matrices (..., 3, 3), continuous along the first axis."""
     shape = matrices.shape[:-2]
+    # Imported here: it takes a third of a second, which most commands need not wait for.
+    from scipy.spatial.transform import Rotation
+
     xyzw = Rotation.from_matrix(matrices.reshape(-1, 3, 3)).as_quat().reshape(*shape, 4)
     wxyz = xyzw[..., [3, 0, 1, 2]]
     if len(shape) > 0 and shape[0] > 1:

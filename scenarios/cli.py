@@ -1,4 +1,8 @@
-"""The command `velodrome`."""
+"""The command `velodrome`.
+
+Compiled kernels, engines and plots take seconds to import: each command imports what it needs, and none
+of them waits for the others'.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +10,14 @@ import json
 import sys
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
-from engines.engine import engine_names, load_engine
+from .error import ScenarioError
 
-from . import present
-from .gate import check as check_gate
-from .gate import update as update_baselines
-from .runner import Plan, plan_run, run
-from .scenario import ScenarioError, library_names, load_scenario
+if TYPE_CHECKING:
+    from .runner import Plan
 
 app = typer.Typer(
     name="velodrome",
@@ -36,6 +35,13 @@ Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout,
 @app.command("list")
 def list_command(as_json: Json = False) -> None:
     """Scenarios of the library and installed engines."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from engines.engine import engine_names, load_engine
+
+    from .scenario import library_names, load_scenario
+
     scenarios = []
     for name in library_names():
         _, scenario = load_scenario(name)
@@ -73,6 +79,11 @@ def run_command(
     as_json: Json = False,
 ) -> None:
     """Run scenarios in every engine from the same computed start and compare with the reference."""
+    from rich.console import Console
+
+    from . import present
+    from .runner import run
+
     sources = [*(scenario or []), *(_tagged(tag) if tag is not None else [])]
     if not sources:
         raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
@@ -107,6 +118,10 @@ def circular_command(
     as_json: Json = False,
 ) -> None:
     """One circular motion: its 21 constants, contact forces, eigenvalues, verdict on stability."""
+    from rich.console import Console
+
+    from . import present
+
     angles = _angles(near)
     with present.working(_STARTING):
         found = present.circular(alpha, rear_rate, family, angles)
@@ -123,7 +138,9 @@ def families_command(
     as_json: Json = False,
 ) -> None:
     """The four solution families by continuation: special points, stable sections."""
-    # scipy's optimisers and matplotlib take half a second that the other commands need not wait for.
+    from rich.console import Console
+
+    from . import present
     from .survey import families_document, write_families
 
     with present.working(_STARTING):
@@ -139,6 +156,9 @@ def families_command(
 @app.command("critical")
 def critical_command(as_json: Json = False) -> None:
     """The critical α: cusps collide, families merge, their last stable sections vanish (a minute or two)."""
+    from rich.console import Console
+
+    from . import present
     from .survey import critical_document
 
     with present.Progress() as progress:
@@ -155,9 +175,15 @@ def check_command(
     as_json: Json = False,
 ) -> None:
     """The drift gate: run the gated scenarios and hold them against the committed baselines."""
+    from rich.console import Console
+
+    from engines.engine import engine_names
+
+    from . import gate, present
+
     console = Console(stderr=as_json)
     with present.Progress() as progress:
-        verdicts, fresh = check_gate(progress.watch)
+        verdicts, fresh = gate.check(progress.watch)
     written = []
     if update:
         # An engine that is not installed any more leaves the baselines; one that broke must not.
@@ -168,7 +194,7 @@ def check_command(
         ]
         if absent:
             raise ScenarioError(f"no baseline written: {absent[0].engine} {absent[0].reason}")
-        written = [str(path) for path in update_baselines(fresh)]
+        written = [str(path) for path in gate.update(fresh)]
     passes = update or all(verdict.passes for _, verdict in verdicts)
     if as_json:
         rows = [{"scenario": name} | verdict.as_json() for name, verdict in verdicts]
@@ -182,6 +208,9 @@ def check_command(
 
 
 def _plan(source: str, changes: dict[str, Any], wanted: list[str] | None) -> Plan:
+    from .runner import plan_run
+    from .scenario import load_scenario
+
     name, scenario = load_scenario(source, changes)
     try:
         return plan_run(name, scenario, wanted)
@@ -190,6 +219,8 @@ def _plan(source: str, changes: dict[str, Any], wanted: list[str] | None) -> Pla
 
 
 def _tagged(tag: str) -> list[str]:
+    from .scenario import library_names, load_scenario
+
     tags = {name: load_scenario(name)[1].tags for name in library_names()}
     names = [name for name in tags if tag in tags[name]]
     if not names:

@@ -18,8 +18,9 @@ from reference.kinematics import REAR_ANGLE
 from reports.drift import Scale, Verdict, judge, limits, missing, quantities
 from reports.metrics import metrics, position_errors
 
+from .error import ScenarioError
 from .runner import Watch, configure, library_versions, write_json
-from .scenario import ScenarioError, library_names, load_scenario
+from .scenario import library_names, load_scenario
 from .start import Start, make_start
 
 BASELINES = Path(next(iter(reports.__path__))) / "baselines"

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich import progress as bars
@@ -22,11 +22,14 @@ from reference.families import find_motion
 from reference.kinematics import YAW
 from reference.stability import growth_rate, linearise
 from reference.surface import Paraboloid
-from reports.drift import Verdict
 from reports.summary import COLUMNS, cell, remarks, verdict_line
 
-from .runner import Outcome, Plan
-from .scenario import ScenarioError
+from .error import ScenarioError
+
+if TYPE_CHECKING:
+    from reports.drift import Verdict
+
+    from .runner import Outcome, Plan
 
 
 class Progress:

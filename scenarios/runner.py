@@ -23,7 +23,8 @@ from engines.storage import write_trajectory
 from reports.metrics import metrics
 from reports.summary import summary
 
-from .scenario import Scenario, ScenarioError, one_line, refuse_unknown
+from .error import ScenarioError
+from .scenario import Scenario, one_line, refuse_unknown
 from .start import Start, make_start
 
 LIBRARIES = ("velodrome", "numpy", "scipy", "numba", "exudyn", "mujoco", "rerun-sdk", "pyarrow")

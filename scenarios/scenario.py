@@ -13,6 +13,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from reference.bicycle import Bicycle
 from reference.surface import Paraboloid, Plane
 
+from .error import ScenarioError
+
 LIBRARY = files("scenarios") / "library"
 
 
@@ -170,10 +172,6 @@ class Scenario(_Table):
             names = ", ".join(Bicycle.__dataclass_fields__)
             raise ValueError(f"bicycle parameter {unknown[0]!r} is unknown; there are {names}")
         return Bicycle(**self.bicycle)
-
-
-class ScenarioError(ValueError):
-    """A scenario that cannot be used: one line that says what, where and what would be right."""
 
 
 def library_names() -> list[str]:

@@ -15,7 +15,8 @@ from reference.kinematics import LEAN, REAR_ANGLE, STEER, YAW, body_positions
 from reference.stability import growth_rate, linearise
 from reference.surface import Surface, SurfaceOfRevolution, evaluate
 
-from .scenario import CircularTable, Scenario, ScenarioError
+from .error import ScenarioError
+from .scenario import CircularTable, Scenario
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from reference.special import special_points
 from reference.stability import growth_rate
 from reference.surface import Paraboloid
 
+from .error import ScenarioError
 from .runner import write_json
-from .scenario import ScenarioError
 
 LONGEST_STEP = 0.05  # of the arc: some 100 to 300 points a family, no stable section known is shorter than three
 

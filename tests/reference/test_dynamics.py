@@ -153,6 +153,20 @@ def test_basu_mandals_accelerations() -> None:
     assert np.abs((4 * slopes[1] - slopes[0]) / 3 - [-a["x"], -a["y"], a["z"]]).max() < 1e-10
 
 
+def test_symbrims_accelerations() -> None:
+    """The state of Table 1 as Kane's method solves it, in axes with z down."""
+    table = published("symbrim")
+    q, u, acceleration = (np.array(table[name]) for name in ("q", "u", "udot"))
+    state = consistent_state(BICYCLE, Plane(), (0.0, 0.0), q[3], -q[6], (u[3], -u[6], -u[5]), yaw=-q[2])
+    now = dynamics(BICYCLE, Plane(), *state)
+    turned = np.array([-1, 1, -1, -1, -1, -1])  # lean's axis is forward either way
+    order = [3, 4, 5, 7, 6, 8]
+    # Printed with 15 digits; rates of some 10 solved to round-off.
+    assert np.abs(now.contact_rate[0, :2] * [1, -1] - u[:2]).max() < 1e-12
+    assert np.abs(state[1][order] * turned - u[2:]).max() < 1e-12
+    assert np.abs(now.acceleration[order] * turned - acceleration[2:]).max() < 1e-11
+
+
 def test_static_wheel_loads() -> None:
     loads = published("meijaard2007")["static_normal_force"]
     q, qd = consistent_state(BICYCLE, Plane(), (0.0, 0.0), 0.0, 0.0, (0.0, 0.0, 0.0))

@@ -1,8 +1,9 @@
 import re
+from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.optimize import brentq, fsolve
 
 from reference.bicycle import Bicycle
 from reference.dae import consistent_state, dynamics
@@ -14,6 +15,7 @@ from tests.literature import published, rounds_to
 
 BICYCLE = Bicycle()
 MEIJAARD = published("meijaard2007")
+KANE = published("kane2012")
 PRINTED = published("xiong2020")
 
 
@@ -39,20 +41,60 @@ def test_upright_eigenvalues_are_meijaards(index: int) -> None:
     assert max(abs(value) for value in found) < 1e-4
 
 
-def test_critical_speeds_are_meijaards() -> None:
+# Rows and columns of lean and steer and their rates: the lateral equations on the straight motion.
+LATERAL = [2, 3, 4, 5]
+
+
+def lateral(speed: float) -> np.ndarray:
+    return upright(speed).jacobian[np.ix_(LATERAL, LATERAL)]
+
+
+def test_weave_speed_and_frequency_are_meijaards() -> None:
     critical = MEIJAARD["critical"]
 
-    def weave(speed: float) -> float:
-        return max((v for v in upright(speed).eigenvalues if abs(v.imag) > 1), key=lambda v: v.imag).real
+    def weave(speed: float) -> complex:
+        return max((v for v in upright(speed).eigenvalues if abs(v.imag) > 1), key=lambda v: v.imag)
 
-    assert brentq(weave, 4.2, 4.4, xtol=1e-13) == pytest.approx(critical["v_weave"], abs=1e-9)
-    # Capsize: the determinant of the lean and steer block vanishes.
-    block = [2, 3, 4, 5]
+    speed: Any = brentq(lambda speed: weave(speed).real, 4.2, 4.4, xtol=1e-13)
+    # Eigenvalues are known to some 1e-13 times their condition, below 100; the root's slope is about 1.
+    assert speed == pytest.approx(critical["v_weave"], abs=1e-11)
+    assert weave(speed).imag == pytest.approx(critical["omega_weave"], abs=1e-11)
 
-    def determinant(speed: float) -> float:
-        return float(np.linalg.det(upright(speed).jacobian[np.ix_(block, block)]))
 
-    assert brentq(determinant, 5.9, 6.1, xtol=1e-13) == pytest.approx(critical["v_capsize"], abs=1e-9)
+def test_capsize_speed_is_meijaards() -> None:
+    speed: Any = brentq(lambda speed: float(np.linalg.det(lateral(speed))), 5.9, 6.1, xtol=1e-13)
+    assert speed == pytest.approx(MEIJAARD["critical"]["v_capsize"], abs=1e-11)
+
+
+def test_weave_is_born_of_a_double_root_at_meijaards_speed() -> None:
+    """det(A - lambda) = 0 and its derivative by lambda: regular in (speed, lambda), unlike the eigenvalues."""
+    # A is quadratic in the speed: three speeds give it at all.
+    rest, one, two = lateral(0.0), lateral(1.0), lateral(2.0)
+    square = (two - 2 * one + rest) / 2
+    linear = one - rest - square
+
+    def equations(x: np.ndarray) -> list[float]:
+        matrix = rest + x[0] * linear + x[0] ** 2 * square
+        coefficients = np.poly(matrix)
+        return [np.polyval(coefficients, x[1]), np.polyval(np.polyder(coefficients), x[1])]
+
+    found: Any = fsolve(equations, (0.7, 3.8), xtol=1e-14)
+    speed, value = found
+    critical = MEIJAARD["critical"]
+    # Coefficients of some 1e3 known to 1e-13, slopes of some 100.
+    assert speed == pytest.approx(critical["v_double_root"], abs=1e-11)
+    assert value == pytest.approx(critical["lambda_double_root"], abs=1e-11)
+
+
+@pytest.mark.parametrize("speed", range(6))
+def test_upright_jacobian_is_that_of_kanes_equations(speed: int) -> None:
+    table = {name: np.array(value) for name, value in KANE.items() if isinstance(value, list)}
+    turn = np.diag([1.0, -1.0])  # the published steer is positive to the right
+    found = lateral(float(speed))[2:]
+    # Entries of some 50 with the published comparison's own tolerance.
+    stiffness, damping = table["constant"] + speed**2 * table["quadratic"], speed * table["damping"]
+    assert np.allclose(found[:, :2], turn @ stiffness @ turn, rtol=0, atol=1e-12 * (1 + speed**2) * 10)
+    assert np.allclose(found[:, 2:], turn @ damping @ turn, rtol=0, atol=1e-12 * (1 + speed) * 10)
 
 
 @pytest.mark.parametrize("speed", [0.0, 3.3, 7.7])

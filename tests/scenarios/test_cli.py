@@ -20,7 +20,7 @@ from reference.bicycle import Bicycle
 from reference.families import find_motion
 from reference.surface import Paraboloid
 from reports.drift import Verdict, missing
-from scenarios import cli, runner
+from scenarios import cli, gate, runner
 from scenarios.scenario import library_names
 from tests.literature import published, rounds_to
 
@@ -275,7 +275,7 @@ def test_no_arguments_show_the_commands(velodrome) -> None:
 
 def judged(monkeypatch: pytest.MonkeyPatch, *verdicts: Verdict) -> None:
     """Make the gate come to these verdicts."""
-    monkeypatch.setattr(cli, "check_gate", lambda _: ([("q2", verdict) for verdict in verdicts], {"q2": {}}))
+    monkeypatch.setattr(gate, "check", lambda _: ([("q2", verdict) for verdict in verdicts], {"q2": {}}))
 
 
 WORSE = Verdict("exudyn", "short_error", 2e-5, 1e-5, 1e-7, "worse", "1e-05 -> 2e-05")
@@ -302,7 +302,7 @@ def test_check_is_status_1_when_a_verdict_fails(
 
 def test_update_writes_no_baseline_of_an_engine_that_did_not_run(velodrome, monkeypatch: pytest.MonkeyPatch) -> None:
     judged(monkeypatch, missing("exudyn", "did not run: no licence"))
-    monkeypatch.setattr(cli, "update_baselines", lambda _: pytest.fail("written"))
+    monkeypatch.setattr(gate, "update", lambda _: pytest.fail("written"))
     result = velodrome("check", "--update")
     assert (result.status, result.stdout) == (2, "")
     assert "exudyn did not run: no licence" in result.stderr
@@ -310,7 +310,7 @@ def test_update_writes_no_baseline_of_an_engine_that_did_not_run(velodrome, monk
 
 def test_update_accepts_what_has_become_worse(velodrome, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     judged(monkeypatch, WORSE)
-    monkeypatch.setattr(cli, "update_baselines", lambda fresh: [tmp_path / f"{name}.json" for name in fresh])
+    monkeypatch.setattr(gate, "update", lambda fresh: [tmp_path / f"{name}.json" for name in fresh])
     result = velodrome("check", "--update", "--json")
     assert result.status == 0
     assert result.json()["updated"] == [str(tmp_path / "q2.json")]
@@ -376,3 +376,18 @@ def test_families_refuses_a_shape_that_is_none(velodrome, tmp_path: Path) -> Non
     assert (result.status, result.stdout) == (2, "")
     assert "alpha is -1.0" in result.stderr
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "unwanted"),
+    [
+        (["--help"], ("numpy", "numba", "scipy", "pyarrow", "matplotlib", "mujoco", "exudyn", "rerun")),
+        (["circular", *Q2, "--family", "2"], ("pyarrow", "matplotlib", "mujoco", "exudyn", "rerun")),
+    ],
+)
+def test_a_command_imports_only_what_it_needs(arguments: list[str], unwanted: tuple[str, ...]) -> None:
+    """What a command waits for before it starts: counted in imports, since a machine's seconds vary."""
+    script = f"import sys\nfrom scenarios import cli\nsys.argv[1:] = {arguments!r}\ntry:\n    cli.main()\nfinally:\n"
+    script += f"    print([name for name in {unwanted!r} if name in sys.modules], file=sys.stderr)"
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert result.stderr.strip() == "[]"

@@ -16,8 +16,9 @@ from altered import Altered, raising
 from engines.engine import Engine, EngineError, Problem, Settings, Trajectory, engine_names
 from reports.drift import Verdict
 from scenarios import gate
+from scenarios.error import ScenarioError
 from scenarios.runner import configure
-from scenarios.scenario import Scenario, ScenarioError
+from scenarios.scenario import Scenario
 from scenarios.start import Start, make_start
 
 NAMES = engine_names()

@@ -15,8 +15,9 @@ from altered import Altered, raising
 
 from engines.engine import REFERENCE, EngineError, Trajectory
 from engines.storage import read_trajectory
+from scenarios.error import ScenarioError
 from scenarios.runner import LIBRARIES, Outcome, Plan, plan_run, run
-from scenarios.scenario import ScenarioError, load_scenario
+from scenarios.scenario import load_scenario
 
 NATIVE = "mujoco-native"
 METRICS = {

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from reference.contact import observe
 from reference.kinematics import LEAN, REAR_ANGLE, STEER
-from scenarios.scenario import Scenario, ScenarioError, library_names, load_scenario, validate
+from scenarios.error import ScenarioError
+from scenarios.scenario import Scenario, library_names, load_scenario, validate
 from scenarios.start import make_start
 from tests.literature import published, rounds_to
 
