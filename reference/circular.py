@@ -1,13 +1,21 @@
-"""One circular motion: 21 constants (Xiong et al. 2020, Eqs. 9-14)."""
+"""One circular motion: 21 constants (Xiong et al. 2020, Eqs. 9-14).
+
+Solved are the eight equations in nine unknowns of `reference.kernels.circle`; speeds, contact points and
+forces follow from them, and all 22 unknowns of `reference.kernels.steady` describe the solution.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .bicycle import Bicycle
+from .kernels import curve
 from .kernels import steady as kernel
+from .kernels.pose import aligned
 from .kinematics import constants
 from .surface import SurfaceOfRevolution
 
@@ -58,12 +66,43 @@ class CircularMotion:
         return q, np.array([-w * y, w * x, 0.0, w, 0.0, 0.0, 0.0, self.rear_rate, self.front_rate])
 
 
+class Expansion(NamedTuple):
+    """The equations at nine unknowns, to first order.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (8,)
+    jacobian : ndarray, shape (8, 9)
+    full : ndarray, shape (22,)
+        All unknowns.
+    basis : ndarray, shape (22, 9)
+        Their Jacobian in the nine.
+    """
+
+    rows: np.ndarray
+    jacobian: np.ndarray
+    full: np.ndarray
+    basis: np.ndarray
+
+
 @dataclass(frozen=True)
 class Steady:
     """The equations of circular motions of one bicycle on one surface of revolution."""
 
     bicycle: Bicycle
     surface: SurfaceOfRevolution
+
+    @cached_property
+    def where(self) -> tuple[Any, Any, np.ndarray, Any]:
+        """What compiled kernels take: the surface for real and for complex numbers, its parameters, the bicycle."""
+        function = self.surface.function
+        return function.real, function.complex, self.surface.parameters, aligned(constants(self.bicycle))
+
+    def expand(self, chosen: np.ndarray) -> Expansion:
+        """The eight equations and all 22 unknowns at the nine, shape (9,), with their Jacobians."""
+        out = Expansion(np.empty(8), np.empty((8, 9)), np.empty(kernel.UNKNOWNS), np.empty((kernel.UNKNOWNS, 9)))
+        curve.expanded(chosen, *self.where[1:], *out)
+        return out
 
     def residual(self, unknowns: np.ndarray) -> np.ndarray:
         """Residual of the 21 equations and the normalisation of the speeds, shape (22,)."""
@@ -153,7 +192,7 @@ def plane_condition(start: np.ndarray, tangent: np.ndarray, distance: float):
 
 
 def newton(equations: Steady, unknowns: np.ndarray, condition, most: int = 12) -> tuple[np.ndarray, int]:
-    """Solve the equations and one condition by Newton's method, least squares for the redundant row.
+    """Solve the equations and one condition by Newton's method.
 
     Parameters
     ----------
@@ -175,20 +214,22 @@ def newton(equations: Steady, unknowns: np.ndarray, condition, most: int = 12) -
     ValueError
         If it does not converge.
     """
-    u = unknowns.copy()
+    u = unknowns[curve.CHOSEN]
     for iteration in range(1, most + 1):
-        extra = condition(u)
-        values = np.append(equations.residual(u), extra.value)
-        matrix = np.vstack([equations.jacobian(u), extra.gradient])
+        here = equations.expand(u)
+        extra = condition(here.full)
+        values = np.append(here.rows, extra.value)
+        matrix = np.vstack([here.jacobian, extra.gradient @ here.basis])
         if not (np.all(np.isfinite(values)) and np.all(np.isfinite(matrix))):
             break
-        # Redundant by power balance on the solution only: the cut keeps that row from blowing up.
-        step = np.linalg.lstsq(matrix, -values, rcond=1e-11)[0]
+        # Without a condition the last row is zero.
+        step = np.linalg.lstsq(matrix, -values, rcond=None)[0]
         size = float(np.abs(step / (1 + np.abs(u))).max())
         u = u + step * min(1.0, 0.5 / size if size > 0 else 1.0)
         if size < 1e-9:  # quadratic: what is left is round-off
+            full = equations.expand(u).full
             # Least squares may also settle where the equations have no solution.
-            if np.abs(equations.residual(u)).max() > LARGEST_RESIDUAL * (1 + np.abs(u).max()):
+            if np.abs(equations.residual(full)).max() > LARGEST_RESIDUAL * (1 + np.abs(full).max()):
                 break
-            return u, iteration
+            return full, iteration
     raise ValueError("Newton's method finds no circular motion there")

@@ -9,13 +9,16 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from .circular import FORCE, LEAN, SIGMA, Steady, newton, plane_condition
+from .circular import Steady
+from .kernels import curve as kernel
 from .kernels.steady import UNKNOWNS
 
 FARTHEST = 1e3  # of D from the origin [m]: beyond, a large circle differs from its limit by round-off
 LARGEST_LEAN = 1.5
 LARGEST_SIGMA = 100.0  # 200 rad/s: a curve can run off to infinite speed at finite angles
-LONGEST_STEP, SHORTEST_STEP = 0.15, 1e-6
+LONGEST_STEP = 0.15
+_FIRST_STEP = 0.02
+_CHUNK = 32  # points that are followed at once
 
 
 @dataclass(frozen=True)
@@ -36,20 +39,18 @@ class Point:
 
 def metric(u: np.ndarray) -> np.ndarray:
     """Diagonal of the arclength's metric at a point: unknowns that grow without bound count relatively."""
-    reach = 0.3 / (1 + 0.3 * np.hypot(u[0], u[1]))
-    scale = np.ones(UNKNOWNS)
-    scale[[0, 1, 10, 11, 13, 14]] = reach
-    scale[2] = 1 / (1 + abs(u[2]))
-    scale[SIGMA] = 1 / (1 + abs(u[SIGMA]))
-    scale[FORCE] = 1 / (1 + np.abs(u[FORCE]).max())
-    return scale**2
+    weights = np.empty(UNKNOWNS)
+    kernel.metric(u, weights)
+    return weights
 
 
 def tangent(equations: Steady, u: np.ndarray) -> np.ndarray:
-    """Null vector of the Jacobian, of unit length in the arclength's metric, of either sign."""
-    # Rank 21 of 22: the singular vector of the smallest singular value.
-    null = np.linalg.svd(equations.jacobian(u))[2][-1]
-    return null / np.sqrt(null @ (metric(u) * null))
+    """Direction of the curve, of unit length in the arclength's metric, of either sign."""
+    chosen, full, along = u[kernel.CHOSEN], np.empty(UNKNOWNS), np.empty(UNKNOWNS)
+    # Rank 8 of 9: the singular vector of the smallest singular value.
+    null = np.linalg.svd(equations.expand(chosen).jacobian)[2][-1]
+    kernel.unit(chosen, null, *equations.where[1:], full, along)
+    return along
 
 
 def follow(
@@ -75,48 +76,43 @@ def follow(
         The start, then points along the curve, until it ends: with the first point of sigma < 0, beyond
         the largest lean, circle or speed, or where the shortest steps no longer converge.
     """
-    u, distance = start, 0.02
-    direction = tangent(equations, u)
-    direction = direction if direction @ towards > 0 else -direction
-    yield Point(u, direction)
-    for _ in range(most):
-        while (step := _step(equations, Point(u, direction), distance)) is None:
-            distance /= 2
-            if distance < SHORTEST_STEP:
-                return
-        (u, direction), iterations = (step[0].unknowns, step[0].tangent), step[1]
-        distance = min(longest, distance * (1.4 if iterations <= 4 else 0.8))
-        yield Point(u, direction)
-        if not 0 <= u[SIGMA] < LARGEST_SIGMA or abs(u[LEAN]) > LARGEST_LEAN or np.linalg.norm(u[:3]) > FARTHEST:
-            return
+    direction = tangent(equations, start)
+    first = Point(start, direction if direction @ towards > 0 else -direction)
+    yield first
+    distance, ended, largest = min(_FIRST_STEP, longest), False, (LARGEST_LEAN, LARGEST_SIGMA, FARTHEST)
+    while most > 0 and not ended:
+        unknowns, tangents = np.empty((2, min(_CHUNK, most) + 1, UNKNOWNS))
+        unknowns[0], tangents[0] = first.unknowns, first.tangent
+        filled, distance, ended = kernel.follow(distance, longest, largest, *equations.where, unknowns, tangents)
+        points = [Point(*row) for row in zip(unknowns[1:filled], tangents[1:filled], strict=True)]
+        yield from points
+        first, most = points[-1] if points else first, most - len(points)
 
 
-def _step(equations: Steady, point: Point, distance: float) -> tuple[Point, int] | None:
-    """One step along the arc and the iterations it took; None where it fails or turns too sharply."""
-    covector = metric(point.unknowns) * point.tangent
-    guess = point.unknowns + distance * point.tangent
-    try:
-        u, iterations = newton(equations, guess, plane_condition(point.unknowns, covector, distance), most=7)
-    except ValueError:
-        return None
-    direction = tangent(equations, u)
-    turn = float(direction @ covector)
-    # A sharp turn means that the step jumped to another branch or over a bend.
-    return (Point(u, direction * np.sign(turn)), iterations) if abs(turn) > 0.9 else None
+def _stepped(equations: Steady, first: Point, distance: float) -> Point:
+    """Point of the curve at a distance along another's tangent.
+
+    Raises
+    ------
+    ValueError
+        If the step does not converge.
+    """
+    unknowns, along = np.empty((2, UNKNOWNS))
+    if not kernel.step(first.unknowns, first.tangent, distance, *equations.where, unknowns, along)[0]:
+        raise ValueError("no circular motion is found along the curve")
+    return Point(unknowns, along)
 
 
 def _arc(equations: Steady, first: Point, second: Point) -> tuple[Callable[[float], Point], float]:
     """Points of the curve by their distance along the first one's tangent, and the second one's distance."""
-    covector = metric(first.unknowns) * first.tangent
-    length = float(covector @ (second.unknowns - first.unknowns))
+    covector = (metric(first.unknowns) * first.tangent)[kernel.CHOSEN]
+    along, change = first.tangent[kernel.CHOSEN], (second.unknowns - first.unknowns)[kernel.CHOSEN]
+    length = float(covector @ change / (covector @ along))
     points = {0.0: first, length: second}
 
     def at(distance: float) -> Point:
         if distance not in points:
-            guess = first.unknowns + distance * first.tangent
-            u, _ = newton(equations, guess, plane_condition(first.unknowns, covector, distance))
-            direction = tangent(equations, u)
-            points[distance] = Point(u, direction * np.sign(direction @ covector))
+            points[distance] = _stepped(equations, first, distance)
         return points[distance]
 
     return at, length

@@ -1,13 +1,12 @@
 """Critical shapes of the bowl: where families exchange parts, and where their last stable section vanishes.
 
-Two curves touch where the Jacobian of the steady equations loses one more rank. With one redundant
-equation left out (power balance makes the spin of a wheel that turns follow from the others), the
-remaining 21 equations F(u, alpha) = 0 in 22 unknowns have full rank on a curve, and the touching point
-is a regular root of
+Two curves touch where the Jacobian of the steady equations loses a rank. The eight equations
+F(u, alpha) = 0 in nine unknowns (`reference.kernels.circle`) have full rank on a curve, and the touching
+point is a regular root of
 
     F(u, alpha) = 0,    w . dF/du = 0,    |w|^2 = 1
 
-in u (22), alpha and w (21). A stable section vanishes where its two ends meet: where one pair of
+in u (9), alpha and w (8). A stable section vanishes where its two ends meet: where one pair of
 eigenvalues touches the imaginary axis, or where two pairs cross it at the same point.
 """
 
@@ -21,16 +20,15 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from .bicycle import Bicycle
-from .circular import FRONT_SPEED, LEAN, REAR_SPEED, SIGMA, STEER, CircularMotion, Steady, newton, plane_condition
+from .circular import LEAN, SIGMA, STEER, CircularMotion, Steady, newton, plane_condition
 from .continuation import Point, metric
 from .families import FAMILIES, trace
-from .kernels.steady import UNKNOWNS
+from .kernels.circle import COORDINATES
+from .kernels.curve import CHOSEN
 from .sections import SectionEnd, linearise_point, stable_sections
 from .stability import linearise
 from .surface import Paraboloid
 
-_REAR_SPIN, _FRONT_SPIN = 7, 8  # rows of the wheels' spins among the equations
-_ROWS = 21
 _STEP = 1e-6  # of second derivatives by central differences: they only steer Newton's method
 _SCAN = np.linspace(0.0, 1.0, 41)
 _BRACKET = 2e-3
@@ -133,7 +131,8 @@ def _changes(
 def _touching_point(bicycle: Bicycle, number: int, low: float, high: float) -> CriticalPoint | None:
     """Solve for the touching point near a family; None where its ends change without one."""
     family = trace(bicycle, Paraboloid(low), number, 0.05)
-    rank = [float(np.linalg.svd(family.equations.jacobian(point.unknowns))[1][-2]) for point in family.points]
+    jacobians = [family.equations.expand(point.unknowns[CHOSEN]).jacobian for point in family.points]
+    rank = [float(np.linalg.svd(jacobian)[1][-1]) for jacobian in jacobians]
     dips = [i for i in range(1, len(rank) - 1) if rank[i] <= min(rank[i - 1], rank[i + 1])]
     for i in sorted(dips, key=lambda i: rank[i]):
         try:
@@ -147,17 +146,14 @@ def _touching_point(bicycle: Bicycle, number: int, low: float, high: float) -> C
 
 
 def _solve_touching(bicycle: Bicycle, unknowns: np.ndarray, alpha: float) -> tuple[np.ndarray, float, float]:
-    """Newton's method on the 44 equations; returns the unknowns, alpha and the residual."""
-    dropped = _FRONT_SPIN if abs(unknowns[FRONT_SPEED]) > abs(unknowns[REAR_SPEED]) else _REAR_SPIN
-    rows = [i for i in range(UNKNOWNS) if i != dropped]
+    """Newton's method on the 18 equations; returns the unknowns, alpha and the residual."""
 
     def equations(x: np.ndarray) -> np.ndarray:
-        at, w = Steady(bicycle, Paraboloid(float(x[UNKNOWNS]))), x[UNKNOWNS + 1 :]
-        u = x[:UNKNOWNS]
-        return np.concatenate([at.residual(u)[rows], w @ at.jacobian(u)[rows], [w @ w - 1]])
+        here, w = Steady(bicycle, Paraboloid(float(x[COORDINATES]))).expand(x[:COORDINATES]), x[COORDINATES + 1 :]
+        return np.concatenate([here.rows, w @ here.jacobian, [w @ w - 1]])
 
-    start = Steady(bicycle, Paraboloid(alpha)).jacobian(unknowns)[rows]
-    x = np.concatenate([unknowns, [alpha], np.linalg.svd(start)[0][:, -1]])
+    start = Steady(bicycle, Paraboloid(alpha)).expand(unknowns[CHOSEN]).jacobian
+    x = np.concatenate([unknowns[CHOSEN], [alpha], np.linalg.svd(start)[0][:, -1]])
     values = equations(x)
     for _ in range(30):
         step = np.linalg.solve(_difference_jacobian(equations, x), -values)
@@ -166,7 +162,9 @@ def _solve_touching(bicycle: Bicycle, unknowns: np.ndarray, alpha: float) -> tup
         values = equations(x)
         # The equations' round-off, 1e-14, times their condition, some 1e3.
         if size < 1e-10:
-            return x[:UNKNOWNS], float(x[UNKNOWNS]), float(np.abs(values).max())
+            alpha = float(x[COORDINATES])
+            full = Steady(bicycle, Paraboloid(alpha)).expand(x[:COORDINATES]).full
+            return full, alpha, float(np.abs(values).max())
     raise ValueError("no touching point near the guess")
 
 
@@ -204,10 +202,28 @@ def last_stable(bicycle: Bicycle, number: int, largest: float = 1.0) -> Critical
     high = next((alpha for alpha in grid if alpha > low), None)
     if high is None:
         raise ValueError(f"family {number} is stable beyond alpha = {largest!r}")
-    while high - low > _SECTION_BRACKET:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if _sections(bicycle, middle, number) else (low, middle)
-    return _vanishing(bicycle, number, low)
+    return vanishing_between(bicycle, number, low, high)
+
+
+def vanishing_between(bicycle: Bicycle, number: int, stable: float, unstable: float) -> CriticalPoint:
+    """Where the last stable section of a family vanishes between an alpha that has one and one that has none.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    number : int
+        Family.
+    stable, unstable : float
+        [1/m].
+
+    Returns
+    -------
+    CriticalPoint
+    """
+    while abs(unstable - stable) > _SECTION_BRACKET:
+        middle = 0.5 * (stable + unstable)
+        stable, unstable = (middle, unstable) if _sections(bicycle, middle, number) else (stable, middle)
+    return _vanishing(bicycle, number, stable)
 
 
 def _sections(bicycle: Bicycle, alpha: float, number: int) -> list[tuple[SectionEnd, SectionEnd]]:

@@ -5,6 +5,8 @@ a curve with an *anchor*: a point of the benchmark bicycle on the level plane, r
 one, carried by continuation to the wanted bicycle and surface; from there the curve is followed by
 pseudo-arclength. Where families have joined or exchanged parts, an anchor stays on its part: family 3
 has two, since its part of forward circles joins family 1 on steep bowls (paraboloids from alpha = 0.384).
+Where an anchor cannot be carried, as into a trough that has no ground for so small a circle, its family
+starts on the circle half-way between the edges of the ground.
 
 =======  =====================================  ============================================
 family   anchor                                 followed towards
@@ -37,6 +39,7 @@ from .circular import (
     SIGMA,
     STEER,
     CircularMotion,
+    Condition,
     Steady,
     nearest_condition,
     newton,
@@ -56,6 +59,9 @@ _POINT_A, _POINT_D, _POINT_G = (0.0, 1.33973991149), (0.62, 2.78), (-0.01206, 1.
 # Rear rates of each family's anchors; None is the pivoting motion. The last one's curve is the family's.
 ANCHORS: dict[int, tuple[float | None, ...]] = {1: (15.0,), 2: (20.0,), 3: (20.0, None), 4: (None,)}
 _LARGEST_MOVE = 0.05  # of an unknown of order one, in a step of carrying an anchor
+# Of the radius where the ground ends. Towards the rim of a sphere derivatives of the height lose digits like
+# the inverse of the distance, and steps of the arc can only creep: within a thousandth a curve is at its end.
+_AT_THE_EDGE = 1e-3
 _NEAR_ENOUGH = 0.2  # rad: a motion further from what was asked for is another one
 
 
@@ -102,13 +108,15 @@ def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
     return u
 
 
-def _carry(path: Callable[[float], Steady], u: np.ndarray, condition: Callable, what: str) -> np.ndarray:
+def _carry(
+    path: Callable[[float], Steady], u: np.ndarray, condition: Callable, what: str, step: float = 0.02
+) -> np.ndarray:
     """Carry a solution along a path of equations, 0 to 1, at a fixed condition; steps as long as converge.
 
     Newton's method may well converge to another branch: a step that moves an angle or a speed by much
     more than a step should is taken again, shorter.
     """
-    reached, step = 0.0, 0.02
+    reached = 0.0
     while reached < 1:
         wanted = min(1.0, reached + step)
         carried = _step_on(path(wanted), u, condition)
@@ -156,6 +164,17 @@ def _on_the_plane(family: int, rear_rate: float | None) -> np.ndarray:
     return start if rear_rate is None else next(_crossings(level, follow(level, start, towards), rear_rate))
 
 
+def _anchored(rear_rate: float | None) -> Callable[[np.ndarray], Condition]:
+    return unknown_condition(REAR_SPEED, 0.0) if rear_rate is None else rear_rate_condition(rear_rate)
+
+
+def _directions(family: int, rear_rate: float | None) -> list[np.ndarray]:
+    steer = np.eye(UNKNOWNS)[STEER]
+    if rear_rate is None:
+        return [steer if family == 4 else -steer]
+    return [steer, -steer]
+
+
 def anchor(
     bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float | None
 ) -> tuple[Steady, np.ndarray, list[np.ndarray]]:
@@ -182,21 +201,33 @@ def anchor(
     ValueError
         If the anchor is lost on the way.
     """
-    axis, u = np.eye(UNKNOWNS), _on_the_plane(family, rear_rate)
-    if rear_rate is None:
-        condition, directions = unknown_condition(REAR_SPEED, 0.0), [axis[STEER] if family == 4 else -axis[STEER]]
-    else:
-        condition, directions = rear_rate_condition(rear_rate), [axis[STEER], -axis[STEER]]
+    u, condition, directions = _on_the_plane(family, rear_rate), _anchored(rear_rate), _directions(family, rear_rate)
     if bicycle != Bicycle():
         u = _carry(lambda s: Steady(_between(bicycle, s), Plane()), u, condition, "this bicycle")
     if not is_level(surface):
         try:
             u = _carry(lambda s: Steady(bicycle, surface.flattened(s)), u, condition, str(surface))
-        except ValueError:
-            if rear_rate is not None:
-                raise
-            u = _other_pivot(bicycle, surface)
+        except ValueError as error:
+            if rear_rate is None:
+                u = _other_pivot(bicycle, surface)
+            else:
+                u = _on_middle_circle(bicycle, surface, u, directions, error)
     return Steady(bicycle, surface), u, directions
+
+
+def next_anchor(
+    path: Callable[[float], Steady], family: int, rear_rate: float | None, unknowns: np.ndarray
+) -> tuple[Steady, np.ndarray, list[np.ndarray]]:
+    """Carry an anchor from neighbouring equations, the path at 0, to those at 1; arguments and results as of `anchor`.
+
+    Raises
+    ------
+    ValueError
+        If the anchor is lost on the way.
+    """
+    there = path(1.0)
+    u = _carry(path, unknowns, _anchored(rear_rate), str(there.surface), step=1.0)
+    return there, u, _directions(family, rear_rate)
 
 
 def _other_pivot(bicycle: Bicycle, surface: SurfaceOfRevolution) -> np.ndarray:
@@ -210,6 +241,40 @@ def _other_pivot(bicycle: Bicycle, surface: SurfaceOfRevolution) -> np.ndarray:
         if end == "pivot":
             return point.unknowns
     raise ValueError(f"there is no pivoting motion on {surface}")
+
+
+def _radius_condition(radius: float) -> Callable[[np.ndarray], Condition]:
+    """Condition of a given radius of D's circle, in units of its square."""
+
+    def condition(u: np.ndarray) -> Condition:
+        gradient = np.zeros(UNKNOWNS)
+        gradient[:2] = 2 * u[:2] / radius**2
+        return Condition(float(u[:2] @ u[:2]) / radius**2 - 1, gradient)
+
+    return condition
+
+
+def _on_middle_circle(
+    bicycle: Bicycle, surface: SurfaceOfRevolution, u: np.ndarray, directions: list[np.ndarray], lost: ValueError
+) -> np.ndarray:
+    """Carry a family from the plane on the circle half-way between the edges of the ground.
+
+    An anchor rides on a small circle: around a trough there is no ground for it. The ``lost`` one's error
+    is raised where the family has no such circle on the plane, or where it is lost on the way too.
+    """
+    radius, level = sum(surface.extent) / 2, Steady(bicycle, Plane())
+    if not np.isfinite(radius):
+        raise lost
+    condition = _radius_condition(radius)
+    for towards in directions:
+        for first, second in pairwise(follow(level, u, towards)):
+            if condition(first.unknowns).value * condition(second.unknowns).value < 0:
+                start, _ = newton(level, second.unknowns, condition, most=30)
+                try:
+                    return _carry(lambda s: Steady(bicycle, surface.flattened(s)), start, condition, str(surface))
+                except ValueError:
+                    raise lost from None
+    raise lost
 
 
 def rear_rate_slope(point: Point) -> float:
@@ -261,17 +326,30 @@ class Family:
 
     @property
     def ends(self) -> tuple[str, str]:
-        """What the curve ends in: ``static``, ``pivot``, ``large circle``, ``flat`` or ``fast front wheel``."""
-        return _kind_of_end(self.points[0]), _kind_of_end(self.points[-1])
+        """What it ends in: ``static``, ``pivot``, ``edge``, ``large circle``, ``flat`` or ``fast front wheel``.
+
+        At the ``edge`` a wheel has come to where the ground ends.
+        """
+        surface = self.equations.surface
+        return _kind_of_end(surface, self.points[0]), _kind_of_end(surface, self.points[-1])
 
 
-def _kind_of_end(point: Point) -> str:
+def _at_edge(surface: SurfaceOfRevolution, point: Point) -> bool:
+    """Whether a wheel stands where the ground ends."""
+    inner, outer = surface.extent
+    contact = np.hypot(point.unknowns[CONTACT][[0, 3]], point.unknowns[CONTACT][[1, 4]])
+    return bool(contact.max() > (1 - _AT_THE_EDGE) * outer or contact.min() < (1 + _AT_THE_EDGE) * inner)
+
+
+def _kind_of_end(surface: SurfaceOfRevolution, point: Point) -> str:
     u = point.unknowns
     # Static and pivot are solved for: their unknown is zero to round-off.
     if abs(u[SIGMA]) < 1e-12:
         return "static"
     if abs(u[REAR_SPEED]) < 1e-12:
         return "pivot"
+    if _at_edge(surface, point):
+        return "edge"
     if np.linalg.norm(u[:3]) > 0.3 * FARTHEST:
         return "large circle"
     return "flat" if abs(u[LEAN]) > 1.0 else "fast front wheel"
@@ -281,7 +359,7 @@ def trace(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, longest: 
     """Follow a family through its anchor to both ends.
 
     A curve ends at the static equilibrium, at the pivoting motion (where families 3 and 4 meet), near
-    a lean of +-pi/2, on a very large circle or at a very large speed.
+    a lean of +-pi/2, at the edge of the ground, on a very large circle or at a very large speed.
 
     Parameters
     ----------
@@ -301,19 +379,50 @@ def trace(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, longest: 
     ValueError
         If the family's anchor cannot be reached on this surface.
     """
-    equations, start, directions = anchor(bicycle, surface, family, ANCHORS[family][-1])
-    forward = _end_exactly(equations, list(_to_an_end(follow(equations, start, directions[0], longest))))
+    return trace_from(family, *anchor(bicycle, surface, family, ANCHORS[family][-1]), longest)
+
+
+def trace_from(
+    family: int, equations: Steady, start: np.ndarray, directions: list[np.ndarray], longest: float = LONGEST_STEP
+) -> Family:
+    """Follow a family from an anchor to both ends, see `anchor` and `trace`."""
+    forward = _end_exactly(equations, list(_to_an_end(equations, follow(equations, start, directions[0], longest))))
     if len(directions) == 1:
-        return Family(family, equations, forward)
-    backward = _end_exactly(equations, list(_to_an_end(follow(equations, start, directions[1], longest))))
+        return Family(family, equations, _turning_alike(forward))
+    backward = _end_exactly(equations, list(_to_an_end(equations, follow(equations, start, directions[1], longest))))
     turned = [Point(point.unknowns, -point.tangent) for point in reversed(backward[1:])]
-    return Family(family, equations, turned + forward)
+    return Family(family, equations, _turning_alike(turned + forward))
 
 
-def _to_an_end(points: Iterator[Point]) -> Iterator[Point]:
-    """Points up to and with the first beyond the pivoting motion, or to the end of the curve."""
-    start = 0.0
+def _turning_alike(points: list[Point]) -> list[Point]:
+    """Let a pivoting motion at an end turn as its neighbour does.
+
+    Its rear speed is zero to round-off, of either sign; motions are run so that the rear wheel rolls forward.
+    """
+    points = list(points)
+    for end, neighbour in ((0, 1), (-1, -2)) if len(points) > 1 else ():
+        u = points[end].unknowns.copy()
+        if abs(u[REAR_SPEED]) < 1e-12:
+            u[REAR_SPEED] = np.copysign(max(abs(u[REAR_SPEED]), 1e-300), points[neighbour].unknowns[REAR_SPEED])
+            points[end] = Point(u, points[end].tangent)
+    return points
+
+
+def _on_ground(equations: Steady, points: Iterator[Point]) -> Iterator[Point]:
+    """Points up to and with the first at the edge of the ground."""
+    if equations.surface.extent == (0.0, np.inf):  # no edge to look for
+        yield from points
+        return
     for point in points:
+        yield point
+        if _at_edge(equations.surface, point):
+            return
+
+
+def _to_an_end(equations: Steady, points: Iterator[Point]) -> Iterator[Point]:
+    """Points up to and with the first beyond the pivoting motion or at the edge, or to the end of the curve."""
+    start = 0.0
+    for point in _on_ground(equations, points):
         yield point
         speed = point.unknowns[REAR_SPEED]
         if start * speed < 0:
@@ -363,7 +472,7 @@ def motions(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_ra
             failures.append(error)
             continue
         for direction in directions:
-            for u in _crossings(equations, follow(equations, start, direction), rear_rate):
+            for u in _crossings(equations, _to_an_end(equations, follow(equations, start, direction)), rear_rate):
                 motion = equations.motion(u)
                 if not any(np.hypot(motion.lean - m.lean, motion.steer - m.steer) < 1e-7 for m in found):
                     found.append(motion)

@@ -10,8 +10,9 @@ from scipy.optimize import linear_sum_assignment
 
 from .circular import CircularMotion, Steady
 from .continuation import Point, least_between, root_between
+from .curve import Samples, sample
 from .families import Family
-from .stability import Linearisation, free_eigenvalues, growth_rate, linearise
+from .stability import Linearisation, free_eigenvalues, linearise
 
 MODES = ("family", "castering", "capsize", "weave", "orbital")
 
@@ -43,19 +44,25 @@ def linearise_point(equations: Steady, point: Point) -> tuple[CircularMotion, Li
 
 def growth_along(equations: Steady, point: Point) -> float:
     """Growth rate of disturbances at a point of a family [1/s]."""
-    motion, reduced = linearise_point(equations, point)
-    return growth_rate(equations.surface, reduced.eigenvalues, motion.yaw_rate)
+    return float(sample(equations, point.unknowns[None]).growth_rate[0])
 
 
-def stable_sections(family: Family) -> list[tuple[SectionEnd, SectionEnd]]:
+def sample_family(family: Family) -> Samples:
+    """All points of a family."""
+    return sample(family.equations, np.array([point.unknowns for point in family.points]))
+
+
+def stable_sections(family: Family, growth: np.ndarray | None = None) -> list[tuple[SectionEnd, SectionEnd]]:
     """Lyapunov-stable sections of a family, both ends solved to round-off.
 
     A section may lie between two points that are both unstable: wherever the growth rate has a least
-    value among the points, its least value between them is looked for.
+    value among the points and falls steeply enough to reach zero, its least value between them is looked for.
 
     Parameters
     ----------
     family : Family
+    growth : ndarray, shape (n,), optional
+        Growth rates of its points, where they are known already.
 
     Returns
     -------
@@ -63,39 +70,49 @@ def stable_sections(family: Family) -> list[tuple[SectionEnd, SectionEnd]]:
         In the order of the family's points.
     """
     equations = family.equations
-    points, growth = _with_least(family)
+    points, rates = _with_least(family, sample_family(family).growth_rate if growth is None else growth)
     ends: list[SectionEnd] = []
-    if growth[0] < 0:
+    if rates[0] < 0:
         ends.append(_end(equations, points[0], "end"))
     for i, (first, second) in enumerate(pairwise(points)):
-        if growth[i] * growth[i + 1] < 0:
+        if rates[i] * rates[i + 1] < 0:
             crossing = root_between(equations, first, second, lambda point: growth_along(equations, point))
             ends.append(_end(equations, crossing))
-    if growth[-1] < 0:
+    if rates[-1] < 0:
         ends.append(_end(equations, points[-1], "end"))
     return list(zip(ends[::2], ends[1::2], strict=True))
 
 
-def _with_least(family: Family) -> tuple[list[Point], list[float]]:
+def _with_least(family: Family, growth: np.ndarray) -> tuple[list[Point], list[float]]:
     """Points and growth rates of a family, with those points added where the growth rate dips below zero."""
     equations = family.equations
-    growth = [growth_along(equations, point) for point in family.points]
-    points, rates = [family.points[0]], [growth[0]]
+    points, rates = [family.points[0]], [float(growth[0])]
     for i in range(1, len(growth)):
         before, here = family.points[i - 1], family.points[i]
-        # The dip is on one side of the least point or the other.
-        if min(growth[i - 1], growth[i]) > 0 and (_least(growth, i - 1) or _least(growth, i)):
+        if _may_dip(growth, i):
             low = least_between(equations, before, here, lambda point: growth_along(equations, point))
             rate = growth_along(equations, low)
             if rate < 0:
                 points.append(low)
                 rates.append(rate)
         points.append(here)
-        rates.append(growth[i])
+        rates.append(float(growth[i]))
     return points, rates
 
 
-def _least(values: list[float], i: int) -> bool:
+def _may_dip(growth: np.ndarray, i: int) -> bool:
+    """Whether the growth rate may be negative between the positive ones at i - 1 and i.
+
+    The dip is on one side of a least point or the other. The growth rate is the largest of several smooth
+    functions, so it stays above each side's continuation; thrice its slope leaves room for curvature.
+    """
+    if min(growth[i - 1], growth[i]) <= 0 or not (_least(growth, i - 1) or _least(growth, i)):
+        return False
+    before, after = growth[max(i - 2, 0)], growth[min(i + 1, len(growth) - 1)]
+    return max(growth[i - 1] - 3 * (before - growth[i - 1]), growth[i] - 3 * (after - growth[i])) < 0
+
+
+def _least(values: np.ndarray, i: int) -> bool:
     return 0 < i < len(values) - 1 and values[i] <= min(values[i - 1], values[i + 1])
 
 
@@ -113,7 +130,7 @@ def modes(family: Family) -> np.ndarray:
 
     The first point's are named by what they are on the plane: the zero of the family, the orbital pair
     near +-i times the yaw rate, the fast real castering root, and of the rest the complex pair weave, the
-    real root capsize. From there each point's are matched with its neighbour's as a whole.
+    real root capsize. From there each point's other six are matched with its neighbour's as a whole.
 
     Parameters
     ----------
@@ -124,14 +141,14 @@ def modes(family: Family) -> np.ndarray:
     ndarray, shape (n, 7), complex
         Columns family, castering, capsize, weave (2), orbital (2).
     """
-    rows = []
-    for point in family.points:
-        motion, reduced = linearise_point(family.equations, point)
-        if not rows:
-            rows.append(_named(reduced.eigenvalues, motion.yaw_rate))
-            continue
-        cost = np.abs(rows[-1][:, None] - reduced.eigenvalues[None, :])
-        rows.append(reduced.eigenvalues[linear_sum_assignment(cost)[1]])
+    seen = sample_family(family)
+    rows = [_named(seen.eigenvalues[0], float(seen.yaw_rate[0]))]
+    for eigenvalues in seen.eigenvalues[1:]:
+        # Where a root passes zero, continuity cannot tell it from the family's own zero.
+        zero = np.abs(eigenvalues).argmin()
+        rest = np.delete(eigenvalues, zero)
+        cost = np.abs(rows[-1][1:, None] - rest[None, :])
+        rows.append(np.append(eigenvalues[zero], rest[linear_sum_assignment(cost)[1]]))
     return np.array(rows)
 
 

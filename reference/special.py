@@ -16,7 +16,8 @@ from .circular import REAR_SPEED, CircularMotion, Steady
 from .continuation import Point, root_between
 from .dae import consistent_state
 from .families import Family, front_rate_slope, rear_rate_slope
-from .kernels.steady import STEP, steady_energy
+from .kernels.circle import STEP
+from .kernels.steady import steady_energy
 from .kinematics import FRONT_ANGLE, constants
 from .stability import VARIABLES, linearise
 from .surface import Plane, is_level

@@ -8,8 +8,10 @@ import numpy as np
 
 from .bicycle import Bicycle
 from .dae import contact_parameters
-from .kernels import steady as kernel
-from .kinematics import LEAN, REAR_ANGLE, STEER, YAW, constants
+from .kernels import reduced as kernel
+from .kernels.dynamics import settle
+from .kernels.pose import aligned
+from .kinematics import FRONT_ANGLE, LEAN, REAR_ANGLE, STEER, YAW, constants
 from .surface import Surface, is_level
 
 VARIABLES = ("x", "y", "lean", "steer", "lean_rate", "steer_rate", "rear_rate")
@@ -17,10 +19,13 @@ VARIABLES = ("x", "y", "lean", "steer", "lean_rate", "steer_rate", "rear_rate")
 
 @dataclass(frozen=True)
 class Linearisation:
-    """The reduced system dv/dt = X(v) about a state, v as named in `VARIABLES`, x and y in the heading frame.
+    """The reduced system dv/dt = X(v) about a state, x and y in the heading frame.
 
     Attributes
     ----------
+    variables : tuple of str
+        What v is: `VARIABLES`, but for the front wheel's rate in the place of the rear's where the rear wheel
+        stands or nearly does (a pivoting motion has no rear rate that would tell its speed).
     field : ndarray, shape (7,)
         X(v); zero on a circular motion.
     jacobian : ndarray, shape (7, 7)
@@ -28,6 +33,7 @@ class Linearisation:
         Sorted by real part, then by imaginary part [1/s].
     """
 
+    variables: tuple[str, ...]
     field: np.ndarray
     jacobian: np.ndarray
     eigenvalues: np.ndarray
@@ -56,35 +62,63 @@ def linearise(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray)
     """
     cosine, sine = np.cos(q[YAW]), np.sin(q[YAW])
     x, y = cosine * q[0] + sine * q[1], -sine * q[0] + cosine * q[1]
-    v = np.array([x, y, q[LEAN], q[STEER], qd[LEAN], qd[STEER], qd[REAR_ANGLE]])
     turned = np.concatenate([[x, y, q[2], 0.0], q[LEAN:]])
-    p, c = contact_parameters(bicycle, surface, turned), constants(bicycle)
-    field, jacobian = np.empty(7), np.empty((7, 7))
-    found = kernel.reduced_field(v, turned, p, surface.function.real, surface.parameters, c, field)
-    found = found and kernel.reduced_jacobian(v, turned, p, surface.function.complex, surface.parameters, c, jacobian)
+    p, c, parameters = contact_parameters(bicycle, surface, turned), constants(bicycle), surface.parameters
+    found = settle(turned, p, surface.function.real, parameters, c)
+    state, field, jacobian = np.concatenate([turned, qd, p]), np.empty(7), np.empty((7, 7))
+    spin = kernel.telling_spin(qd[REAR_ANGLE], qd[FRONT_ANGLE])
+    kernel.reduced_jacobian(state, spin, surface.function.complex, parameters, aligned(c), field, jacobian)
     if not found or not np.all(np.isfinite(jacobian)):
         raise ValueError(f"the motion cannot be linearised at lean = {q[LEAN]!r}, steer = {q[STEER]!r}")
-    eigenvalues = np.linalg.eigvals(jacobian)
-    return Linearisation(field, jacobian, eigenvalues[np.lexsort((eigenvalues.imag, eigenvalues.real))])
+    last = "rear_rate" if spin == kernel.REAR else "front_rate"
+    return Linearisation((*VARIABLES[:-1], last), field, jacobian, sorted_eigenvalues(jacobian))
 
 
-def structural_eigenvalues(surface: Surface, yaw_rate: float) -> list[complex]:
-    """Eigenvalues that symmetry alone puts on the imaginary axis.
+def sorted_eigenvalues(jacobians: np.ndarray) -> np.ndarray:
+    """Eigenvalues of matrices (..., 7, 7), shape (..., 7), sorted by real part, then by imaginary part."""
+    return np.sort(np.linalg.eigvals(jacobians).astype(complex), axis=-1)
+
+
+def structural_eigenvalues(surface: Surface, yaw_rate: np.ndarray | float) -> np.ndarray:
+    """Eigenvalues that symmetry alone puts on the imaginary axis, shape (..., 1 or 3) for yaw rates (...).
 
     Circular motions come in one-parameter families, hence a zero; on a level plane the circle's centre
     is free too, hence a pair of +-i times the yaw rate.
     """
-    return [0j, complex(0, yaw_rate), complex(0, -yaw_rate)] if is_level(surface) else [0j]
+    turns = np.array([0, 1, -1] if is_level(surface) else [0])
+    return 1j * turns * np.asarray(yaw_rate)[..., None]
 
 
-def free_eigenvalues(surface: Surface, eigenvalues: np.ndarray, yaw_rate: float) -> list[complex]:
-    """Eigenvalues that symmetry does not fix: all but the nearest to each structural one."""
-    rest = list(eigenvalues)
-    for known in structural_eigenvalues(surface, yaw_rate):
-        rest.remove(min(rest, key=lambda value: abs(value - known)))
+def free_eigenvalues(surface: Surface, eigenvalues: np.ndarray, yaw_rate: np.ndarray | float) -> np.ndarray:
+    """Eigenvalues that symmetry does not fix: all but the nearest to each structural one.
+
+    Parameters
+    ----------
+    surface : Surface
+    eigenvalues : ndarray, shape (..., 7)
+    yaw_rate : ndarray or float, shape (...)
+        [rad/s].
+
+    Returns
+    -------
+    ndarray, shape (..., 6), or (..., 4) on the level plane
+    """
+    rest = np.asarray(eigenvalues, complex)
+    for known in np.moveaxis(structural_eigenvalues(surface, yaw_rate), -1, 0):
+        nearest = np.abs(rest - known[..., None]).argmin(axis=-1)
+        others = np.arange(rest.shape[-1]) != nearest[..., None]
+        rest = rest[others].reshape(*rest.shape[:-1], -1)
     return rest
 
 
+def growth_rates(surface: Surface, eigenvalues: np.ndarray, yaw_rate: np.ndarray | float) -> np.ndarray:
+    """Largest real parts (...) among the eigenvalues (..., 7) that symmetry does not fix [1/s].
+
+    Negative: Lyapunov stable.
+    """
+    return np.real(free_eigenvalues(surface, eigenvalues, yaw_rate)).max(axis=-1)
+
+
 def growth_rate(surface: Surface, eigenvalues: np.ndarray, yaw_rate: float) -> float:
-    """Largest real part among the eigenvalues that symmetry does not fix [1/s]; negative: Lyapunov stable."""
-    return max(value.real for value in free_eigenvalues(surface, eigenvalues, yaw_rate))
+    """Growth rate of one motion, see `growth_rates`."""
+    return float(growth_rates(surface, eigenvalues, yaw_rate))

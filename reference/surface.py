@@ -1,7 +1,11 @@
 """Surfaces z = f(x, y): what the kernels need of the ground is its height, gradient and Hessian.
 
 A surface is a pair of compiled functions (real, and complex for the complex step) and an array of
-parameters, so a kernel is compiled once and takes any surface as data.
+parameters, so a kernel is compiled once and takes any surface as data. Where there is no ground (beyond
+the rim of a sphere, off a grid of heights) the functions give nan: Newton's method and the integrators
+stop at it.
+
+The level plane and the paper's paraboloid are here; `bowls`, `profile` and `height_field` have more.
 """
 
 from __future__ import annotations
@@ -9,7 +13,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from functools import cached_property
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numba import cfunc, types
@@ -25,14 +30,32 @@ def _signature(scalar: Any) -> Any:
 
 @dataclass(frozen=True)
 class SurfaceFunction:
-    """A height function compiled for real and for complex arguments."""
+    """A height function, compiled for real and for complex arguments when first asked for.
 
-    real: Any
-    complex: Any
+    Attributes
+    ----------
+    source : callable
+        As `surface_function` takes it.
+    cached : bool
+        Whether the compiled code is kept on disk; a closure's cannot be.
+    """
+
+    source: Callable[..., tuple]
+    cached: bool = True
+
+    @cached_property
+    def real(self) -> Any:
+        """Compiled for real x and y."""
+        return cfunc(_signature(types.float64), cache=self.cached)(self.source)
+
+    @cached_property
+    def complex(self) -> Any:
+        """Compiled for complex x and y."""
+        return cfunc(_signature(types.complex128), cache=self.cached)(self.source)
 
 
 def surface_function(function: Callable[..., tuple]) -> SurfaceFunction:
-    """Compile ``function(x, y, parameters) -> (f, fx, fy, fxx, fxy, fyy)`` for the kernels.
+    """Make ``function(x, y, parameters) -> (f, fx, fy, fxx, fxy, fyy)`` a function for the kernels.
 
     All six results must be of the type of ``x`` (write ``0 * x`` for a zero), and the function must be
     analytic: no `abs`, no comparison of ``x`` or ``y`` other than through its real part.
@@ -40,16 +63,14 @@ def surface_function(function: Callable[..., tuple]) -> SurfaceFunction:
     Parameters
     ----------
     function : callable
-        Height [m], gradient [-] and Hessian [1/m] at (x, y) [m], in numba's subset of Python.
+        Height [m], gradient [-] and Hessian [1/m] at (x, y) [m], in numba's subset of Python; nan where
+        there is no ground.
 
     Returns
     -------
     SurfaceFunction
     """
-    return SurfaceFunction(
-        cfunc(_signature(types.float64), cache=True)(function),
-        cfunc(_signature(types.complex128), cache=True)(function),
-    )
+    return SurfaceFunction(function)
 
 
 class Surface(Protocol):
@@ -62,12 +83,18 @@ class Surface(Protocol):
 
     @property
     def parameters(self) -> np.ndarray:
-        """Its parameters, shape (k,), float64."""
+        """Its parameters, shape (k,), float64; all zero if and only if it is the level plane."""
         ...
 
 
+@runtime_checkable
 class SurfaceOfRevolution(Surface, Protocol):
     """A ground z = g(r) about the z axis: circular motions ride on it."""
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Smallest and largest radius r that has ground [m]."""
+        ...
 
     def flattened(self, fraction: float) -> SurfaceOfRevolution:
         """The ground on the way from the level plane (fraction 0) to this one (1), smooth in the fraction."""
@@ -101,6 +128,11 @@ class Plane:
         """No parameters; one unused entry, shape (1,)."""
         return np.zeros(1)
 
+    @property
+    def extent(self) -> tuple[float, float]:
+        """It has no edge."""
+        return 0.0, math.inf
+
     def flattened(self, fraction: float) -> Plane:
         """The plane itself, which is level."""
         return self
@@ -124,8 +156,7 @@ class Paraboloid:
     alpha: float
 
     def __post_init__(self) -> None:
-        number = isinstance(self.alpha, int | float) and not isinstance(self.alpha, bool)
-        if not (number and math.isfinite(self.alpha) and self.alpha >= 0):
+        if not (is_number(self.alpha) and self.alpha >= 0):
             raise ValueError(f"alpha is {self.alpha!r}; it must be a finite number >= 0")
 
     @property
@@ -138,13 +169,23 @@ class Paraboloid:
         """Array of alpha, shape (1,)."""
         return np.array([float(self.alpha)])
 
+    @property
+    def extent(self) -> tuple[float, float]:
+        """It has no edge."""
+        return 0.0, math.inf
+
     def flattened(self, fraction: float) -> Paraboloid:
         """The paraboloid of a fraction of alpha."""
         return Paraboloid(fraction * self.alpha)
 
 
+def is_number(value: object) -> bool:
+    """Whether a value is a finite real number, and no truth value."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
 def is_level(surface: Surface) -> bool:
-    """Whether a surface is the plane z = 0, as its parameters tell: all that shape it are zero."""
+    """Whether a surface is the plane z = 0: its parameters are all zero, as no other surface's may be."""
     return not np.any(surface.parameters)
 
 
@@ -158,13 +199,13 @@ def _evaluate(function, parameters, x, y):
     return out
 
 
-def evaluate(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def evaluate(surface: Surface, x: np.ndarray | float, y: np.ndarray | float) -> np.ndarray:
     """Height, gradient and Hessian at points.
 
     Parameters
     ----------
     surface : Surface
-    x, y : ndarray
+    x, y : ndarray or float
         Coordinates of any common shape (...) [m].
 
     Returns

@@ -1,4 +1,4 @@
-"""Circular motions and their linearisation: the rotated equations (Xiong et al. 2020, Eqs. 9-17).
+"""Circular motions in full: the rotated equations with contact points and forces (Xiong et al. 2020, Eqs. 9-14).
 
 In the heading frame all 21 quantities of a circular motion are constant. At yaw = 0
 
@@ -12,18 +12,19 @@ squares of it, so static equilibria (sigma = 0) and pivoting motions (b = 0) are
 
 Unknowns (22): x, y, z, lean, pitch, steer | a, b, c | sigma / 400 | contact parameters (6) | contact
 forces / weight (6). Rows (22): the 21 equations, speeds by their direction, and the normalisation.
+
+Solutions are found in the smaller form of `circle`; this one describes them and measures how well they hold.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from .dynamics import accelerations, complete_velocity, energies, mass_and_bias, residual, settle
+from .circle import SIGMA_UNIT, STEP
+from .dynamics import energies, mass_and_bias, residual
 from .vector import jit
 
 UNKNOWNS = 22
-SIGMA_UNIT = 400.0  # (20 rad/s)^2: keeps the unknown of the size of the others
-STEP = 1e-30  # complex step: the derivative is exact to round-off
 
 
 @jit
@@ -72,39 +73,3 @@ def steady_energy(u, c):
     qd[0], qd[1], qd[3], qd[7], qd[8] = -u[6] * u[1], u[6] * u[0], u[6], u[7], u[8]
     kinetic, potential = energies(q, qd, c)
     return SIGMA_UNIT * u[9] * kinetic + potential
-
-
-@jit
-def reduced_field(v, q, p, function, parameters, c, out):
-    """The reduced vector field X(v) (Eq. 16), v = (x, y, lean, steer, lean_rate, steer_rate, rear_rate).
-
-    ``q`` (9,) and ``p`` (6,) bring the guess of the dependent coordinates and take their values. False
-    where the wheels do not reach the ground.
-    """
-    qd, qdd = np.zeros(9, v.dtype), np.empty(9, v.dtype)
-    force, rate = np.empty(6, v.dtype), np.empty(6, v.dtype)
-    q[0], q[1], q[3], q[4], q[6] = v[0], v[1], 0, v[2], v[3]
-    qd[4], qd[6], qd[7] = v[4], v[5], v[6]
-    if not settle(q, p, function, parameters, c):
-        return False
-    complete_velocity(q, qd, p, function, parameters, c)
-    accelerations(q, qd, p, function, parameters, c, qdd, force, rate)
-    out[0] = qd[0] + qd[3] * v[1]
-    out[1] = qd[1] - qd[3] * v[0]
-    out[2], out[3] = v[4], v[5]
-    out[4], out[5], out[6] = qdd[4], qdd[6], qdd[7]
-    return True
-
-
-@jit
-def reduced_jacobian(v, q, p, function, parameters, c, out):
-    """Fill dX/dv (7, 7) by the complex step around a state whose dependent coordinates have converged."""
-    z, r = v.astype(np.complex128), np.empty(7, np.complex128)
-    good = True
-    for j in range(7):
-        z[j] = complex(v[j], STEP)
-        good = reduced_field(z, q.astype(np.complex128), p.astype(np.complex128), function, parameters, c, r) and good
-        z[j] = v[j]
-        for i in range(7):
-            out[i, j] = r[i].imag / STEP
-    return good

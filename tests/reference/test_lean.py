@@ -172,7 +172,8 @@ def test_projection_is_the_smallest_change(surface: Any, state: dict, seed: int)
     q, qd, p = after[:9], after[9:18], after[18:]
     seen = observe(BENCHMARK, surface, q[None], qd[None])
     condition = conditioning(BENCHMARK, surface, after)
-    assert np.abs(seen.gap).max() < 1e-14
+    # Where the projection stops, a few roundings of the coordinates, and as much again in measuring.
+    assert np.abs(seen.gap).max() < 2e-15 * (5 + np.abs(q[:3]).sum()) + 10 * ROUND_OFF
     assert np.abs(seen.slip).max() < 15 * ROUND_OFF * condition * (1 + np.abs(qd).max())
     found = p.copy()
     assert kernel.find_contacts(q, found, *where, c)

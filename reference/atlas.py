@@ -1,0 +1,211 @@
+"""The atlas of circular motions: every family end to end over alpha, where it is stable, and why it ceases to be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .bicycle import Bicycle
+from .circular import Steady
+from .critical import CriticalPoint, reconnections, vanishing_between
+from .curve import Samples, sample
+from .families import ANCHORS, FAMILIES, anchor, next_anchor, trace_from
+from .sections import SectionEnd, stable_sections
+from .surface import Paraboloid
+
+SIZE = 400_000
+_CROWDED = 0.04  # the last stable section vanishes at 0.033, the cusps meet at 0.017
+_ARC = 38.0  # of all four families together, a mean over alpha
+_LONGEST_STEP = 0.05  # of the arc: no section known is so short that its neighbours would not tell of it
+
+
+@dataclass(frozen=True)
+class AtlasCurve:
+    """One family at one alpha.
+
+    Attributes
+    ----------
+    alpha : float
+        [1/m].
+    family : int
+    ends : tuple of str
+        See `reference.families.Family`.
+    seen : Samples
+        Its motions in the order of the curve.
+    sections : list of (SectionEnd, SectionEnd)
+        Its stable sections, ends solved to round-off.
+    """
+
+    alpha: float
+    family: int
+    ends: tuple[str, str]
+    seen: Samples
+    sections: list[tuple[SectionEnd, SectionEnd]]
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """The two ends of a stable section, followed over alpha.
+
+    Attributes
+    ----------
+    family : int
+    alpha : list of float
+        [1/m].
+    ends : list of (SectionEnd, SectionEnd)
+        At each alpha, in the order of the family's points.
+    vanishing : CriticalPoint or None
+        Where both ends meet, and the section vanishes, as alpha grows; None where it reaches the last alpha.
+    """
+
+    family: int
+    alpha: list[float]
+    ends: list[tuple[SectionEnd, SectionEnd]]
+    vanishing: CriticalPoint | None
+
+
+@dataclass(frozen=True)
+class Absence:
+    """A family that has no curve at an alpha, and why."""
+
+    alpha: float
+    family: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Atlas:
+    """All curves, the boundaries of their stable sections, and where families touch.
+
+    Attributes
+    ----------
+    bicycle : Bicycle
+    alphas : ndarray, shape (k,)
+        Rising [1/m].
+    curves : list of AtlasCurve
+        By rising alpha, then family.
+    absent : list of Absence
+    boundaries : list of Boundary
+    reconnections : list of CriticalPoint
+        Where families touch and exchange their parts, within the alphas.
+    """
+
+    bicycle: Bicycle
+    alphas: np.ndarray
+    curves: list[AtlasCurve]
+    absent: list[Absence]
+    boundaries: list[Boundary]
+    reconnections: list[CriticalPoint]
+
+    @property
+    def size(self) -> int:
+        """Number of motions."""
+        return sum(len(curve.seen.lean) for curve in self.curves)
+
+
+def spacing(size: int = SIZE, largest: float = 1.0) -> tuple[np.ndarray, float]:
+    """Shapes and longest step of the arc for an atlas of some ``size`` motions.
+
+    Half of the shapes lie evenly up to 0.04, where things happen, the others evenly in log alpha up to the
+    largest.
+
+    Returns
+    -------
+    alphas : ndarray
+        Rising from 0 [1/m].
+    longest : float
+    """
+    shapes = max(4, round(min(np.sqrt(size / 2.5), size * _LONGEST_STEP / _ARC)))
+    if largest <= _CROWDED:
+        return np.linspace(0.0, largest, shapes), min(_LONGEST_STEP, _ARC * shapes / size)
+    crowded = np.linspace(0.0, _CROWDED, shapes // 2, endpoint=False)
+    alphas = np.concatenate([crowded, np.geomspace(_CROWDED, largest, shapes - len(crowded))])
+    return alphas, min(_LONGEST_STEP, _ARC * shapes / size)
+
+
+def atlas(
+    bicycle: Bicycle,
+    alphas: Sequence[float] | np.ndarray,
+    longest: float,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Atlas:
+    """Compute the atlas of a bicycle on paraboloids.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    alphas : sequence of float
+        Rising shapes [1/m].
+    longest : float
+        Longest step along a family's arc.
+    progress : callable
+        Called with the fraction done.
+
+    Returns
+    -------
+    Atlas
+    """
+    curves: list[AtlasCurve] = []
+    absent: list[Absence] = []
+    anchors: dict[float | None, tuple[float, np.ndarray]] = {}
+    for k, alpha in enumerate(map(float, alphas)):
+        for family in FAMILIES:
+            try:
+                curves.append(_curve(bicycle, alpha, family, longest, anchors))
+            except ValueError as error:
+                absent.append(Absence(alpha, family, str(error)))
+        progress(0.9 * (k + 1) / len(alphas))
+    largest = float(alphas[-1])
+    touching = reconnections(bicycle, largest=largest)
+    progress(0.95)
+    boundaries = [boundary for family in FAMILIES for boundary in _boundaries(bicycle, curves, family)]
+    progress(1.0)
+    return Atlas(bicycle, np.asarray(alphas, float), curves, absent, boundaries, touching)
+
+
+def _curve(
+    bicycle: Bicycle, alpha: float, number: int, longest: float, anchors: dict[float | None, tuple[float, np.ndarray]]
+) -> AtlasCurve:
+    """One family at one alpha, its anchor carried from where ``anchors`` has it, which takes the new one."""
+    rear_rate = ANCHORS[number][-1]
+    equations, start, directions = _anchor(bicycle, alpha, number, anchors.pop(rear_rate, None))
+    anchors[rear_rate] = alpha, start
+    family = trace_from(number, equations, start, directions, longest)
+    seen = sample(equations, np.array([point.unknowns for point in family.points]))
+    return AtlasCurve(alpha, number, family.ends, seen, stable_sections(family, seen.growth_rate))
+
+
+def _anchor(
+    bicycle: Bicycle, alpha: float, number: int, known: tuple[float, np.ndarray] | None
+) -> tuple[Steady, np.ndarray, list[np.ndarray]]:
+    rear_rate = ANCHORS[number][-1]
+    if known is not None:
+        low, unknowns = known
+        try:
+            return next_anchor(
+                lambda s: Steady(bicycle, Paraboloid(low + s * (alpha - low))), number, rear_rate, unknowns
+            )
+        except ValueError:
+            pass  # one pivoting motion is gone; there may be another
+    return anchor(bicycle, Paraboloid(alpha), number, rear_rate)
+
+
+def _boundaries(bicycle: Bicycle, curves: list[AtlasCurve], number: int) -> list[Boundary]:
+    """Stable sections of a family, each followed from its first alpha to its last."""
+    found: list[Boundary] = []
+    current: list[Boundary] = []
+    before = None
+    for curve in (curve for curve in curves if curve.family == number):
+        if len(curve.sections) != len(current):
+            if before is not None and current and not curve.sections:
+                closing = vanishing_between(bicycle, number, before.alpha, curve.alpha)
+                found[-1] = replace(found[-1], vanishing=closing)
+            current = [Boundary(number, [], [], None) for _ in curve.sections]
+            found += current
+        for boundary, ends in zip(current, curve.sections, strict=True):
+            boundary.alpha.append(curve.alpha)
+            boundary.ends.append(ends)
+        before = curve
+    return found

@@ -1,0 +1,115 @@
+"""Ground from a grid of heights: z = f(x, y) without any symmetry, for simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import comb
+
+import numpy as np
+
+from .kernels.spline import DEGREE, tensor, uniform_cell
+from .surface import SurfaceFunction, is_number, surface_function
+
+_FEWEST = DEGREE + 1
+_HEADER = 5
+
+
+@surface_function
+def _tensor_spline(x, y, parameters):
+    spacing, nx, ny = parameters[2], int(parameters[3]), int(parameters[4])
+    u, v = (x - parameters[0]) / spacing, (y - parameters[1]) / spacing
+    i, j = uniform_cell(u, nx), uniform_cell(v, ny)
+    if i < 0 or j < 0:
+        hole = np.nan + 0 * x
+        return hole, hole, hole, hole, hole, hole
+    coefficients = parameters[5:].reshape((nx + 4, ny + 4))
+    f, fu, fv, fuu, fuv, fvv = tensor(coefficients, i, j, u - i, v - j)
+    square = spacing * spacing
+    return f, fu / spacing, fv / spacing, fuu / square, fuv / square, fvv / square
+
+
+def _spline_coefficients(samples: np.ndarray) -> np.ndarray:
+    """Coefficients (n + 4, m) of uniform quintic B-splines through samples (n, m) along the first axis.
+
+    The fifth derivative jumps by the sixth difference of the coefficients: two such jumps are taken out
+    next to either end ("not a knot"), which keeps the order 6 up to the edge.
+    """
+    n = len(samples)
+    matrix, right = np.zeros((n + 4, n + 4)), np.zeros((n + 4, samples.shape[1]))
+    for k in range(n):
+        matrix[k, k : k + 5] = np.array([1, 26, 66, 26, 1]) / 120
+    right[:n] = samples
+    jump = [(-1) ** k * comb(6, k) for k in range(7)]
+    for row, first in enumerate((0, 1, n - 4, n - 3)):
+        matrix[n + row, first : first + 7] = jump
+    return np.linalg.solve(matrix, right)
+
+
+@dataclass(frozen=True)
+class HeightField:
+    """Ground through a regular grid of heights, by tensor-product quintic splines.
+
+    The height has four continuous derivatives and an error of order 6 in the spacing. Outside the grid
+    there is no ground: a ride ends there.
+
+    Parameters
+    ----------
+    heights : array_like, shape (nx, ny)
+        Row i, column j is the height at (x0 + i spacing, y0 + j spacing) [m]; six or more each way, not
+        all equal.
+    spacing : float
+        Of the grid, both ways [m].
+    origin : tuple of float
+        (x0, y0) [m].
+
+    Raises
+    ------
+    ValueError
+        If they are not so.
+    """
+
+    heights: Sequence[Sequence[float]] = field(repr=False)
+    spacing: float
+    origin: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        rows = _rows(self.heights)
+        object.__setattr__(self, "heights", rows)
+        if not (is_number(self.spacing) and self.spacing > 0):
+            raise ValueError(f"spacing is {self.spacing!r}; it must be a finite number > 0")
+        if len(self.origin) != 2 or not all(is_number(value) for value in self.origin):
+            raise ValueError(f"origin is {self.origin!r}; it must be two finite numbers")
+        object.__setattr__(self, "origin", tuple(float(value) for value in self.origin))
+        if len({height for row in rows for height in row}) == 1:
+            raise ValueError("heights are all equal; level ground is the plane")
+
+    @property
+    def function(self) -> SurfaceFunction:
+        """The height function."""
+        return _tensor_spline
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Origin, spacing, numbers of samples, then the splines' coefficients row by row."""
+        return self._parameters
+
+    @cached_property
+    def _parameters(self) -> np.ndarray:
+        samples = np.array(self.heights)
+        along_x = _spline_coefficients(samples)
+        coefficients = _spline_coefficients(along_x.T).T
+        return np.concatenate([self.origin, [self.spacing], samples.shape, coefficients.ravel()])
+
+
+def _rows(heights: Sequence[Sequence[float]]) -> tuple[tuple[float, ...], ...]:
+    """The heights as tuples; ValueError if they are no grid of numbers."""
+    grid = heights.tolist() if isinstance(heights, np.ndarray) else heights
+    if len(grid) < _FEWEST or any(len(row) != len(grid[0]) for row in grid) or len(grid[0]) < _FEWEST:
+        raise ValueError(f"heights must be a grid of {_FEWEST} x {_FEWEST} or more, its rows of one length")
+    for i, row in enumerate(grid):
+        for j, value in enumerate(row):
+            if not is_number(value):
+                raise ValueError(f"heights[{i}][{j}] is {value!r}; it must be a finite number")
+    return tuple(tuple(float(value) for value in row) for row in grid)

@@ -1,0 +1,217 @@
+"""Bowls of any profile z = g(r): an even polynomial, a spline through points, a function of one's own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numba as nb
+import numpy as np
+
+from .kernels.revolution import of_radius, of_square
+from .kernels.spline import DEGREE, piecewise, polynomial
+from .surface import Plane, SurfaceFunction, SurfaceOfRevolution, is_number, surface_function
+
+
+@surface_function
+def _polynomial(x, y, parameters):
+    return of_square(x, y, *polynomial(parameters, x * x + y * y))
+
+
+@surface_function
+def _spline(x, y, parameters):
+    return of_square(x, y, *piecewise(parameters, x * x + y * y))
+
+
+def _numbers(name: str, values: Sequence[float]) -> tuple[float, ...]:
+    """Finite numbers as floats; ValueError with the first that is none."""
+    for i, value in enumerate(values):
+        if not is_number(value):
+            raise ValueError(f"{name}[{i}] is {value!r}; it must be a finite number")
+    return tuple(float(value) for value in values)
+
+
+@dataclass(frozen=True)
+class PolynomialProfile:
+    """The bowl z = c1 r^2 + c2 r^4 + c3 r^6 + ...
+
+    Parameters
+    ----------
+    coefficients : sequence of float
+        c1 [1/m], c2 [1/m^3], c3 [1/m^5], ...; c1 alone is the paraboloid of that alpha.
+
+    Raises
+    ------
+    ValueError
+        If one is not finite, or none differs from zero.
+    """
+
+    coefficients: Sequence[float]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "coefficients", _numbers("coefficients", self.coefficients))
+        if not any(self.coefficients):
+            raise ValueError("coefficients are all zero; level ground is the plane")
+
+    @property
+    def function(self) -> SurfaceFunction:
+        """The height function."""
+        return _polynomial
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Coefficients of the powers of r^2 from the zeroth, shape (n + 1,)."""
+        return np.array([0.0, *self.coefficients])
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """It has no edge."""
+        return 0.0, math.inf
+
+    def flattened(self, fraction: float) -> SurfaceOfRevolution:
+        """All heights times the fraction."""
+        return PolynomialProfile(tuple(fraction * c for c in self.coefficients)) if fraction > 0 else Plane()
+
+
+@dataclass(frozen=True)
+class SplineProfile:
+    """The bowl through points (r, z) of its profile.
+
+    A quintic spline in r^2: smooth on the axis, with four continuous derivatives elsewhere; through fewer
+    than seven points the one polynomial. There is no ground outside the points.
+
+    Parameters
+    ----------
+    radii : sequence of float
+        Rising, the first >= 0 [m]; two or more. The axis is ground if the first is 0.
+    heights : sequence of float
+        As many, not all equal [m].
+
+    Raises
+    ------
+    ValueError
+        If they are not so.
+    """
+
+    radii: Sequence[float]
+    heights: Sequence[float] = field(repr=False)
+
+    def __post_init__(self) -> None:
+        for name in ("radii", "heights"):
+            object.__setattr__(self, name, _numbers(name, getattr(self, name)))
+        if len(self.radii) != len(self.heights) or len(self.radii) < 2:
+            counts = f"{len(self.radii)} radii and {len(self.heights)} heights"
+            raise ValueError(f"there are {counts}; there must be as many of each, two or more")
+        if self.radii[0] < 0:
+            raise ValueError(f"radii[0] is {self.radii[0]!r}; it must be >= 0")
+        for i, (inner, outer) in enumerate(pairwise(self.radii)):
+            if not outer > inner:
+                raise ValueError(f"radii[{i + 1}] is {outer!r}; it must be greater than {inner!r} before it")
+        if len(set(self.heights)) == 1:
+            raise ValueError("heights are all equal; level ground is the plane")
+
+    @property
+    def function(self) -> SurfaceFunction:
+        """The height function."""
+        return _spline
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """As `reference.kernels.spline.piecewise` takes them: breaks in r^2, then coefficients."""
+        return self._parameters
+
+    @cached_property
+    def _parameters(self) -> np.ndarray:
+        # A quarter of a second that only this surface needs.
+        from scipy.interpolate import PPoly, make_interp_spline
+
+        squares = np.array(self.radii) ** 2
+        spline = make_interp_spline(squares, np.array(self.heights), k=min(DEGREE, len(squares) - 1))
+        pieces = PPoly.from_spline(spline)
+        solid = np.diff(pieces.x) > 0  # the knots at both ends are multiple
+        powers = np.zeros((int(solid.sum()), DEGREE + 1))
+        powers[:, : len(pieces.c)] = pieces.c[::-1, solid].T
+        return np.concatenate([np.unique(pieces.x), powers.ravel()])
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """From the first point to the last."""
+        return self.radii[0], self.radii[-1]
+
+    def flattened(self, fraction: float) -> SurfaceOfRevolution:
+        """All heights times the fraction."""
+        return SplineProfile(self.radii, tuple(fraction * z for z in self.heights)) if fraction > 0 else Plane()
+
+
+def profile_function(profile: Callable[..., tuple]) -> SurfaceFunction:
+    """Make ``profile(r, constants) -> (g, g', g'')`` the function of a `Profile`.
+
+    All three results must be of the type of ``r``, which is real or complex, and analytic: no `abs`, no
+    comparison other than through the real part; nan where there is no ground.
+
+    Parameters
+    ----------
+    profile : callable
+        Height [m] and its first [-] and second derivative [1/m] at r [m], in numba's subset of Python;
+        ``constants`` are those of the `Profile`, an array.
+
+    Returns
+    -------
+    SurfaceFunction
+    """
+    compiled = nb.njit(error_model="numpy")(profile)
+
+    def height(x, y, parameters):
+        r = np.sqrt(x * x + y * y)
+        g, first, second = compiled(r, parameters[1:])
+        scale = parameters[0]
+        return of_radius(x, y, r, scale * g, scale * first, scale * second)
+
+    return SurfaceFunction(height, cached=False)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The bowl z = g(r) of a profile of one's own.
+
+    Parameters
+    ----------
+    function : SurfaceFunction
+        What `profile_function` makes of g.
+    constants : sequence of float
+        Handed to g.
+    extent : tuple of float
+        Smallest and largest radius that g has ground for [m].
+    scale : float
+        Factor of all heights, positive.
+
+    Raises
+    ------
+    ValueError
+        If a constant is not finite, or the extent or the scale is impossible.
+    """
+
+    function: SurfaceFunction
+    constants: Sequence[float] = ()
+    extent: tuple[float, float] = (0.0, math.inf)
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "constants", _numbers("constants", self.constants))
+        inner, outer = self.extent
+        if not 0 <= inner < outer:
+            raise ValueError(f"extent is {self.extent!r}; it must be two radii, 0 <= inner < outer")
+        if not (is_number(self.scale) and self.scale > 0):
+            raise ValueError(f"scale is {self.scale!r}; it must be a finite number > 0")
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """The scale, then the constants."""
+        return np.array([float(self.scale), *self.constants])
+
+    def flattened(self, fraction: float) -> SurfaceOfRevolution:
+        """All heights times the fraction."""
+        return replace(self, scale=fraction * self.scale) if fraction > 0 else Plane()

@@ -1,0 +1,116 @@
+"""The atlas against single curves, and its boundaries against what is known of them."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from reference.atlas import Atlas, Boundary, atlas, spacing
+from reference.bicycle import Bicycle
+from reference.families import FAMILIES, find_motion, trace
+from reference.sections import stable_sections
+from reference.stability import growth_rate, linearise
+from reference.surface import Paraboloid
+
+BICYCLE = Bicycle()
+ALPHAS = (0.0, 0.005, 0.009, 0.02, 0.0333, 0.05, 0.3, 0.44, 0.5)
+LONGEST = 0.05
+
+
+@cache
+def small() -> Atlas:
+    return atlas(BICYCLE, ALPHAS, LONGEST)
+
+
+def boundary(family: int) -> Boundary:
+    (found,) = (one for one in small().boundaries if one.family == family)
+    return found
+
+
+def test_every_family_is_there_or_said_to_be_absent() -> None:
+    present = {(curve.alpha, curve.family) for curve in small().curves}
+    absent = {(one.alpha, one.family) for one in small().absent}
+    assert present | absent == {(alpha, family) for alpha in ALPHAS for family in FAMILIES}
+    assert absent == {(0.44, 3), (0.44, 4)}, "from 0.420 to 0.464 there is no pivoting motion to start from"
+    assert all("pivoting motion" in one.reason for one in small().absent)
+
+
+@pytest.mark.parametrize(("alpha", "family"), [(0.0, 4), (0.005, 2), (0.3, 3), (0.5, 1), (0.5, 4)])
+def test_a_curve_of_the_atlas_is_the_traced_one(alpha: float, family: int) -> None:
+    """Its anchor came from the shape before, not from the plane."""
+    (curve,) = (one for one in small().curves if (one.alpha, one.family) == (alpha, family))
+    traced = trace(BICYCLE, Paraboloid(alpha), family, LONGEST)
+    assert curve.ends == traced.ends
+    assert len(curve.seen.lean) == len(traced.points)
+    # Both start at the same anchor to round-off; some 100 steps from there pass it on, each a little larger.
+    angles = np.array([curve.seen.lean, curve.seen.steer]).T
+    expected = np.array([point.unknowns[[3, 5]] for point in traced.points])
+    assert np.abs(angles - expected).max() < 1e-8
+
+
+@pytest.mark.parametrize(("alpha", "family"), [(0.0, 2), (0.005, 4), (0.05, 1), (0.3, 3), (0.5, 2)])
+def test_a_point_of_the_atlas_is_a_motion_with_its_growth_rate(alpha: float, family: int) -> None:
+    (curve,) = (one for one in small().curves if (one.alpha, one.family) == (alpha, family))
+    seen = curve.seen
+    for i in np.flatnonzero((seen.rear_rate > 5) & (seen.radius < 20))[::40]:
+        near, surface = (float(seen.lean[i]), float(seen.steer[i])), Paraboloid(alpha)
+        motion = find_motion(BICYCLE, surface, float(seen.rear_rate[i]), family, near)[1]
+        # Next to a fold in the rear rate angles move like its root.
+        assert np.hypot(motion.lean - near[0], motion.steer - near[1]) < 1e-7
+        alone = linearise(BICYCLE, surface, *motion.state())
+        growth = growth_rate(surface, alone.eigenvalues, motion.yaw_rate)
+        # Growth rates change by some 10 / s over a radian.
+        assert seen.growth_rate[i] == pytest.approx(growth, abs=1e-5)
+        assert seen.stable[i] == (growth < 0)
+
+
+@pytest.mark.parametrize("family", [2, 4])
+def test_boundaries_are_the_ends_of_the_stable_sections(family: int) -> None:
+    found = boundary(family)
+    for alpha, ends in zip(found.alpha, found.ends, strict=True):
+        ((start, end),) = stable_sections(trace(BICYCLE, Paraboloid(alpha), family, 0.03))
+        for one, other in zip(ends, (start, end), strict=True):
+            assert one.cause == other.cause
+            # Ends are solved to 1e-9 in the arc; the rear rate changes by some 10 over it.
+            assert one.motion.rear_rate == pytest.approx(other.motion.rear_rate, abs=1e-7)
+
+
+def test_on_the_plane_one_end_is_an_energy_extremum_and_in_a_bowl_none_is() -> None:
+    for family in (2, 4):
+        causes = [tuple(end.cause for end in ends) for ends in boundary(family).ends]
+        assert causes[0] == ("energy", "hopf")
+        assert set(causes[1:]) == {("hopf", "hopf")}
+
+
+def test_boundaries_end_in_the_critical_points() -> None:
+    for family, last in ((2, 0.0333), (4, 0.009)):
+        found = boundary(family)
+        assert found.alpha[-1] == last
+        vanishing = found.vanishing
+        assert vanishing is not None
+        (following,) = (alpha for i, alpha in enumerate(ALPHAS) if ALPHAS[i - 1] == last)
+        assert last < vanishing.alpha < following
+        # Both ends close in on it like the root of the distance in alpha.
+        start, end = found.ends[-1]
+        assert min(start.motion.lean, end.motion.lean) < vanishing.motion.lean < max(start.motion.lean, end.motion.lean)
+
+
+def test_families_one_and_three_have_no_boundary() -> None:
+    assert {one.family for one in small().boundaries} == {2, 4}
+
+
+def test_spacing_gives_the_asked_number_of_motions() -> None:
+    size = 6000
+    found = atlas(BICYCLE, *spacing(size, largest=0.04))
+    # The length of the arcs, taken as a constant, changes by a sixth with alpha.
+    assert found.size == pytest.approx(size, rel=0.3)
+    assert found.alphas[0] == 0
+    assert found.alphas[-1] == pytest.approx(0.04)
+    assert np.all(np.diff(found.alphas) > 0)
+
+
+def test_spacing_is_fine_where_things_happen() -> None:
+    alphas, longest = spacing()
+    assert np.diff(alphas[alphas <= 0.04]).max() < 3e-4
+    assert alphas[-1] == 1.0
+    assert longest < LONGEST
