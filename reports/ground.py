@@ -15,6 +15,10 @@ LIGHT = np.array([-0.85, 0.53])
 WALL = 0.05  # height of the wall below the lowest point, as a share of the ground's radius
 STRIP_MARGIN = 4.0  # ground on either side of a ride that is not around the axis [m]
 LINE_LIFT = 0.003  # lines lie this far above the mesh, or they would sink into its facets [m]
+# Ground may end, as a sphere's does at its equator, where it is upright: it is drawn up to this slope, or
+# to twice the steepest under the ride.
+STEEPEST = 5.0
+_HALVINGS = 40  # from any size on the ground to far below a picture's resolution
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,31 @@ def lifted(surface: Surface, x: np.ndarray, y: np.ndarray, lift: float = 0.0) ->
     return point + lift * unit_normals(surface, x, y)
 
 
+def _drawable(surface: Surface, x: np.ndarray, y: np.ndarray, steepest: float) -> np.ndarray:
+    """Whether there is ground at points (...), no steeper than a slope."""
+    values = evaluate(surface, x, y)
+    # A comparison with nan is false.
+    return np.isfinite(values).all(axis=-1) & (np.hypot(values[..., 1], values[..., 2]) <= steepest)
+
+
+def _reached(surface: Surface, start: np.ndarray, end: np.ndarray, steepest: float) -> np.ndarray:
+    """The ends (..., 2) of lines seen from above that start on the ground, cut short where the ground ends."""
+    start, end = np.broadcast_arrays(start, end)
+
+    def drawable(share: np.ndarray) -> np.ndarray:
+        place = start + share[..., None] * (end - start)
+        return _drawable(surface, place[..., 0], place[..., 1], steepest)
+
+    low, high = np.zeros(end.shape[:-1]), np.ones(end.shape[:-1])
+    whole = drawable(high)
+    if not whole.all():
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            good = drawable(middle)
+            low, high = np.where(good, middle, low), np.where(good, high, middle)
+    return np.where(whole[..., None], end, start + low[..., None] * (end - start))
+
+
 def _shading(heights: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Brightness 0 to 1: half by the height, half by the slope towards the light, relative to the largest.
 
@@ -100,25 +129,40 @@ def _quads(rows: int, columns: int, closed: bool) -> np.ndarray:
     return np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in ((a, c, d), (a, d, b))])
 
 
-def disc(surface: Surface, radius: float) -> Ground:
-    """A disc about the z axis out to a radius [m]."""
-    around = np.arange(180) * 2 * np.pi / 180
+def _polar(surface: Surface, r: np.ndarray, angle: np.ndarray, lift: float) -> np.ndarray:
+    return lifted(surface, r * np.cos(angle), r * np.sin(angle), lift)
+
+
+def disc(surface: Surface, path: np.ndarray, radius: float, steepest: float) -> Ground:
+    """A disc about the z axis out to a radius [m], as far as there is ground around a path (n, 2) about the axis."""
+    ride, around = np.linalg.norm(path, axis=1), np.arange(180) * 2 * np.pi / 180
+
+    def bounds(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Smallest and largest radius with ground, from the ride's place nearest in angle."""
+        out = np.column_stack([np.cos(angle), np.sin(angle)])
+        known = ride[np.argmax(out @ (path / ride[:, None]).T, axis=1), None] * out
+        ends = (_reached(surface, known, end, steepest) for end in (np.zeros(2), radius * out))
+        inner, outer = (np.linalg.norm(end, axis=1) for end in ends)
+        return inner, outer
+
+    inner, outer = bounds(around)
+    r = inner + np.linspace(0, 1, 81)[:, None] * (outer - inner)
     ring = np.append(around, 0.0)
-    out = np.linspace(0, radius, 81)
-    r, a = np.meshgrid(out, around, indexing="ij")
-    x, y = r * np.cos(a), r * np.sin(a)
+    radius = float(outer.min())
     spacing = _spacing(radius, 10)
-    rings = np.arange(spacing, radius * (1 - 1e-9), spacing)
-    lines = [lifted(surface, k * np.cos(ring), k * np.sin(ring), LINE_LIFT) for k in rings]
-    spoke = np.linspace(spacing, radius, 60)
-    lines += [lifted(surface, spoke * np.cos(b), spoke * np.sin(b), LINE_LIFT) for b in np.arange(24) * np.pi / 12]
-    normals = unit_normals(surface, x, y).reshape(-1, 3)
-    vertices = lifted(surface, x, y).reshape(-1, 3)
-    edge = lifted(surface, radius * np.cos(ring), radius * np.sin(ring), LINE_LIFT)
+    marks = np.arange(spacing, radius * (1 - 1e-9), spacing)
+    lines = [_polar(surface, np.full_like(ring, k), ring, LINE_LIFT) for k in marks if k > inner.max()]
+    spokes = np.arange(24) * np.pi / 12
+    for angle, first, last in zip(spokes, *bounds(spokes), strict=True):
+        spoke = np.linspace(max(spacing, first), last, 60)
+        lines.append(_polar(surface, spoke, np.full_like(spoke, angle), LINE_LIFT))
+    vertices = _polar(surface, r, around, 0.0).reshape(-1, 3)
+    normals = unit_normals(surface, vertices[:, 0], vertices[:, 1])
+    edge = _polar(surface, np.append(outer, outer[0]), ring, LINE_LIFT)
     return Ground(
         vertices,
         normals,
-        _quads(len(out), len(around), closed=True),
+        _quads(len(r), len(around), closed=True),
         _shading(vertices[:, 2], normals),
         lines,
         edge,
@@ -128,16 +172,23 @@ def disc(surface: Surface, radius: float) -> Ground:
     )
 
 
-def strip(surface: Surface, path: np.ndarray, margin: float) -> Ground:
-    """A rectangle along a path (n, 2), wider by a margin on every side [m]."""
+def strip(surface: Surface, path: np.ndarray, margin: float, steepest: float) -> Ground:
+    """A rectangle along a path (n, 2), wider by a margin on every side [m], as far as there is ground."""
     middle = path.mean(axis=0)
     along = np.linalg.svd(path - middle, full_matrices=False)[2][0] if len(path) > 1 else np.array([1.0, 0.0])
     along = along * np.sign(along @ (path[-1] - path[0]) or 1.0)
     axes = np.array([along, [-along[1], along[0]]])
 
     def place(u: np.ndarray, v: np.ndarray, lift: float = LINE_LIFT) -> np.ndarray:
-        x, y = np.moveaxis(middle + u[..., None] * axes[0] + v[..., None] * axes[1], -1, 0)
+        wanted = middle + u[..., None] * axes[0] + v[..., None] * axes[1]
+        x, y = np.moveaxis(_reached(surface, nearest(u), wanted, steepest), -1, 0)
         return lifted(surface, x, y, lift)
+
+    def nearest(u: np.ndarray) -> np.ndarray:
+        """The ride's place nearest to each position along the rectangle."""
+        order = np.argsort(reach[:, 0], kind="stable")
+        after = np.clip(np.searchsorted(reach[order, 0], u), 0, len(order) - 1)
+        return path[order[after]]
 
     reach = (path - middle) @ axes.T
     low, high = reach.min(axis=0) - margin, reach.max(axis=0) + margin
@@ -180,9 +231,16 @@ def ground_of_ride(surface: Surface, path: np.ndarray) -> Ground:
     Ground
         A disc about the z axis where the ride goes around it, else a strip around the path.
     """
+    slopes = evaluate(surface, path[:, 0], path[:, 1])[:, 1:3]
+    steepest = max(STEEPEST, 2 * float(np.nanmax(np.linalg.norm(slopes, axis=1), initial=0.0)))
+    # A bicycle that falls may reach beyond the ground.
+    path = path[_drawable(surface, path[:, 0], path[:, 1], steepest)]
     low, high = path.min(axis=0), path.max(axis=0)
     around_axis = np.all(low < 0) and np.all(high > 0) and np.ptp(path, axis=0).min() > 0.5 * np.ptp(path, axis=0).max()
     if around_axis:
         reach = float(np.linalg.norm(path, axis=1).max())
-        return disc(surface, reach + max(1.0, 0.4 * reach))
-    return strip(surface, path, STRIP_MARGIN)
+        shown = disc(surface, path, reach + max(1.0, 0.4 * reach), steepest)
+        # Between two places of a ride there may be a hole; a strip starts from places alone.
+        if np.isfinite(shown.vertices).all():
+            return shown
+    return strip(surface, path, STRIP_MARGIN, steepest)

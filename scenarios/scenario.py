@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from reference.bicycle import Bicycle
-from reference.surface import Paraboloid, Plane
 
 from .error import ScenarioError
+from .surfaces import SurfaceTable
+from .table import Table, one_line
+from .table import refuse_unknown as refuse_unknown  # part of this module's face, with `one_line`
 
 LIBRARY = files("scenarios") / "library"
 
@@ -22,54 +24,14 @@ LIBRARY = files("scenarios") / "library"
 _Moderate = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
-class _Table(BaseModel):
-    # Strict: true is no number, and neither is "18".
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _known_keys(cls, data: Any) -> Any:
-        if isinstance(data, Mapping):
-            refuse_unknown(data, cls.model_fields)
-        return data
-
-
-def refuse_unknown(data: Mapping[str, Any], known: Iterable[str]) -> None:
-    """Raise ValueError with the known keys if there is another."""
-    unknown = sorted(set(data) - set(known))
-    if unknown:
-        raise ValueError(f"unknown key {unknown[0]!r}; there are {', '.join(known)}")
-
-
-class PlaneTable(_Table):
-    """Level ground."""
-
-    kind: Literal["plane"]
-
-    def make(self) -> Plane:
-        """The surface."""
-        return Plane()
-
-
-class ParaboloidTable(_Table):
-    """The bowl z = alpha (x^2 + y^2)."""
-
-    kind: Literal["paraboloid"]
-    alpha: float = Field(ge=0, description="shape [1/m]")
-
-    def make(self) -> Paraboloid:
-        """The surface."""
-        return Paraboloid(self.alpha)
-
-
-class Near(_Table):
+class Near(Table):
     """Angles that a circular motion is near to."""
 
     lean: float
     steer: float
 
 
-class CircularTable(_Table):
+class CircularTable(Table):
     """A circular motion to start from."""
 
     kind: Literal["circular"] = "circular"
@@ -84,14 +46,14 @@ class CircularTable(_Table):
         return self
 
 
-class UprightTable(_Table):
+class UprightTable(Table):
     """A straight upright start along x, the rear contact in the origin."""
 
     kind: Literal["upright"]
     speed: float = Field(gt=0, le=1e4, description="forward speed [m/s]")
 
 
-class Perturbation(_Table):
+class Perturbation(Table):
     """Added to the independent variables of the start; the rest is solved."""
 
     x: _Moderate = 0.0
@@ -103,7 +65,7 @@ class Perturbation(_Table):
     rear_rate: _Moderate = 0.0
 
 
-class Simulation(_Table):
+class Simulation(Table):
     """How long, and how often to report."""
 
     duration: float = Field(gt=0, le=1e5, description="[s]")
@@ -121,24 +83,24 @@ class Simulation(_Table):
         return self
 
 
-class Criterion(_Table):
+class Criterion(Table):
     """A verdict that a benchmark asks of every engine."""
 
     energy_variation: float = Field(gt=0, description="limit of 100 (Emax - Emin) / E(0) [percent]")
 
 
-class Scenario(_Table):
+class Scenario(Table):
     """A scenario as its file declares it."""
 
     title: str
     tags: Annotated[tuple[str, ...], Field(strict=False)] = ()  # TOML has arrays only
-    surface: Annotated[PlaneTable | ParaboloidTable, Field(discriminator="kind")]
+    surface: SurfaceTable
     motion: Annotated[CircularTable | UprightTable, Field(discriminator="kind")]
     perturbation: Perturbation = Perturbation()
     simulation: Simulation
     criterion: Criterion | None = None
-    bicycle: dict[str, _Moderate] = {}
-    engines: dict[str, dict[str, Any]] = {}
+    bicycle: dict[str, _Moderate] = Field(default_factory=dict)
+    engines: dict[str, dict[str, Any]] = Field(default_factory=dict)
 
     @field_validator("title")
     @classmethod
@@ -229,28 +191,6 @@ def validate(data: Mapping[str, Any], source: str) -> Scenario:
         return Scenario.model_validate(data)
     except ValidationError as error:
         raise ScenarioError(f"{source}: {one_line(error)}") from error
-
-
-_PLAIN_WORDS = {
-    "missing": "is missing",
-    "union_tag_not_found": "kind is missing",
-    "model_type": "must be a table",
-    "dict_type": "must be a table",
-    "model_attributes_type": "must be a table",
-}
-
-
-def one_line(error: ValidationError) -> str:
-    """Say the first thing wrong in one line: where, what, what came."""
-    first = error.errors()[0]
-    # Discriminator values appear in the location of a union's member: they are no keys of the file.
-    where = ".".join(str(part) for part in first["loc"] if part not in ("circular", "upright", "plane", "paraboloid"))
-    plain = _PLAIN_WORDS.get(first["type"], first["msg"].removeprefix("Value error, "))
-    message = plain.replace("\n", " ")
-    came = first.get("input")
-    shown = "" if isinstance(came, Mapping | BaseModel) or first["type"] == "missing" else f" (it is {came!r})"
-    more = len(error.errors()) - 1
-    return f"{where}: {message}{shown}".lstrip(": ") + (f"; and {more} more" if more else "")
 
 
 def _put(data: dict[str, Any], key: str, value: Any) -> None:

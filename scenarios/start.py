@@ -13,10 +13,11 @@ from reference.dae import consistent_state
 from reference.families import find_motion
 from reference.kinematics import LEAN, REAR_ANGLE, STEER, YAW, body_positions
 from reference.stability import growth_rate, linearise
-from reference.surface import Surface, SurfaceOfRevolution, evaluate
+from reference.surface import Plane, Surface, SurfaceOfRevolution, evaluate
 
 from .error import ScenarioError
 from .scenario import CircularTable, Scenario
+from .surfaces import bowl
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Start:
         Family of the circular motion; None for an upright start.
     motion : CircularMotion or None
     growth_rate : float
-        Largest real part of the motion's eigenvalues that symmetry does not fix [1/s].
+        Largest real part of the motion's eigenvalues that symmetry does not fix [1/s]; on ground without
+        symmetry, where nothing is steady, that of the same start on the level plane.
     size : float
         Radius of the circle of D, or the wheelbase for a straight start [m].
     """
@@ -55,8 +57,7 @@ def make_start(scenario: Scenario) -> Start:
         # Numbers that no bicycle has may overflow on the way; what comes of them is checked.
         with np.errstate(all="ignore"):
             family, motion, q, qd = _undisturbed(scenario, bicycle, surface)
-            straight = linearise(bicycle, surface, q, qd)
-            rate = growth_rate(surface, straight.eigenvalues, float(qd[YAW]))
+            rate = _growth_rate(scenario, bicycle, surface, q, qd)
             q, qd = _disturbed(scenario, bicycle, surface, q, qd)
     except (ValueError, ArithmeticError) as error:
         raise ScenarioError(f"motion: {error}") from error
@@ -68,13 +69,20 @@ def make_start(scenario: Scenario) -> Start:
     return Start(Problem(bicycle, surface, q, qd, times), family, motion, rate, size)
 
 
+def _growth_rate(scenario: Scenario, bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> float:
+    if not isinstance(surface, SurfaceOfRevolution):
+        surface = Plane()
+        _, _, q, qd = _undisturbed(scenario, bicycle, surface)
+    return growth_rate(surface, linearise(bicycle, surface, q, qd).eigenvalues, float(qd[YAW]))
+
+
 def _undisturbed(
-    scenario: Scenario, bicycle: Bicycle, surface: SurfaceOfRevolution
+    scenario: Scenario, bicycle: Bicycle, surface: Surface
 ) -> tuple[int | None, CircularMotion | None, np.ndarray, np.ndarray]:
     table = scenario.motion
     if isinstance(table, CircularTable):
         near = (table.near.lean, table.near.steer) if table.near is not None else None
-        family, motion = find_motion(bicycle, surface, table.rear_rate, table.family, near)
+        family, motion = find_motion(bicycle, bowl(surface), table.rear_rate, table.family, near)
         return family, motion, *motion.state()
     rates = (0.0, 0.0, table.speed / bicycle.rear_wheel_radius)
     q, qd = consistent_state(bicycle, surface, (float(bicycle.reference_point[0]), 0.0), 0.0, 0.0, rates)

@@ -9,27 +9,26 @@ from typing import Any
 import numpy as np
 
 from reference.bicycle import Bicycle
-from reference.contact import observe
 from reference.critical import CriticalPoint, last_stable, reconnections
 from reference.families import FAMILIES, Family, trace
-from reference.sections import SectionEnd, modes, stable_sections
+from reference.sections import SectionEnd, modes, sample_family, stable_sections
 from reference.special import special_points
-from reference.stability import growth_rate
-from reference.surface import Paraboloid
+from reference.surface import Surface
 
 from .error import ScenarioError
 from .runner import write_json
+from .surfaces import bowl, named
 
 LONGEST_STEP = 0.05  # of the arc: some 100 to 300 points a family, no stable section known is shorter than three
 
 
-def families_document(alpha: float) -> dict[str, Any]:
-    """Follow all four families at alpha, with special points and stable sections.
+def families_document(ground: Surface | float) -> dict[str, Any]:
+    """Follow all four families on a ground, with special points and stable sections.
 
     Parameters
     ----------
-    alpha : float
-        Shape of the paraboloid [1/m].
+    ground : Surface or float
+        A surface of revolution, or the alpha of a paraboloid [1/m].
 
     Returns
     -------
@@ -39,19 +38,16 @@ def families_document(alpha: float) -> dict[str, Any]:
     Raises
     ------
     ScenarioError
-        If alpha is no shape.
+        If it is none.
     """
-    bicycle, families, absent = Bicycle(), [], {}
-    try:
-        surface = Paraboloid(alpha)
-    except ValueError as error:
-        raise ScenarioError(str(error)) from error
+    bicycle, surface = Bicycle(), bowl(ground)
+    families, absent = [], {}
     for number in FAMILIES:
         try:
-            families.append(_family(trace(bicycle, surface, number, LONGEST_STEP)))
+            families.append(family_document(trace(bicycle, surface, number, LONGEST_STEP)))
         except ValueError as error:
             absent[str(number)] = str(error)
-    return {"alpha": alpha, "families": families, "absent": absent}
+    return {**named(surface), "families": families, "absent": absent}
 
 
 def critical_document(watch: Callable[[str, float, float], None]) -> dict[str, Any]:
@@ -73,16 +69,17 @@ def critical_document(watch: Callable[[str, float, float], None]) -> dict[str, A
     for number in FAMILIES:
         watch("last stable", float(number), float(len(FAMILIES)))
         point = last_stable(bicycle, number)
-        stable[str(number)] = None if point is None else _critical(point)
+        stable[str(number)] = None if point is None else critical_entry(point)
     collision = next(point for point in merging if point.families == (2, 4))
     return {
-        "cusp_collision": _critical(collision),
+        "cusp_collision": critical_entry(collision),
         "last_stable": stable,
-        "merging": [{"families": list(point.families)} | _critical(point) for point in merging],
+        "merging": [{"families": list(point.families)} | critical_entry(point) for point in merging],
     }
 
 
-def _critical(point: CriticalPoint) -> dict[str, Any]:
+def critical_entry(point: CriticalPoint) -> dict[str, Any]:
+    """A critical point as it stands in documents."""
     motion = point.motion
     return {
         "alpha": point.alpha,
@@ -113,7 +110,8 @@ def write_families(document: Mapping[str, Any], out: Path) -> None:
     family_figure(out / "families.png", document, Bicycle().front_wheel_radius)
 
 
-def _family(family: Family) -> dict[str, Any]:
+def family_document(family: Family) -> dict[str, Any]:
+    """One family's part of the document of `velodrome families`."""
     return {
         "family": family.number,
         "ends": list(family.ends),
@@ -134,25 +132,16 @@ def _family(family: Family) -> dict[str, Any]:
 
 def _points(family: Family) -> dict[str, list[Any]]:
     """Quantities along the curve, equal-length lists."""
-    equations = family.equations
-    motions = [equations.motion(point.unknowns) for point in family.points]
-    states = [motion.state() for motion in motions]
-    seen = observe(
-        equations.bicycle, equations.surface, np.array([q for q, _ in states]), np.array([qd for _, qd in states])
-    )
-    normal = np.einsum("nwi,nwi->nw", np.array([motion.force for motion in motions]), seen.normal)
+    seen = sample_family(family)
+    names = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "radius", "energy")
     values = modes(family)
-    growth = [float(growth_rate(equations.surface, row, m.yaw_rate)) for row, m in zip(values, motions, strict=True)]
-    names = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch")
     return {
-        **{name: [getattr(motion, name) for motion in motions] for name in names},
-        "radius": [float(np.hypot(*motion.position[:2])) for motion in motions],
-        "energy": (seen.kinetic_energy + seen.potential_energy).tolist(),
-        "lyapunov_stable": [bool(rate < 0) for rate in growth],
-        "growth_rate": growth,
-        "normal_force_rear": normal[:, 0].tolist(),
-        "normal_force_front": normal[:, 1].tolist(),
-        "eigenvalues": [[[value.real, value.imag] for value in row] for row in values],
+        **{name: getattr(seen, name).tolist() for name in names},
+        "lyapunov_stable": seen.stable.tolist(),
+        "growth_rate": seen.growth_rate.tolist(),
+        "normal_force_rear": seen.normal_force[:, 0].tolist(),
+        "normal_force_front": seen.normal_force[:, 1].tolist(),
+        "eigenvalues": np.stack([np.real(values), np.imag(values)], axis=-1).tolist(),
     }
 
 

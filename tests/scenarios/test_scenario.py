@@ -112,7 +112,7 @@ def test_an_override_reaches_the_bicycle() -> None:
         ({"surface__beta": 1.0}, ["surface", "'beta'", "alpha"]),
         ({"surface__alpha": None}, ["surface.alpha", "missing"]),
         ({"surface__kind": None}, ["surface", "kind is missing"]),
-        ({"surface__kind": "cone"}, ["surface", "'cone'", "plane"]),
+        ({"surface__kind": "cube"}, ["surface", "'cube'", "plane"]),
         ({"motion__kind": "flying"}, ["motion", "'flying'", "upright"]),
         ({"motion__speed": 4.0}, ["motion", "'speed'", "rear_rate"]),
         ({"perturbation__yaw": 0.1}, ["perturbation", "'yaw'", "lean_rate"]),
