@@ -1,0 +1,52 @@
+"""The ledger as a table for a terminal and as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from .ledger import FAILS, REPRODUCED, ROUNDS, TRUNCATED, UNTESTABLE, Line, counts
+
+STYLES = {REPRODUCED: "green", ROUNDS: "green", TRUNCATED: "yellow", FAILS: "red", UNTESTABLE: "dim"}
+_WHOSE = {"paper": "the paper's", "ours": "ours: the measurement does not pass its own tests"}
+
+
+def show_ledger(console: Console, lines: Sequence[Line]) -> None:
+    """Print the ledger: every line in the paper's order, then those that do not hold and whose they are."""
+    table = Table("§", "claim", "printed", "measured", "verdict", box=None, pad_edge=False)
+    for line in lines:
+        row = (line.section, line.claim, line.printed or "", line.measured)
+        table.add_row(*(Text(cell) for cell in row), Text(line.verdict, STYLES[line.verdict]))
+    console.print(table)
+    console.print()
+    for line in lines:
+        if not line.holds:
+            console.print(_failure(line), style="red", markup=False, highlight=False, soft_wrap=True)
+            for check in line.checks:
+                word = "passes" if check.passes else "FAILS"
+                text = f"    {check.what}: {check.value:.2e}, limit {check.limit:.2e}: {word}"
+                console.print(text, markup=False, highlight=False, soft_wrap=True)
+    console.print(summary(lines), markup=False, highlight=False, soft_wrap=True)
+
+
+def _failure(line: Line) -> str:
+    return f"{line.section}: {line.claim}: {line.measured} ({_WHOSE[line.fault or 'ours']})"
+
+
+def summary(lines: Sequence[Line]) -> str:
+    """One line: how many lines of each verdict."""
+    return f"{len(lines)} lines: " + ", ".join(f"{n} {verdict}" for verdict, n in counts(lines).items() if n)
+
+
+def markdown(lines: Sequence[Line]) -> str:
+    """The ledger as a Markdown document."""
+    rows = ["# The paper, line by line", "", summary(lines), ""]
+    rows += ["| § | claim | printed | measured | verdict |", "|---|---|---|---|---|"]
+    for line in lines:
+        verdict = line.verdict if line.holds else f"**{line.verdict}**: {_WHOSE[line.fault or 'ours']}"
+        cells = (line.section, line.claim, line.printed or "", line.measured, verdict)
+        rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(rows) + "\n"

@@ -1,0 +1,173 @@
+"""A solution family as a curve in the plane of a figure: pieces, stable sections, named points, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+SCALE = 4.0  # of the front wheel's speed in the paper's abscissa [m/s]
+
+
+def scaled_speed(front_rate: float | np.ndarray, front_radius: float) -> Any:
+    """The paper's abscissa, arctan(R |w| / 4).
+
+    The paper plots families 1 and 3 over arctan(R w / 4). On family 2 the front wheel turns backward and
+    it says that it plots -arctan(R w / 4); on family 4 it does so too, as its points G and H coincide in
+    the figures only so. The sign at the pivoting motion is free.
+    """
+    return np.arctan(front_radius * np.abs(front_rate) / SCALE)
+
+
+@dataclass(frozen=True)
+class NamedPoint:
+    """A point to mark: the paper's letter (or none), its kind, its place, and whether it is only a limit."""
+
+    name: str
+    kind: str
+    speed: float
+    lean: float
+    steer: float
+    limit: bool
+    first: bool = False
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve of a figure.
+
+    Attributes
+    ----------
+    families : tuple of int
+        Whose it is; two where families have joined.
+    speed, lean, steer : ndarray, shape (n,)
+        Abscissa [1] and angles [rad].
+    push : ndarray, shape (n,)
+        The smaller of the two normal forces [N]; negative where a wheel would have to be pulled.
+    stable : tuple of (float, float)
+        Lyapunov-stable sections, as positions along the curve in samples.
+    limits : tuple of NamedPoint
+        What the curve tends to at its ends.
+    """
+
+    families: tuple[int, ...]
+    speed: np.ndarray
+    lean: np.ndarray
+    steer: np.ndarray
+    push: np.ndarray
+    stable: tuple[tuple[float, float], ...]
+    limits: tuple[NamedPoint, ...]
+
+    def line(self, angle: str, low: float = 0.0, high: float | None = None) -> np.ndarray:
+        """Points (speed, angle) between two positions along the curve, shape (k, 2)."""
+        samples = np.arange(len(self.speed))
+        high = float(samples[-1]) if high is None else high
+        inside = samples[(samples > low) & (samples < high)]
+        places = np.concatenate([[low], inside, [high]])
+        return np.column_stack([np.interp(places, samples, row) for row in (self.speed, getattr(self, angle))])
+
+    def pieces(self) -> list[tuple[float, float, bool]]:
+        """Parts in which both wheels are pushed, and others: start, end, whether pushed."""
+        pushed = self.push > 0
+        turns = np.flatnonzero(pushed[1:] != pushed[:-1])
+        crossings = turns + self.push[turns] / (self.push[turns] - self.push[turns + 1])
+        bounds = [0.0, *crossings.tolist(), float(len(pushed) - 1)]
+        signs = [bool(pushed[0]) ^ bool(k % 2) for k in range(len(turns) + 1)]
+        return list(zip(bounds[:-1], bounds[1:], signs, strict=True))
+
+
+def curves(families: Sequence[Mapping[str, Any]], front_radius: float) -> list[Curve]:
+    """Curves of the families of a document, each once even where two families share one."""
+    found: dict[tuple, Curve] = {}
+    for family in families:
+        curve = _curve(family, front_radius)
+        # Two families share a curve where they own it both and it ends alike.
+        key = (curve.families, *family["ends"]) if len(curve.families) > 1 else (len(found),)
+        found.setdefault(key, curve)
+    return list(found.values())
+
+
+def _curve(family: Mapping[str, Any], front_radius: float) -> Curve:
+    points = family["points"]
+    rate, lean, steer = (np.array(points[name]) for name in ("front_rate", "lean", "steer"))
+    push = np.minimum(points["normal_force_rear"], points["normal_force_front"])
+    sections = []
+    for section in family["stable_sections"]:
+        ends = zip(section["lean"], section["steer"], strict=True)
+        low, high = sorted(_position(lean, steer, *end) for end in ends)
+        sections.append((low, high))
+    speed = scaled_speed(rate, front_radius)
+    return Curve(_owners(family), speed, lean, steer, push, tuple(sections), _limits(family, speed))
+
+
+def _position(lean: np.ndarray, steer: np.ndarray, at_lean: float, at_steer: float) -> float:
+    """Where along a polyline a point lies, in samples."""
+    path = np.column_stack([lean, steer])
+    step, arm = np.diff(path, axis=0), np.array([at_lean, at_steer]) - path[:-1]
+    share = np.clip(np.einsum("ij,ij->i", arm, step) / np.einsum("ij,ij->i", step, step), 0, 1)
+    nearest = int(np.argmin(np.hypot(*(arm - share[:, None] * step).T)))
+    return nearest + float(share[nearest])
+
+
+def _ends(family: Mapping[str, Any]) -> list[tuple[int, str]]:
+    """Index of the end sample and what the curve ends in, for both ends."""
+    return list(zip((0, -1), family["ends"], strict=True))
+
+
+def _owners(family: Mapping[str, Any]) -> tuple[int, ...]:
+    """Families that a curve belongs to, by what it ends in: A is of family 1, E of 2, F of 3, G of 3 and H of 4."""
+    lean, steer = family["points"]["lean"], family["points"]["steer"]
+    owners = {family["family"]}
+    for index, end in _ends(family):
+        if end == "static":
+            owners.add(1)
+        elif end == "flat":
+            owners.add(2 if lean[index] > 0 else 3)
+        elif end == "pivot":
+            neighbour = steer[1 if index == 0 else -2]
+            owners.add(4 if neighbour > steer[index] else 3)
+    return tuple(sorted(owners))
+
+
+def _limits(family: Mapping[str, Any], speed: np.ndarray) -> tuple[NamedPoint, ...]:
+    """E and F at the frame's corners; B and C where circles grow without bound, until they are solved for."""
+    points, special = family["points"], family["special_points"]
+    solved = {name for name, point in special.items() if point["kind"] == "straight"}
+    large = [index for index, end in _ends(family) if end == "large circle"]
+    fastest = max(large, key=lambda index: speed[index]) if large else None
+    found = []
+    for index, end in _ends(family):
+        lean, steer = points["lean"][index], points["steer"][index]
+        if end == "flat":
+            name, angles = ("E", (np.pi / 2, np.pi)) if lean > 0 else ("F", (-np.pi / 2, 0.0))
+            found.append(NamedPoint(name, end, np.pi / 2, *angles, True, index == 0))
+        elif end == "large circle" and not solved:
+            letter = "B" if steer < np.pi / 2 else "C"
+            name = letter if index == fastest else ""
+            found.append(NamedPoint(name, end, float(speed[index]), lean, steer, True, index == 0))
+    return tuple(found)
+
+
+def limits(drawn: Sequence[Curve]) -> list[NamedPoint]:
+    """What all curves tend to, each once."""
+    found: dict[tuple, NamedPoint] = {}
+    for point in (limit for curve in drawn for limit in curve.limits):
+        found.setdefault((point.name, round(point.speed, 6), round(point.lean, 6)), point)
+    return list(found.values())
+
+
+def named_points(families: Sequence[Mapping[str, Any]], front_radius: float) -> list[NamedPoint]:
+    """Points with the paper's letters; those that lie on one another share a label, as G and H do."""
+    found: dict[tuple, NamedPoint] = {}
+    for family in families:
+        for name, point in family["special_points"].items():
+            if len(name) != 1:
+                continue
+            speed = float(scaled_speed(point["front_rate"], front_radius))
+            key = (point["kind"], round(point["lean"], 6), round(point["steer"], 6))
+            both = sorted({name, *(found[key].name if key in found else "")} - set(" ()"))
+            label = both[0] + "".join(f" ({other})" for other in both[1:])
+            found[key] = NamedPoint(label, point["kind"], speed, point["lean"], point["steer"], False)
+    return list(found.values())

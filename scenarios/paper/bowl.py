@@ -1,0 +1,188 @@
+"""Section 3.3: how the families change with the bowl, up to alpha = 1/5."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from reference.circular import REAR_SPEED, STEER
+from reference.families import FAMILIES
+from reference.special import SpecialPoint
+from reports.paper.ledger import Check, Line, words
+
+from .evidence import Evidence
+from .named import front_rate
+from .profile import abscissa, apart, figure_coordinates, nearest
+
+_PLANE, _SMALL, _AFTER, _DEEP = 0.0, 0.005, 0.05, 0.2
+_ALIKE = 0.2  # rad: curves of the paper's figures, pi/2 wide and pi high, that one would call alike
+_LITTLE = 0.02  # rad: a hundredth of them
+_NEAR = (1e-2, 1e-3)  # of alpha, before the touching point
+_FINE = 0.02  # step of the arc where two curves are near
+
+
+def bowl_lines(evidence: Evidence) -> Iterator[Line]:
+    """Lines on section 3.3."""
+    yield from _small_curvature(evidence)
+    yield from _collision(evidence)
+    yield from _split(evidence)
+    yield _role(evidence)
+
+
+def profiles(evidence: Evidence, one: float, other: float, numbers: tuple[int, ...]) -> list[float]:
+    """Largest distance between the curves of each family at two alphas, in the figures' coordinates [rad]."""
+
+    def compute(number: int) -> float:
+        curves = (figure_coordinates(evidence.bicycle, evidence.samples(alpha, number)) for alpha in (one, other))
+        return apart(*curves)
+
+    return [evidence.once(("profiles", number, one, other), lambda n=number: compute(n)) for number in numbers]
+
+
+def _numbers(values: list[float]) -> str:
+    return ", ".join(f"{value:.3f}" for value in values)
+
+
+def _alike(evidence: Evidence, claim: str, one: float, other: float, numbers: tuple[int, ...]) -> Line:
+    """Curves are alike if they end alike and lie near each other in the paper's figures."""
+    apart_by = profiles(evidence, one, other, numbers)
+    ends = all(evidence.family(one, n).ends == evidence.family(other, n).ends for n in numbers)
+    what = f"families {', '.join(map(str, numbers))}"
+    return words(
+        *("3.3", claim, ends and max(apart_by) < _ALIKE),
+        f"{what}: the curves are nowhere further apart than {_numbers(apart_by)} rad in the figures' coordinates and "
+        f"end {'alike' if ends else 'differently'}; a fifth of a radian counts as alike",
+        [evidence.residual((one, other))],
+    )
+
+
+def _small_curvature(evidence: Evidence) -> Iterator[Line]:
+    found = evidence.found(_SMALL)
+    static, pivoting = len(found.static), len(found.pivoting)
+    whole = [evidence.residual((_PLANE, _SMALL))]
+    text = f"a grid of starts finds {static} static equilibrium and {pivoting} pivoting motion"
+    claim = "at alpha = 1/200 there is one static equilibrium A and one pivoting motion"
+    yield words("3.3", claim, (static, pivoting) == (1, 1), text, whole)
+    ends = [evidence.family(_SMALL, number).points[0].unknowns for number in (3, 4)]
+    off = float(np.abs(np.abs(ends[0]) - np.abs(ends[1])).max())
+    yield words(
+        *("3.3", "at alpha = 1/200 G of family 3 and H of family 4 are one motion", off < 1e-12),
+        *(f"their constants differ by {off:.0e}", [_pivots(ends)]),
+    )
+    before = evidence.found(_PLANE)
+    changes = [abs(float(found.static[0][STEER] - before.static[0][STEER]))]
+    changes += [abs(float(found.pivoting[0][k] - before.pivoting[0][k])) for k in (3, STEER)]
+    rates = [abs(front_rate(one.pivoting[0])) for one in (before, found)]
+    changes.append(float(np.ptp(abscissa(evidence.bicycle, np.array(rates)))))
+    yield words(
+        *("3.3", "at alpha = 1/200 A and G have changed little from the plane", max(changes) < _LITTLE),
+        f"A: steer by {changes[0]:.4f} rad; G: lean by {changes[1]:.5f}, steer by {changes[2]:.5f}, front rate from "
+        f"{rates[0]:.4f} to {rates[1]:.4f}: all within {_LITTLE} rad in the figure",
+        whole,
+    )
+    yield _alike(evidence, "at alpha = 1/200 the curves are very similar to the plane's", _PLANE, _SMALL, FAMILIES)
+
+
+def _pivots(ends: list[np.ndarray]) -> Check:
+    spin = max(abs(float(u[REAR_SPEED])) for u in ends)
+    return Check("largest rear speed of G and H", spin, 1e-12)
+
+
+def _cusps(evidence: Evidence, alpha: float) -> tuple[SpecialPoint, SpecialPoint] | None:
+    both = evidence.special(alpha, 2, "D", _FINE), evidence.special(alpha, 4, "I", _FINE)
+    return both if both[0] is not None and both[1] is not None else None  # type: ignore[return-value]
+
+
+def _between(evidence: Evidence, alpha: float) -> np.ndarray:
+    """From I to D in the figures' coordinates [rad]."""
+    both = _cusps(evidence, alpha)
+    if both is None:
+        return np.full(3, np.nan)
+    rows = [[abscissa(evidence.bicycle, point.front_rate), point.lean, point.steer] for point in both]
+    return np.subtract(*np.array(rows, float))
+
+
+def _collision(evidence: Evidence) -> Iterator[Line]:
+    touch = evidence.touching((2, 4))
+    if touch is None:
+        yield words("3.3", "cusps D and I merge at a right value of alpha", False, "no touching point is found", [])
+        return
+    near = [float(np.linalg.norm(_between(evidence, touch.alpha * (1 - share)))) for share in _NEAR]
+    # The distance of two turning points that merge falls like the root of what alpha is short of it.
+    order = float(np.log(near[0] / near[1]) / np.log(_NEAR[0] / _NEAR[1]))
+    after = _cusps(evidence, touch.alpha * (1 + _NEAR[0]))
+    touching = [
+        Check("residual of the touching point's 44 equations", touch.residual, 1e-12),
+        Check("how far the order of D's approach to I is from 1/2", abs(order - 0.5), 0.01),
+    ]
+    yield words(
+        *("3.3", "at a right value of alpha cusp D of family 2 and cusp I of family 4 merge", after is None),
+        f"alpha = {touch.alpha:.11f}, lean {touch.motion.lean:.6f}, steer {touch.motion.steer:.6f}; below, D and I are "
+        f"apart like its root (order {order:.4f}); above, there are none",
+        touching,
+    )
+    alphas = [_PLANE, _SMALL, 0.01, 0.015]
+    distances = [float(np.linalg.norm(_between(evidence, alpha))) for alpha in alphas]
+    yield words(
+        *(
+            "3.3",
+            "before that alpha families 2 and 4 approach each other as alpha grows",
+            bool(np.all(np.diff(distances) < 0)),
+        ),
+        f"D and I are {_numbers(distances)} rad apart at alpha = 0, 0.005, 0.01, 0.015",
+        touching,
+    )
+    yield _separation(evidence, touching)
+
+
+def _separation(evidence: Evidence, touching: list[Check]) -> Line:
+    gaps, direction = [], np.zeros(3)
+    for alpha in (_AFTER, 0.03, 0.02):
+        one, other = (figure_coordinates(evidence.bicycle, evidence.samples(alpha, number)) for number in (2, 4))
+        distances, feet = nearest(one, other)
+        i = int(distances.argmin())
+        gaps.append(float(distances[i]))
+        direction = one[i] - feet[i]
+    before = _between(evidence, 0.015)
+    angle = float(np.degrees(np.arccos(abs(direction @ before) / np.linalg.norm(direction) / np.linalg.norm(before))))
+    return words(
+        *("3.3", "beyond that alpha they separate in another direction", gaps[0] > gaps[1] > gaps[2] and angle > 45),
+        f"their least distance is {_numbers(gaps[::-1])} rad at alpha = 0.02, 0.03, 0.05; at 0.02 across the line from "
+        f"D to I before, at {angle:.0f} degrees to it",
+        touching,
+    )
+
+
+def _split(evidence: Evidence) -> Iterator[Line]:
+    ends = {alpha: {n: evidence.family(alpha, n).ends for n in (2, 4)} for alpha in (_SMALL, _AFTER)}
+    old, new = ends[_SMALL], ends[_AFTER]
+    exchanged = old[2][0] == new[4][1] and old[4][1] == new[2][0] and old != new
+    whole = [evidence.residual((_SMALL, _AFTER))]
+    yield words(
+        *("3.3", "collision and split: families 2 and 4 take new profiles by alpha = 1/20", exchanged),
+        f"they have exchanged an end: 2 ran to a {old[2][0]}, runs to a {new[2][0]}; 4 ran to a {old[4][1]}, runs to a "
+        f"{new[4][1]}",
+        whole,
+    )
+    claim = "at alpha = 1/20 the profiles of families 1 and 3 have changed little from the plane"
+    yield _alike(evidence, claim, _PLANE, _AFTER, (1, 3))
+    gone = evidence.special(_AFTER, 2, "D") is None and evidence.special(_AFTER, 4, "I") is None
+    at = [evidence.special(_SMALL, 2, "D"), evidence.special(_SMALL, 4, "I")]
+    claim = "at alpha = 1/20 the cusps D and I have disappeared"
+    text = "neither is found; both are at 1/200" if gone else "one is still there"
+    yield words("3.3", claim, gone and None not in at, text, whole)
+    claim = "at alpha = 1/5 the curves are very similar to those at 1/20"
+    yield _alike(evidence, claim, _AFTER, _DEEP, FAMILIES)
+
+
+def _role(evidence: Evidence) -> Line:
+    touches = [touch for pair in ((2, 4), (1, 3)) if (touch := evidence.touching(pair)) is not None]
+    text = "; ".join(f"{' and '.join(map(str, t.families))} touch at alpha = {t.alpha:.11f}" for t in touches)
+    return words(
+        *("1", "the surface parameter merges and separates families", len(touches) > 0),
+        *(
+            text,
+            [Check("largest residual of the 44 equations", max((t.residual for t in touches), default=np.inf), 1e-12)],
+        ),
+    )

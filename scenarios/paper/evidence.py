@@ -1,0 +1,119 @@
+"""What the ledger measures with: families, their samples and special points, each computed once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import numpy as np
+
+from reference.bicycle import Bicycle
+from reference.circular import LARGEST_RESIDUAL, SIGMA, CircularMotion, Steady
+from reference.critical import CriticalPoint, reconnections
+from reference.curve import Samples
+from reference.families import FAMILIES, Family, motions, trace
+from reference.sections import SectionEnd, sample_family, stable_sections
+from reference.special import SpecialPoint, special_points
+from reference.surface import Paraboloid
+from reports.paper import printed
+from reports.paper.ledger import Check
+
+from .search import Found, search
+
+LONGEST_STEP = 0.05  # of the arc: some 100 to 300 points a family, no stable section known is shorter than three
+OTHER_STEP = 0.03  # a second tracing, whose points lie elsewhere: what it finds tells the error of the first
+LARGEST_TOUCHING = 0.4  # alpha up to which touching points are looked for: two are known below
+
+Thing = TypeVar("Thing")
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Measurements shared by the ledger's lines.
+
+    Attributes
+    ----------
+    figures : mapping
+        The printed figures, see `reports.paper.printed`.
+    bicycle : Bicycle
+    """
+
+    figures: Mapping[str, Any] = field(default_factory=printed)
+    bicycle: Bicycle = field(default_factory=Bicycle)
+    _known: dict[tuple, Any] = field(default_factory=dict, repr=False)
+
+    def once(self, key: tuple, compute: Callable[[], Thing]) -> Thing:
+        """What is known by a key, computed the first time."""
+        if key not in self._known:
+            self._known[key] = compute()
+        return self._known[key]
+
+    @property
+    def cases(self) -> tuple[float, ...]:
+        """The paper's five alphas."""
+        return tuple(self.figures["cases"])
+
+    def family(self, alpha: float, number: int, longest: float = LONGEST_STEP) -> Family:
+        """A family from end to end."""
+        return self.once(
+            ("family", number, "alpha", alpha, "step", longest),
+            lambda: trace(self.bicycle, Paraboloid(alpha), number, longest),
+        )
+
+    def samples(self, alpha: float, number: int) -> Samples:
+        """All its points."""
+        return self.once(("points", number, "alpha", alpha), lambda: sample_family(self.family(alpha, number)))
+
+    def sections(self, alpha: float, number: int, longest: float = LONGEST_STEP) -> list[tuple[SectionEnd, SectionEnd]]:
+        """Its stable sections."""
+        return self.once(
+            ("stable sections", number, "alpha", alpha, "step", longest),
+            lambda: stable_sections(self.family(alpha, number, longest)),
+        )
+
+    def special(self, alpha: float, number: int, name: str, longest: float = LONGEST_STEP) -> SpecialPoint | None:
+        """A special point of it by name; None where there is none."""
+        points = self.once(
+            ("special points", number, "alpha", alpha, "step", longest),
+            lambda: special_points(self.family(alpha, number, longest)),
+        )
+        return next((point for point in points if point.name == name), None)
+
+    def found(self, alpha: float) -> Found:
+        """Static equilibria, pivoting motions and whole curves, from a grid of starts."""
+        return self.once(("search", "alpha", alpha), lambda: search(Steady(self.bicycle, Paraboloid(alpha))))
+
+    def motions(self, alpha: float, number: int, rear_rate: float) -> list[CircularMotion]:
+        """Motions of a family at a rear rate."""
+        return self.once(
+            ("motions", number, "alpha", alpha, "rear rate", rear_rate),
+            lambda: motions(self.bicycle, Paraboloid(alpha), number, rear_rate),
+        )
+
+    def touching(self, families: tuple[int, int]) -> CriticalPoint | None:
+        """Where two families exchange parts."""
+        points = self.once(("touching points",), lambda: reconnections(self.bicycle, largest=LARGEST_TOUCHING))
+        return next((point for point in points if point.families == families), None)
+
+    def residual(self, alphas: tuple[float, ...] | None = None) -> Check:
+        """Largest residual of the full equations over all points of all families.
+
+        The families are solved from eight reduced equations: the full ones are another form of them.
+        """
+        alphas = self.cases if alphas is None else alphas
+        worst = max(self._residual(alpha, number) for alpha in alphas for number in FAMILIES)
+        return Check("largest residual of the 21 equations along the families", worst, LARGEST_RESIDUAL)
+
+    def _residual(self, alpha: float, number: int) -> float:
+        family = self.family(alpha, number)
+        return self.once(
+            ("residual", number, "alpha", alpha),
+            lambda: max(_relative_residual(family.equations, point.unknowns) for point in family.points),
+        )
+
+
+def _relative_residual(equations: Steady, unknowns: np.ndarray) -> float:
+    # Rows are of order one but for heights on large circles and forces at high speeds.
+    size = 1 + float(np.abs(unknowns).max()) + abs(float(unknowns[SIGMA]))
+    return float(np.abs(equations.residual(unknowns)).max()) / size

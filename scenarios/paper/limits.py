@@ -1,0 +1,78 @@
+"""Limits of flat bicycles: families followed on towards a lean of +-pi/2, at fixed leans."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from reference.circular import LEAN, REAR_SPEED, SIGMA, STEER, Steady, newton, unknown_condition
+from reference.kernels.steady import SIGMA_UNIT
+
+_NEAREST = 2e-3  # rad from +-pi/2: nearer, forces are so large that their round-off reaches the other rows
+_MOST = 40
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The last of a sequence of motions whose leans' distances from +-pi/2 halve.
+
+    Attributes
+    ----------
+    distance : float
+        Of the lean from its limit [rad].
+    front_rate : float
+        [rad/s].
+    rate_exponent, steer_exponent : float
+        Of the powers of the distance that the front rate and the steer's distance from its limit follow.
+    steer : float
+        Its limit, extrapolated from the last three [rad].
+    radius : float
+        Of D's circle [m].
+    residual : float
+        Largest of the equations on the way, relative to the largest force.
+    """
+
+    distance: float
+    front_rate: float
+    rate_exponent: float
+    steer_exponent: float
+    steer: float
+    radius: float
+    residual: float
+
+
+def limit(equations: Steady, ends: Sequence[np.ndarray], side: int) -> Limit:
+    """Follow the flat one of a curve's two ends (22,) towards a lean of pi/2 (side 1) or -pi/2 (side -1).
+
+    Raises
+    ------
+    ValueError
+        If neither end is flat to that side, or Newton's method fails on the way.
+    """
+    unknowns = max(ends, key=lambda u: side * u[LEAN])
+    distance = np.pi / 2 - side * unknowns[LEAN]
+    if distance > 1:
+        raise ValueError("the curve has no flat end there")
+    rows, residual = [], 0.0
+    while distance > _NEAREST or len(rows) < 3:
+        distance /= 2
+        condition = unknown_condition(LEAN, side * (np.pi / 2 - distance))
+        unknowns, _ = newton(equations, unknowns, condition, most=_MOST)
+        off = float(np.abs(equations.residual(unknowns)).max())
+        residual = max(residual, off / (1 + float(np.abs(unknowns).max())))
+        speed = np.sqrt(SIGMA_UNIT * unknowns[SIGMA]) * np.sign(unknowns[REAR_SPEED])
+        rows.append((distance, float(speed * unknowns[8]), float(unknowns[STEER]), float(np.hypot(*unknowns[:2]))))
+    (_, _, s0, _), (_, r1, s1, _), (d2, r2, s2, radius) = rows[-3:]
+    # Halving: an error of the first order leaves half of itself.
+    steer = 2 * s2 - s1
+    return Limit(
+        distance=d2,
+        front_rate=r2,
+        rate_exponent=float(np.log2(abs(r1 / r2))),
+        steer_exponent=float(np.log2(abs((s0 - s1) / (s1 - s2)))),
+        steer=steer,
+        radius=radius,
+        residual=residual,
+    )

@@ -1,0 +1,206 @@
+"""Section 3.2: the plane, its named points and limits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from reference.circular import FRONT_SPEED, LEAN, REAR_SPEED, SIGMA, STEER
+from reference.families import FAMILIES, Family, front_rate_slope
+from reference.kernels.steady import SIGMA_UNIT
+from reference.special import SpecialPoint
+from reports.paper.ledger import Check, Line, count, figure, untestable, words
+
+from .evidence import LONGEST_STEP, OTHER_STEP, Evidence
+from .limits import limit
+from .model import model_check
+
+_SLOPE = 0.002  # of what a power law's exponent may be off by at the last lean: its correction is of the lean's size
+_LEVEL = 0.0
+_ROUND_OFF = 1e-14  # of numbers of order ten
+_BEYOND_CUSP = 0.1  # rad/s beyond the cusp D: where a front rate has several motions
+
+
+def plane_lines(evidence: Evidence) -> Iterator[Line]:
+    """Lines on section 3.2."""
+    yield from _four_families(evidence)
+    yield _ranges(evidence)
+    yield from _first(evidence)
+    yield from _second(evidence)
+    yield from _third(evidence)
+
+
+def point(evidence: Evidence, family: int, name: str) -> tuple[SpecialPoint, dict[str, float]]:
+    """A special point on the plane and its error: how far it is from the same found in another way.
+
+    The other way is a second tracing; A and G, which end a curve, are solved from a grid of starts too.
+    """
+    one, other = (evidence.special(_LEVEL, family, name, step) for step in (LONGEST_STEP, OTHER_STEP))
+    if one is None or other is None:
+        raise ValueError(f"point {name} is not found on family {family}")
+    names = ("lean", "steer", "front_rate", "rear_rate")
+    error = {field: abs(getattr(one, field) - getattr(other, field)) for field in names}
+    found = evidence.found(_LEVEL)
+    for alone in {"A": found.static, "G": found.pivoting}.get(name, []):
+        rate = abs(front_rate(alone)) - abs(one.front_rate)
+        for field, off in (("lean", alone[LEAN] - one.lean), ("steer", alone[STEER] - one.steer), ("front_rate", rate)):
+            error[field] = max(error[field], abs(float(off)))
+    return one, {field: off + _ROUND_OFF for field, off in error.items()}
+
+
+def _four_families(evidence: Evidence) -> Iterator[Line]:
+    found, printed = evidence.found(_LEVEL), evidence.figures["counts"]["families"]
+    whole = [evidence.residual((_LEVEL,))]
+    text = f"{len(found.curves)} curves from a grid of starts, one through a pivoting motion: {found.families} families"
+    yield count("3.2", "on the plane there are four families", printed, found.families, text, whole)
+    three, text = len(found.curves), f"{len(found.curves)} whole curves: 3 and 4 are one, through the pivoting motion"
+    yield count(
+        "1", "two of the four can be merged, leaving three (Basu-Mandal et al.)", printed - 1, three, text, whole
+    )
+    yield untestable("3.2", "their families, drawn as black dots, lie on ours", "the text lacks the dots", "number")
+
+
+def _ranges(evidence: Evidence) -> Line:
+    steers = np.concatenate([evidence.samples(_LEVEL, number).steer for number in FAMILIES])
+    rates = np.concatenate([evidence.samples(_LEVEL, number).rear_rate for number in FAMILIES])
+    inside = steers.min() >= 0 and steers.max() <= np.pi and rates.min() >= -1e-9
+    return words(
+        *("3.2", "all four lie within a rear rate >= 0 and a steer in [0, pi]", bool(inside)),
+        f"steers from {steers.min():.4f} to {steers.max():.4f}, rear rates to {rates.max():.0f} where they are cut off",
+        [evidence.residual()],
+    )
+
+
+def _first(evidence: Evidence) -> Iterator[Line]:
+    printed, samples = evidence.figures, evidence.samples(_LEVEL, 1)
+    steer = float(samples.steer.max())
+    claim = "family 1 keeps its steer below pi/2"
+    yield words("3.2", claim, steer < np.pi / 2, f"largest steer {steer:.5f}, at A", [evidence.residual()])
+    static, error = point(evidence, 1, "A")
+    yield figure("3.2", "A: steer", printed["A"]["steer"], static.steer, error["steer"])
+    rest = max(abs(static.rear_rate), abs(static.front_rate))
+    # The squared speed is zero to round-off: the speed to its root.
+    claim = "A is a static equilibrium"
+    yield words("3.2", claim, rest < 1e-6, f"wheel rates {rest:.0e}, lean {static.lean:.0e}", [evidence.residual()])
+    yield from _straight(evidence, 1, "B")
+    speed = point(evidence, 1, "B")[0].rear_rate * evidence.bicycle.rear_wheel_radius
+    off = abs(speed - float(printed["meijaard"]["capsize_speed"]))
+    yield words(
+        *("3.2", "B is the limit speed of upright straight motion", off < 1e-12),
+        f"{speed:.14f} m/s, the published capsize speed to {off:.0e}",
+        [evidence.residual()],
+    )
+
+
+def _straight(evidence: Evidence, number: int, name: str) -> Iterator[Line]:
+    """The straight motion that large circles tend to: their front rate is off by a constant over R^2."""
+    straight, error = point(evidence, number, name)
+    samples = evidence.samples(_LEVEL, number)
+    far = np.argsort(samples.radius)[[-1, -5]]
+    weights = samples.radius[far] ** 2
+    limit_rate = float((weights * samples.front_rate[far]) @ [1, -1] / (weights @ [1, -1]))
+    independent = Check("against the limit of large circles", abs(limit_rate - straight.front_rate), 1e-6)
+    printed = evidence.figures[name]["front_rate"]
+    claim = f"{name}: front rate"
+    yield figure("3.2", claim, printed, straight.front_rate, error["front_rate"] + 1e-12, [independent])
+    turned = "reversed, steer pi" if number == 2 else "straight ahead"
+    angles = np.stack([samples.lean, samples.steer - straight.steer])[:, far] * samples.radius[far]
+    # Lean and steer are odd in the curvature 1/R: what they miss of their first order falls like 1/R^3.
+    kept = float(np.abs(angles[:, 0] / angles[:, 1] - 1).max())
+    yield words(
+        *("3.2", f"{name} is upright straight motion, handlebar {turned}", kept < 1e-4),
+        f"the lean and the steer's distance from it fall like {abs(angles[0, 0]):.4f} m / R and "
+        f"{abs(angles[1, 0]):.4f} m / R, to within {kept:.0e} on circles of {samples.radius[far[1]]:.0f} to "
+        f"{samples.radius[far[0]]:.0f} m",
+        [independent],
+    )
+
+
+def _second(evidence: Evidence) -> Iterator[Line]:
+    printed, samples = evidence.figures["D"], evidence.samples(_LEVEL, 2)
+    least, fastest = float(samples.steer.min()), float(samples.front_rate.max())
+    whole = [evidence.residual()]
+    yield words("3.2", "family 2 keeps its steer above pi/2", least > np.pi / 2, f"least steer {least:.4f}", whole)
+    text = f"largest front rate {fastest:.4f}"
+    yield words("3.2", "front rates of family 2 are always negative", fastest < 0, text, whole)
+    yield from _straight(evidence, 2, "C")
+    cusp, error = point(evidence, 2, "D")
+    for name, what in (("lean", "lean"), ("steer", "steer"), ("front_rate", "front rate")):
+        yield figure("3.2", f"D: {what}", printed[name], getattr(cusp, name), error[name])
+    rate = cusp.front_rate - _BEYOND_CUSP
+    crossings = int(np.sum(np.diff(np.sign(samples.front_rate - rate)) != 0))
+    yield words(
+        *("3.2", "around the cusp D lean and steer take several values at a front rate", crossings >= 2),
+        *(f"{crossings} motions of family 2 at {rate:.4f}; none of that branch above {cusp.front_rate:.4f}", whole),
+    )
+    yield _limit_line(evidence.family(_LEVEL, 2), "E", 1, np.pi, -1)
+
+
+def _third(evidence: Evidence) -> Iterator[Line]:
+    printed, family = evidence.figures["G"], evidence.family(_LEVEL, 3)
+    pivot, error = point(evidence, 3, "G")
+    for name, what in (("lean", "lean"), ("steer", "steer")):
+        yield figure("3.2", f"G: {what}", printed[name], getattr(pivot, name), error[name])
+    yield figure("3.2", "G: front rate", printed["front_rate"], abs(pivot.front_rate), error["front_rate"])
+    start = evidence.found(_LEVEL).pivoting[0]
+    contact = float(np.hypot(*start[10:12]))
+    yield words(
+        *("3.2", "G turns about a vertical axis through the rear wheel's contact point", contact < 1e-12),
+        *(f"the contact point is {contact:.0e} m from the axis", [evidence.residual()]),
+    )
+    spin = abs(float(start[REAR_SPEED]))
+    yield words(
+        *("3.2", "at G the rear rate is nearly zero", spin < 1e-12),
+        *(f"it is exactly zero: {spin:.0e}", [evidence.residual()]),
+    )
+    yield _limit_line(family, "F", -1, 0.0, 1)
+    yield _monotone(evidence, family)
+    yield _agreement(evidence)
+
+
+def _monotone(evidence: Evidence, family: Family) -> Line:
+    """The tangents tell: no point where the front rate, the lean or the steer turns back."""
+    slopes = np.array([[front_rate_slope(p), p.tangent[LEAN], p.tangent[STEER]] for p in family.points])
+    # At the pivot itself a sign of the direction that is followed; all three must keep theirs.
+    signs = np.sign(slopes)
+    falling = np.all(signs[:, 0] == -signs[:, 1]) and np.all(signs[:, 0] == -signs[:, 2])
+    return words(
+        *("3.2", "on family 3 lean and steer fall monotonically with the front rate", bool(falling)),
+        f"at all {len(slopes)} points their derivatives by the front rate are negative; the least size of the front "
+        f"rate's slope is {np.abs(slopes[:, 0]).min():.1e}",
+        [evidence.residual()],
+    )
+
+
+def _limit_line(family: Family, name: str, side: int, steer: float, sign: int) -> Line:
+    """E and F: the curve followed on at fixed leans, whose distances from +-pi/2 halve."""
+    far = limit(family.equations, [family.points[k].unknowns for k in (0, -1)], side)
+    rates = abs(far.rate_exponent + 0.5)
+    angles = abs(far.steer_exponent - 1)
+    holds = rates < _SLOPE and angles < _SLOPE and np.sign(far.front_rate) == sign and abs(far.steer - steer) < 1e-5
+    infinity = "-infinity" if sign < 0 else "infinity"
+    corner = f"({'pi/2' if side > 0 else '-pi/2'}, {'pi' if steer else '0'}, {infinity})"
+    return words(
+        *("3.2", f"{name} is a limit: lean, steer and front rate tend to {corner}", bool(holds)),
+        f"with the lean's distance d from it down to {far.distance:.1e} the front rate grows like "
+        f"d^{far.rate_exponent:.4f}, to {far.front_rate:.0f}, and the steer's distance falls like "
+        f"d^{far.steer_exponent:.4f}; extrapolated steer {far.steer:.6f}, circle of D {far.radius:.4f} m",
+        [Check("largest residual on the way, relative", far.residual, 1e-12)],
+    )
+
+
+def _agreement(evidence: Evidence) -> Line:
+    model = model_check(evidence.bicycle, evidence.figures)
+    return words(
+        *("3.2", "the model agrees with Basu-Mandal et al.", model.passes),
+        f"accelerations of their Table 1 differ by {model.value:.0e}",
+        [model],
+        "number",
+    )
+
+
+def front_rate(unknowns: np.ndarray) -> float:
+    """Front rate of a solution, run so that the rear wheel rolls forward [rad/s]."""
+    speed = np.sqrt(SIGMA_UNIT * max(unknowns[SIGMA], 0.0))
+    return float(speed * unknowns[FRONT_SPEED] * np.sign(unknowns[REAR_SPEED]))

@@ -1,0 +1,101 @@
+"""Section 3.1: what is constant, what periodic on a circular motion; the mirrored one; contact circles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from reference.circular import CONTACT
+from reference.contact import observe
+from reference.families import FAMILIES
+from reference.kinematics import FRONT_ANGLE, LEAN, PITCH, REAR_ANGLE, STEER, YAW
+from reference.simulate import simulate
+from reference.surface import Paraboloid
+from reports.paper.ledger import Check, Line, words
+
+from .evidence import Evidence
+from .search import mirrored
+
+_STEADY = (LEAN, PITCH, STEER)
+_TURNS = 1.0
+# The precise integrator leaves some 1e-12 a turn, which the unstable Q1 multiplies by exp(0.38 x 8) = 22.
+_KEPT = 1e-9
+
+
+def orbit_lines(evidence: Evidence) -> Iterator[Line]:
+    """Lines on Eqs. 9-11 and the symmetry of left and right."""
+    constant, sinus, normal, turning = 0.0, 0.0, 0.0, np.inf
+    for name in ("Q1", "Q2"):
+        one = _one_turn(evidence, name)
+        constant, sinus = max(constant, one[0]), max(sinus, one[1])
+        normal, turning = max(normal, one[2]), min(turning, one[3])
+    integrated = Check("largest departure of what is constant", constant, _KEPT)
+    yield words(
+        *(
+            "3.1",
+            "z, lean, pitch, steer, wheel rates and rim angles are constant on a circular motion",
+            constant < _KEPT,
+        ),
+        *(f"over a turn of Q1 and of Q2, integrated, they change by at most {constant:.0e}", [integrated]),
+    )
+    yield words(
+        *("3.1", "x and y vary sinusoidally, the heading grows linearly", sinus < _KEPT),
+        *(f"over a turn of Q1 and of Q2 the largest departure is {sinus:.0e}", [integrated]),
+    )
+    yield words(
+        *("3.1", "normal multipliers are constant, the others periodic", normal < 1e-7 and turning > 1),
+        f"over a turn normal forces change by {normal:.0e} N, horizontal ones turn with the heading by {turning:.0f} N",
+        [integrated],
+    )
+    yield _circles(evidence)
+    yield _mirror(evidence)
+
+
+def _one_turn(evidence: Evidence, name: str) -> tuple[float, float, float, float]:
+    """Change of constants, departure from the sinusoid [m, rad], change of normal forces, of others [N]."""
+    point = evidence.figures[name]
+    surface = Paraboloid(point["alpha"])
+    motion = evidence.motions(point["alpha"], point["family"], float(point["v"][-1]))[0]
+    times = np.linspace(0, _TURNS * 2 * np.pi / abs(motion.yaw_rate), 101)
+    ride = simulate(evidence.bicycle, surface, *motion.state(), times)
+    still = np.column_stack([ride.q[:, [2, *_STEADY]], ride.qd[:, [REAR_ANGLE, FRONT_ANGLE]], ride.contact[:, :, 2]])
+    angle = motion.yaw_rate * ride.time
+    x, y = motion.position[:2]
+    circle = np.column_stack([np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, angle])
+    seen = observe(evidence.bicycle, surface, ride.q, ride.qd)
+    normal = np.einsum("nwi,nwi->nw", ride.force, seen.normal)
+    return (
+        float(np.ptp(still, axis=0).max()),
+        float(np.abs(ride.q[:, [0, 1, YAW]] - circle).max()),
+        float(np.ptp(normal, axis=0).max()),
+        float(np.ptp(ride.force[:, :, 0], axis=0).min()),
+    )
+
+
+def _circles(evidence: Evidence) -> Line:
+    least = np.inf
+    for alpha in evidence.cases:
+        for number in FAMILIES:
+            u = np.array([point.unknowns[CONTACT] for point in evidence.family(alpha, number).points])
+            least = min(least, float((np.hypot(u[:, 3], u[:, 4]) - np.hypot(u[:, 0], u[:, 1])).min()))
+    return words(
+        *("3.1", "the wheels' contact points run on two different circles", least > 0),
+        f"along all families the front wheel's is the larger, by {least:.1e} m at least (on the largest circles)",
+        [evidence.residual()],
+    )
+
+
+def _mirror(evidence: Evidence) -> Line:
+    worst = 0.0
+    for alpha in evidence.cases:
+        for number in FAMILIES:
+            family = evidence.family(alpha, number)
+            for point in family.points[::20]:
+                here, there = point.unknowns, mirrored(point.unknowns)
+                change = np.abs(family.equations.residual(there)).max() - np.abs(family.equations.residual(here)).max()
+                worst = max(worst, float(change) / (1 + float(np.abs(here).max())))
+    return words(
+        *("3.2", "left and right are alike: a steer in [0, pi] is enough", worst < 1e-12),
+        *(f"mirrored motions solve the equations too: residual greater by {worst:.0e}", [evidence.residual()]),
+    )

@@ -1,0 +1,110 @@
+"""Section 4.2: the points Q1 and Q2, their spectra, and what they say of D."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from reference.circular import CircularMotion
+from reference.kinematics import rotations
+from reference.stability import Linearisation, linearise
+from reference.surface import Paraboloid
+from reports.paper.ledger import Check, Line, figure, untestable, words
+
+from .configurations import named_motion, own_errors
+from .evidence import Evidence
+
+_STATES = (("x", "D's x in the heading frame"), ("y", "D's y"), ("lean", "lean"), ("steer", "steer"))
+
+
+def point_lines(evidence: Evidence) -> Iterator[Line]:
+    """Lines on Q1 and Q2."""
+    for name in ("Q1", "Q2"):
+        motion, printed = named_motion(evidence, name), evidence.figures[name]
+        errors = own_errors(evidence, name, motion)
+        values = {"x": motion.position[0], "y": motion.position[1], "lean": motion.lean, "steer": motion.steer}
+        for (field, what), text in zip(_STATES, printed["v"], strict=False):
+            yield figure("4.2", f"{name}: {what}", text, float(values[field]), errors[field])
+        yield from _spectrum(evidence, name, motion)
+        why = "the text lacks the matrix; its eigenvalues are held above"
+        yield untestable("4.2", f"{name}: the 7 x 7 Jacobian as printed", why, "number")
+    yield from _meaning(evidence)
+
+
+def _spectrum(evidence: Evidence, name: str, motion: CircularMotion) -> Iterator[Line]:
+    surface = Paraboloid(evidence.figures[name]["alpha"])
+    reduced = linearise(evidence.bicycle, surface, *motion.state())
+    error = eigenvalue_errors(reduced)
+    for real, imaginary in evidence.figures[name]["eigenvalues"]:
+        target = complex(float(real), float(imaginary))
+        i = int(np.abs(reduced.eigenvalues - target).argmin())
+        value = complex(reduced.eigenvalues[i])
+        if target == 0:
+            text = f"smallest {abs(value):.0e}"
+            checks = [Check("its own error", float(error[i]), 1e-9)]
+            yield words("4.2", f"{name}: an eigenvalue is zero", abs(value) < 1e-9, text, checks, "number", "0")
+            continue
+        yield figure(
+            "4.2", f"{name}: eigenvalue {_complex(real, imaginary)}, real part", real, value.real, float(error[i])
+        )
+        if target.imag:
+            claim = f"{name}: eigenvalue {_complex(real, imaginary)}, imaginary part"
+            yield figure("4.2", claim, imaginary, abs(value.imag), float(error[i]))
+
+
+def _complex(real: str, imaginary: str) -> str:
+    return real if float(imaginary) == 0 else f"{real} +- {imaginary} i"
+
+
+def eigenvalue_errors(reduced: Linearisation) -> np.ndarray:
+    """What round-off of the Jacobian leaves of each eigenvalue: 1e-14 of its norm times the condition, shape (7,)."""
+    values, right = np.linalg.eig(reduced.jacobian)
+    left = np.linalg.inv(right)
+    condition = np.linalg.norm(right, axis=0) * np.linalg.norm(left, axis=1)
+    order = [int(np.abs(values - value).argmin()) for value in reduced.eigenvalues]
+    return 1e-14 * np.linalg.norm(reduced.jacobian) * condition[order]
+
+
+def _meaning(evidence: Evidence) -> Iterator[Line]:
+    for name, stable, forward in (("Q1", False, True), ("Q2", True, False)):
+        motion, point = named_motion(evidence, name), evidence.figures[name]
+        surface = Paraboloid(point["alpha"])
+        reduced = linearise(evidence.bicycle, surface, *motion.state())
+        rest = np.delete(reduced.eigenvalues, int(np.abs(reduced.eigenvalues).argmin()))
+        growth = float(np.real(rest).max())
+        field = Check("largest of X at the motion", float(np.abs(reduced.field).max()), 1e-9)
+        sense, bar = ("anticlockwise", "forward") if forward else ("clockwise", "reversed")
+        yield words(
+            *("4.2", f"{name} rides {sense}, handlebar {bar}"),
+            (motion.yaw_rate > 0) == forward and (motion.steer < np.pi / 2) == forward,
+            *(f"yaw rate {motion.yaw_rate:.4f}, steer {motion.steer:.4f}", [field]),
+        )
+        word = "Lyapunov stable, not asymptotically" if stable else "Lyapunov unstable"
+        yield words(
+            *("4.2", f"{name} is {word}", (growth < 0) == stable),
+            f"largest real part of the six other eigenvalues {growth:.6f}",
+            [field, Check("own error over its size", float(eigenvalue_errors(reduced).max()) / abs(growth), 1e-3)],
+            "stability",
+        )
+    yield _reference_point(evidence)
+
+
+def _reference_point(evidence: Evidence) -> Line:
+    """D at another height of the steering axis would give other x and y: how the printed ones tell."""
+    worst, other = 0.0, np.inf
+    for name in ("Q1", "Q2"):
+        motion, printed = named_motion(evidence, name), evidence.figures[name]["v"][:2]
+        off = np.abs(motion.position[:2] - [float(text) for text in printed])
+        worst = max(worst, float(off.max()))
+        # Up the steering axis to the height of the rear axle, in the heading frame.
+        q, _ = motion.state()
+        bicycle = evidence.bicycle
+        rise = (bicycle.rear_wheel_radius - bicycle.front_wheel_radius) / bicycle.steer_axis[2]
+        shift = rotations(bicycle, q[None])[0, 0] @ (rise * bicycle.steer_axis)
+        other = min(other, float(np.abs(motion.position[:2] + shift[:2] - [float(t) for t in printed]).max()))
+    return words(
+        *("2.1", "D is the point of the steering axis at the height of the front axle", worst <= 0.005 < other),
+        f"the printed x and y of Q1 and Q2 then agree to {worst:.4f} m, at the rear axle's height to {other:.4f} m",
+        [Check("largest residual", max(named_motion(evidence, n).residual for n in ("Q1", "Q2")), 1e-12)],
+    )

@@ -1,0 +1,252 @@
+"""Section 4.2, Figures 8 and 9: Q1 leaves its circle, a disturbed Q2 tends to a neighbouring one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from reference.bicycle import Bicycle
+from reference.circular import CircularMotion
+from reference.contact import observe
+from reference.dae import consistent_state
+from reference.kinematics import LEAN, REAR_ANGLE, STEER
+from reference.simulate import Motion, simulate, simulate_modified_euler
+from reference.stability import linearise
+from reference.surface import Paraboloid
+from reports.paper.ledger import Check, Line, words
+
+from .configurations import named_motion
+from .energy import motion_of_energy
+from .evidence import Evidence
+
+_OUTPUT = 0.05  # s
+_LEAVES = 0.01  # of the circle's radius
+_WATCHED = {"paper": 50.0, "exact": 100.0}  # s: the paper's integrator leaves after 36 s, the precise one after 76 s
+_GROWING = {"paper": (10.0, 25.0), "exact": (40.0, 65.0)}  # s: after what decays has, before it is no longer small
+_LONG, _LATE = 1200.0, 100.0  # s: exp(-0.0111 x 1200) = 2e-6
+_LONG_OUTPUT = 0.25
+_CLOSE = 0.1  # of the circle's radius
+_TOLERANCE = 1e-12
+_SLIGHT, _SETTLES = 1e-3, 400.0  # rad/s, s
+
+
+def ride_lines(evidence: Evidence) -> Iterator[Line]:
+    """Lines on the simulations of section 4.2, and on energy."""
+    yield from _unstable(evidence)
+    rides = {sign: _disturbed(evidence, sign) for sign in (1, -1)}
+    yield _energy(evidence, rides)
+    yield from _stable(evidence, rides)
+
+
+@dataclass(frozen=True)
+class Leaving:
+    """How an integration started on Q1 leaves its circle.
+
+    Attributes
+    ----------
+    at : float
+        When the distance from the axis is off by a hundredth; nan if never [s].
+    rate : float
+        Growth rate of the unstable mode's share [1/s].
+    """
+
+    at: float
+    rate: float
+
+
+def radius(ride: Motion) -> np.ndarray:
+    """Distance of D from the axis [m]."""
+    return np.hypot(ride.q[:, 0], ride.q[:, 1])
+
+
+def leaving_time(ride: Motion, circle: float) -> float:
+    """When the radius is first off by a hundredth, between two outputs as if it grew exponentially [s]."""
+    off = np.abs(radius(ride) - circle) / circle
+    beyond = np.flatnonzero(off > _LEAVES)
+    if len(beyond) == 0:
+        return float("nan")
+    i = int(beyond[0])
+    if i == 0:
+        return 0.0
+    share = np.log(_LEAVES / off[i - 1]) / np.log(off[i] / off[i - 1])
+    return float(ride.time[i - 1] + share * (ride.time[i] - ride.time[i - 1]))
+
+
+def _leave(evidence: Evidence, ride: Motion, motion: CircularMotion, window: tuple[float, float]) -> Leaving:
+    reduced = linearise(evidence.bicycle, Paraboloid(evidence.figures["Q1"]["alpha"]), *motion.state())
+    values, right = np.linalg.eig(reduced.jacobian)
+    unstable = np.real(np.linalg.inv(right)[int(np.real(values).argmax())])
+    share = np.abs((_reduced(ride.q, ride.qd) - _reduced(*(part[None] for part in motion.state()))) @ unstable)
+    chosen = (ride.time >= window[0]) & (ride.time <= window[1])
+    rate = float(np.polyfit(ride.time[chosen], np.log(share[chosen]), 1)[0]) if chosen.sum() > 2 else float("nan")
+    return Leaving(leaving_time(ride, float(np.hypot(*motion.position[:2]))), rate)
+
+
+def _reduced(q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+    """The reduced system's seven variables, shape (n, 7)."""
+    cosine, sine = np.cos(q[:, 3]), np.sin(q[:, 3])
+    x, y = cosine * q[:, 0] + sine * q[:, 1], -sine * q[:, 0] + cosine * q[:, 1]
+    return np.column_stack([x, y, q[:, [LEAN, STEER]], qd[:, [LEAN, STEER, REAR_ANGLE]]])
+
+
+def _unstable(evidence: Evidence) -> Iterator[Line]:
+    motion, surface = named_motion(evidence, "Q1"), Paraboloid(evidence.figures["Q1"]["alpha"])
+    step = evidence.figures["simulation"]["step"]
+    reduced = linearise(evidence.bicycle, surface, *motion.state())
+    growth = float(np.real(reduced.eigenvalues).max())
+
+    def integrate(how: str, h: float) -> Leaving:
+        times = np.arange(round(_WATCHED[how] / _OUTPUT) + 1) * _OUTPUT
+        start = (evidence.bicycle, surface, *motion.state(), times)
+        ride = simulate(*start) if how == "exact" else simulate_modified_euler(*start, h)
+        return _leave(evidence, ride, motion, _GROWING[how])
+
+    one, half, precise = integrate("paper", step), integrate("paper", step / 2), integrate("exact", 0.0)
+    # An error of order two shrinks by four when the step is halved: the ride leaves ln 4 / growth later.
+    delay, expected = half.at - one.at, np.log(4) / growth
+    grown = Check("growth rate of the precise ride, relative to the eigenvalue", abs(precise.rate / growth - 1), 1e-2)
+    yield words(
+        *("4.2", "even with just numerical errors Q1 does not keep its circle", bool(np.isfinite(one.at))),
+        f"started on Q1 to round-off, modified Euler at {step:g} s is off by 1 % of the radius at {one.at:.2f} s, at "
+        f"half the step {delay:.3f} s later (ln 4 / {growth:.5f} = {expected:.3f}: an error of order two that grows "
+        f"with the eigenvalue); the precise integrator at {precise.at:.2f} s, growing at {precise.rate:.5f} 1/s",
+        [grown, Check("delay at half the step, less the expected", abs(delay - expected), 0.02)],
+        "simulation",
+    )
+    yield _rounded_start(evidence, motion, surface, step)
+
+
+def _rounded_start(evidence: Evidence, motion: CircularMotion, surface: Paraboloid, step: float) -> Line:
+    """From v* as printed: rounding to two decimals outweighs the integrator's errors by far."""
+    v = [float(text) for text in evidence.figures["Q1"]["v"]]
+    guess = (float(motion.position[2]), motion.pitch)
+    start = consistent_state(evidence.bicycle, surface, (v[0], v[1]), v[2], v[3], (v[4], v[5], v[6]), guess=guess)
+    times = np.arange(401) * _OUTPUT
+    circle = float(np.hypot(*motion.position[:2]))
+    rides = [
+        simulate_modified_euler(evidence.bicycle, surface, *start, times, step),
+        simulate(evidence.bicycle, surface, *start, times),
+    ]
+    leaves = [leaving_time(ride, circle) for ride in rides]
+    return words(
+        *("4.2", "Q1, started from v* as printed, leaves its circle", bool(np.all(np.isfinite(leaves)))),
+        f"off by 1 % at {leaves[0]:.3f} s, by the precise integrator at {leaves[1]:.3f} s: here it is the two printed "
+        "decimals that matter, not the integrator",
+        [Check("integrators' difference", abs(leaves[0] - leaves[1]), 0.01)],
+        "simulation",
+    )
+
+
+def _disturbed(evidence: Evidence, sign: int) -> Motion:
+    def compute() -> Motion:
+        motion, surface = named_motion(evidence, "Q2"), Paraboloid(evidence.figures["Q2"]["alpha"])
+        x, y, z = (float(value) for value in motion.position)
+        rates = (sign * evidence.figures["simulation"]["lean_rate"], 0.0, motion.rear_rate)
+        start = consistent_state(
+            evidence.bicycle, surface, (x, y), motion.lean, motion.steer, rates, guess=(z, motion.pitch)
+        )
+        times = np.arange(round(_LONG / _LONG_OUTPUT) + 1) * _LONG_OUTPUT
+        return simulate(evidence.bicycle, surface, *start, times, _TOLERANCE)
+
+    return evidence.once(("ride of Q2", sign), compute)
+
+
+def _energies(evidence: Evidence, ride: Motion) -> np.ndarray:
+    seen = observe(evidence.bicycle, Paraboloid(evidence.figures["Q2"]["alpha"]), ride.q, ride.qd)
+    return seen.kinetic_energy + seen.potential_energy
+
+
+def _energy(evidence: Evidence, rides: dict[int, Motion]) -> Line:
+    drift = max(float(np.ptp(e) / e[0]) for e in (_energies(evidence, ride) for ride in rides.values()))
+    evaluations = sum(ride.evaluations for ride in rides.values())
+    return words(
+        *("2.3", "the uncontrolled bicycle conserves energy", drift < 1e-8),
+        f"over {_LONG:g} s of the two disturbed rides of Q2 by {drift:.0e} of itself, what the tolerance of "
+        f"{_TOLERANCE:.0e} leaves",
+        [Check("evaluations of the right-hand side (must be many)", -evaluations, -1000)],
+        "simulation",
+    )
+
+
+@dataclass(frozen=True)
+class Settling:
+    """How a disturbed ride of Q2 settles.
+
+    Attributes
+    ----------
+    limit : float
+        Mean of the rear rate at the end [rad/s].
+    left : float
+        Its span there [rad/s].
+    predicted : float
+        Rear rate of the circle of the same family that has the ride's energy [rad/s].
+    decay : float
+        Rate at which its oscillation decays [1/s], negative.
+    """
+
+    limit: float
+    left: float
+    predicted: float
+    decay: float
+
+
+def _settling(evidence: Evidence, ride: Motion, motion: CircularMotion) -> Settling:
+    late, rear = ride.time >= _LONG - _LATE, ride.qd[:, REAR_ANGLE]
+    family = evidence.family(evidence.figures["Q2"]["alpha"], evidence.figures["Q2"]["family"])
+    neighbour = motion_of_energy(family, float(_energies(evidence, ride)[0]), motion)
+    return Settling(float(rear[late].mean()), float(np.ptp(rear[late])), neighbour.rear_rate, _decay(ride, rear))
+
+
+def _stable(evidence: Evidence, rides: dict[int, Motion]) -> Iterator[Line]:
+    motion, surface = named_motion(evidence, "Q2"), Paraboloid(evidence.figures["Q2"]["alpha"])
+    whole = [Check("rides that ended early", float(sum(ride.ended is not None for ride in rides.values())), 0.0)]
+    circle = float(np.hypot(*motion.position[:2]))
+    off = [float(np.abs(radius(ride) - circle).max()) for ride in rides.values()]
+    yield words(
+        *("4.2", "disturbed by a lean rate of +-0.1 rad/s Q2 stays close to its circle", max(off) < _CLOSE * circle),
+        f"over {_LONG:g} s D's distance from the axis departs from {circle:.4f} m by at most {off[0]:.3f} (+) and "
+        f"{off[1]:.3f} m (-), within {_CLOSE:.0%}",
+        whole,
+        "simulation",
+    )
+    plus, minus = (_settling(evidence, ride, motion) for ride in rides.values())
+    error = max(abs(one.limit - one.predicted) for one in (plus, minus))
+    apart = min(abs(one.limit - motion.rear_rate) for one in (plus, minus))
+    left = max(plus.left, minus.left)
+    yield words(
+        *("4.2", "the disturbed Q2's rear rate converges to a constant near, but not equal to, its own"),
+        1e-3 < apart < 1 and left < 1e-6,
+        f"to {plus.limit:.7f} (+) and {minus.limit:.7f} rad/s (-), constant to {left:.0e}; the circles of family 2 "
+        f"that have the disturbed energies have {plus.predicted:.7f} and {minus.predicted:.7f}",
+        [*whole, Check("limits against the prediction from energy", error, 1e-6)],
+        "simulation",
+    )
+    slowest = float(np.sort(np.real(linearise(evidence.bicycle, surface, *motion.state()).eigenvalues))[-2])
+    departs = abs((plus.decay + minus.decay) / 2 / slowest - 1)
+    yield words(
+        *("4.2", "Q2 is stable but not asymptotically: a disturbance does not die out", apart > 1e-3 and slowest < 0),
+        f"what oscillates decays at {-plus.decay:.4f} and {-minus.decay:.4f} 1/s, the slowest eigenvalue's "
+        f"{-slowest:.4f}; the change of energy stays",
+        [*whole, Check("decay over the slowest eigenvalue's, less one", departs, 0.1)],
+        "simulation",
+    )
+
+
+def _decay(ride: Motion, rear: np.ndarray, end: float = 500.0) -> float:
+    """Slope of the logarithm of the rear rate's span over windows of 20 s, from 100 s on [1/s]."""
+    starts = np.arange(100.0, end, 50.0)
+    spans = [np.ptp(rear[(ride.time >= start) & (ride.time < start + 20)]) for start in starts]
+    return float(np.polyfit(starts, np.log(spans), 1)[0])
+
+
+def disturbed_decay(bicycle: Bicycle, surface: Paraboloid, motion: CircularMotion) -> float:
+    """Rate at which a slightly disturbed ride on a circle settles [1/s]."""
+    x, y, z = (float(value) for value in motion.position)
+    rates = (_SLIGHT, 0.0, motion.rear_rate)
+    start = consistent_state(bicycle, surface, (x, y), motion.lean, motion.steer, rates, guess=(z, motion.pitch))
+    # Long enough to see the slowest mode, short enough that the integrator's own error is not seen.
+    times = np.arange(round(_SETTLES / _LONG_OUTPUT) + 1) * _LONG_OUTPUT
+    ride = simulate(bicycle, surface, *start, times, _TOLERANCE)
+    return _decay(ride, ride.qd[:, REAR_ANGLE], _SETTLES - 50.0) if ride.ended is None else float("nan")

@@ -1,0 +1,213 @@
+"""Sections 2 and 3.1: coordinates, constraints, equations, symmetries, and what makes a motion circular."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields
+
+import numpy as np
+
+from reference.bicycle import Bicycle
+from reference.dae import consistent_state, dynamics, mass_matrix, residual
+from reference.families import FAMILIES
+from reference.kernels.steady import STEP
+from reference.kinematics import COORDINATES, YAW, angular_velocities, body_velocities, rotations
+from reference.surface import Paraboloid
+from reports.paper.ledger import Check, Line, count, words
+
+from .brackets import growth
+from .evidence import Evidence
+
+CONTACT_ROWS, GAP_ROWS, ROLLING_ROWS = slice(9, 15), slice(15, 17), slice(17, 21)
+_BODIES, _HINGES = 4, 3
+_ROUND_OFF = 1e-9  # of the largest singular value: what is below is zero to round-off
+# A state with nothing special about it: leaning, steered, all three free rates at work.
+_PLACE, _LEAN, _STEER, _RATES = (1.3, -2.1), 0.2, 0.4, (0.3, -0.5, 12.0)
+
+
+def structure_lines(evidence: Evidence) -> Iterator[Line]:
+    """Lines on sections 2 and 3.1."""
+    printed, bicycle, surface = evidence.figures["counts"], evidence.bicycle, Paraboloid(0.2)
+    q, qd = consistent_state(bicycle, surface, _PLACE, _LEAN, _STEER, _RATES)
+    yield from _bodies(printed, bicycle, q)
+    yield from _constraints(printed, bicycle, surface, q, qd)
+    yield from _equations(printed, bicycle, surface, q, qd)
+    yield from _symmetries(printed, bicycle, surface, q, qd)
+    yield from _constants(printed, evidence)
+
+
+def rank(matrix: np.ndarray) -> tuple[int, float]:
+    """Rank, and how far the last singular value that counts stands above round-off (relative)."""
+    values = np.linalg.svd(matrix, compute_uv=False)
+    many = int(np.sum(values > _ROUND_OFF * values[0]))
+    return many, float(values[many - 1] / values[0])
+
+
+def _clear(smallest: float) -> Check:
+    """A rank counts only if no singular value is near the limit that it is told by."""
+    return Check("limit of round-off over the smallest singular value that counts", _ROUND_OFF / smallest, 1e-3)
+
+
+def _bodies(printed: dict[str, int], bicycle: Bicycle, q: np.ndarray) -> Iterator[Line]:
+    names = [f.name for f in fields(bicycle) if f.name != "gravity"]
+    text = f"{len(names)} parameters, and gravity"
+    yield count("2.1", "the bicycle has 25 geometric and mass parameters", printed["parameters"], len(names), text)
+    unit = np.eye(9)
+    many = np.repeat(q[None], 9, axis=0)
+    motion = np.concatenate([body_velocities(bicycle, many, unit), angular_velocities(bicycle, many, unit)], axis=2)
+    free, smallest = rank(motion.reshape(9, -1))
+    text = f"velocities of {_BODIES} bodies under the {len(COORDINATES)} rates: rank {free}"
+    claim = "without contacts the bicycle has nine coordinates: 4 x 6 - 3 x 5"
+    hinged = Check("4 x 6 - 3 x 5 less the rank", abs(6 * _BODIES - 5 * _HINGES - free), 0.0)
+    yield count("2.1", claim, printed["coordinates"], free, text, [_clear(smallest), hinged])
+    product = _turn(2, q[3]) @ _turn(0, q[4]) @ _turn(1, q[5])
+    error = float(np.abs(product - rotations(bicycle, q[None])[0, 0]).max())
+    yield words(
+        *("2.1", "the rear frame's angles are yaw, lean, pitch, in the order 3-1-2", error < 1e-14),
+        *(f"product of the three turns: off by {error:.0e}", [Check("a turn that is none", -abs(q[4]), -0.1)]),
+    )
+
+
+def _turn(axis: int, angle: float) -> np.ndarray:
+    matrix, (i, j) = np.eye(3), [k for k in range(3) if k != axis]
+    sign = -1 if axis == 1 else 1
+    matrix[i, i] = matrix[j, j] = np.cos(angle)
+    matrix[i, j], matrix[j, i] = -sign * np.sin(angle), sign * np.sin(angle)
+    return matrix
+
+
+def derivatives(bicycle: Bicycle, surface: Paraboloid, q: np.ndarray, qd: np.ndarray) -> dict[str, np.ndarray]:
+    """Derivatives of the 21 equations by q, qd, qdd, contact parameters and forces, by the complex step."""
+    now = dynamics(bicycle, surface, q, qd)
+    arguments = {"q": q, "qd": qd, "qdd": now.acceleration, "p": now.contact.ravel(), "force": now.force.ravel()}
+    out = {}
+    for name, values in arguments.items():
+        columns = []
+        for k in range(len(values)):
+            varied = {key: value.astype(complex) for key, value in arguments.items()}
+            varied[name][k] += 1j * STEP
+            columns.append(np.imag(residual(bicycle, surface, *varied.values())) / STEP)
+        out[name] = np.array(columns).T
+    return out
+
+
+def _constraints(
+    printed: dict[str, int], bicycle: Bicycle, surface: Paraboloid, q: np.ndarray, qd: np.ndarray
+) -> Iterator[Line]:
+    slopes = derivatives(bicycle, surface, q, qd)
+    contact = slopes["p"][CONTACT_ROWS]
+    solved, smallest = rank(contact)
+    text = f"derivative of the contact equations by the contact parameters: rank {solved}"
+    claim = "three contact parameters a wheel, solved from three contact equations of regular Jacobian"
+    yield count("2.2", claim, printed["contact_equations"], solved, text, [_clear(smallest)])
+    gaps = slopes["q"][GAP_ROWS] - slopes["p"][GAP_ROWS] @ np.linalg.solve(contact, slopes["q"][CONTACT_ROWS])
+    closed, smallest = rank(gaps)
+    text = f"gaps after elimination of the contact parameters: rank {closed}"
+    claim = "of four geometric equations a contact leaves one holonomic constraint: two in all"
+    yield count("2.2", claim, printed["holonomic"], closed, text, [_clear(smallest)])
+    rolling = slopes["qd"][ROLLING_ROWS]
+    rolls, smallest = rank(rolling)
+    text = f"rolling rows: rank {rolls}"
+    claim = "pure rolling gives four independent velocity constraints"
+    yield count("2.2", claim, printed["nonholonomic"], rolls, text, [_clear(smallest)])
+    both, smallest = rank(np.vstack([gaps, rolling]))
+    text = f"{len(COORDINATES)} rates less {both} independent constraints"
+    claim = "the bicycle has three degrees of freedom in velocity"
+    yield count("2.2", claim, printed["velocity_freedoms"], len(COORDINATES) - both, text, [_clear(smallest)])
+    reached, smallest = growth(bicycle, surface, q)
+    yield words(
+        *("2.2", "the four rolling constraints are nonholonomic", reached[-1] == printed["independent_coordinates"]),
+        f"velocities, their brackets, brackets of those span {', '.join(map(str, reached))} dimensions: "
+        "none of the four integrates",
+        [Check("1e-4 over the smallest singular value that counts", 1e-4 / smallest, 0.1)],
+    )
+
+
+def _equations(
+    printed: dict[str, int], bicycle: Bicycle, surface: Paraboloid, q: np.ndarray, qd: np.ndarray
+) -> Iterator[Line]:
+    now = dynamics(bicycle, surface, q, qd)
+    rows = residual(bicycle, surface, q, qd, now.acceleration, now.contact.ravel(), now.force.ravel())
+    parts = {
+        "differential_equations": (rows[: CONTACT_ROWS.start], "equations of motion"),
+        "algebraic": (rows[CONTACT_ROWS.start : GAP_ROWS.stop], "contact equations and gaps"),
+        "nonholonomic": (rows[ROLLING_ROWS], "rolling constraints"),
+    }
+    left = Check("largest residual of the 21 equations at the solved state", float(np.abs(rows).max()), 1e-11)
+    for name, (part, what) in parts.items():
+        text = f"{len(part)} {what}"
+        yield count("2.3", f"the DAE has {printed[name]} {what}", printed[name], len(part), text, [left])
+    unknown = len(COORDINATES) + now.contact.size + now.force.size
+    text = f"{len(COORDINATES)} coordinates, {now.contact.size} contact parameters, {now.force.size} multipliers"
+    yield count("2.3", "21 unknowns", printed["unknowns"], unknown, text, [left])
+    slopes = derivatives(bicycle, surface, q, qd)
+    regular, smallest = rank(slopes["force"][:9])
+    condition = float(np.linalg.cond(mass_matrix(bicycle, q)))
+    yield words(
+        *("2.3", "with initial conditions the equations determine the motion", regular == 6 and condition < 1e8),
+        f"mass matrix of condition {condition:.1e}, forces on the bicycle of rank {regular}: accelerations and "
+        "multipliers follow from one regular system",
+        [_clear(smallest), left],
+    )
+
+
+def _symmetries(
+    printed: dict[str, int], bicycle: Bicycle, surface: Paraboloid, q: np.ndarray, qd: np.ndarray
+) -> Iterator[Line]:
+    here = dynamics(bicycle, surface, q, qd)
+
+    def change(turned: np.ndarray, rates: np.ndarray, back: np.ndarray) -> float:
+        other = dynamics(bicycle, surface, turned, rates)
+        moved = other.acceleration.copy()
+        moved[:3] = back @ moved[:3]
+        return float(np.abs(moved - here.acceleration).max())
+
+    spun = q.copy()
+    spun[7:] += (1.0, -2.0)
+    by_wheels = change(spun, qd, np.eye(3))
+    turn = _turn(2, 0.7)
+    turned, rates = q.copy(), qd.copy()
+    turned[:3], rates[:3], turned[YAW] = turn @ q[:3], turn @ qd[:3], q[YAW] + 0.7
+    by_yaw = change(turned, rates, turn.T)
+    lean = q.copy()
+    lean[4] += 1e-3
+    # Accelerations are of order 10 to 100.
+    moved = Check("what the test sees of a lean of 1e-3 (must be seen)", -change(lean, qd, np.eye(3)), -1e-3)
+    yield words(
+        *("3.1", "the wheels' angles do not appear in the equations", by_wheels < 1e-10),
+        *(f"accelerations change by {by_wheels:.0e} when the wheels are turned", [moved]),
+    )
+    yield words(
+        *("3.1", "on a surface of revolution the equations are invariant under turns: yaw is cyclic", by_yaw < 1e-10),
+        *(f"accelerations, turned back, change by {by_yaw:.0e}", [moved]),
+    )
+    cyclic = int(by_wheels < 1e-10) * 2 + int(by_yaw < 1e-10)
+    six = len(COORDINATES) - cyclic
+    text = f"{len(COORDINATES)} coordinates less {cyclic} cyclic ones"
+    yield count("3.1", "six coordinates are not cyclic", printed["noncyclic_coordinates"], six, text)
+
+
+def _constants(printed: dict[str, int], evidence: Evidence) -> Iterator[Line]:
+    residual_check = evidence.residual()
+    family = evidence.family(evidence.cases[0], 1)
+    motion = family.equations.motion(family.points[0].unknowns)
+    angles, rates = (motion.lean, motion.pitch, motion.steer), (motion.yaw_rate, motion.rear_rate, motion.front_rate)
+    constants = motion.position.size + len(angles) + len(rates) + motion.contact.size + motion.force.size
+    yield count(
+        *("3.1", "a circular motion is 21 constants: 9 kinematic, 6 of the contacts, 6 multipliers"),
+        *(printed["unknowns"], constants, "the 21 equations hold along all families with 21 constants"),
+        [residual_check],
+    )
+    widest, least = 0.0, np.inf
+    for alpha in evidence.cases:
+        for number in FAMILIES:
+            family = evidence.family(alpha, number)
+            for point in family.points[:: max(1, len(family.points) // 20)]:
+                values = np.linalg.svd(family.equations.jacobian(point.unknowns), compute_uv=False)
+                widest, least = max(widest, values[-1] / values[0]), min(least, values[-2] / values[0])
+    yield words(
+        *("3.1", "one of the 21 constants is free: circular motions come in one-parameter families", widest < 1e-12),
+        f"the equations have rank 20 along all families: smallest relative singular value {widest:.0e}, the next "
+        f">= {least:.0e}",
+        [Check("smallest over next singular value", widest / least, 1e-3), residual_check],
+    )

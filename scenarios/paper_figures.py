@@ -1,0 +1,250 @@
+"""Computes and draws the figures and tables of Xiong, Wang and Liu (2020)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.optimize import root_scalar
+
+from reference.bicycle import Bicycle
+from reference.circular import SIGMA, STEER, CircularMotion, Steady, newton, unknown_condition
+from reference.contact import observe
+from reference.continuation import Point, follow, root_between
+from reference.families import ANCHORS, Family, anchor, find_motion, trace
+from reference.simulate import simulate, simulate_modified_euler
+from reference.stability import linearise
+from reference.surface import Paraboloid
+from reports.figure_style import style, write_figure
+from reports.figures import solution_figure
+from reports.paper.ledger import Line
+from reports.paper.ledger import document as ledger_document
+from reports.paper.table import markdown
+from reports.paper_figures.captions import (
+    captions_text,
+    configurations_caption,
+    departure_caption,
+    disturbed_caption,
+    families_caption,
+)
+from reports.paper_figures.configurations import Configuration, configurations_figure
+from reports.paper_figures.tables import LinearisedPoint, linearisation_document, linearisation_tables
+from reports.paper_figures.trajectories import Ride, departure_figure, disturbed_figure, while_pushed
+
+from .error import ScenarioError
+from .runner import Watch, write_json, write_text
+from .scenario import load_scenario
+from .start import Start, make_start
+from .survey import LONGEST_STEP, families_document, family_document
+
+ENDINGS = (".svg", ".png")
+ALPHAS = {"figure-2": 0.0, "figure-3": 1 / 200, "figure-4": 1 / 20, "figure-5": 1 / 5, "figure-7": 1.0}
+MARKS = {"figure-3": ("q1", "q2"), "figure-5": ("p1", "p2", "p3", "p4")}  # motions that the paper marks
+DISTURBED = {"+0.1 rad/s": "q2-plus", "−0.1 rad/s": "q2-minus"}
+DEPARTURE, SETTLING = 100.0, 60.0  # simulated from Q1 and about Q2 [s]
+_MERGED = 0.05  # rad: an anchor this near to a followed curve lies on it
+
+Drawn = tuple[Figure, str]
+
+
+def write_figures(out: Path, progress: Watch, endings: Iterable[str] = ENDINGS) -> list[Path]:
+    """Compute and write Figures 2 to 9, their captions, and the tables at Q1 and Q2.
+
+    Parameters
+    ----------
+    out : Path
+        Folder, made if need be.
+    progress : callable
+        Called with what comes next, how many are done, and how many there are.
+    endings : iterable of str
+        Formats to write each figure in.
+
+    Returns
+    -------
+    list of Path
+        Files written, each whole or not at all.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    written: list[Path] = []
+    captions: dict[str, str] = {}
+    jobs = _jobs()
+    with style():
+        for done, (name, draw) in enumerate(jobs.items()):
+            progress(name, done, len(jobs) + 1)
+            figure, captions[name] = draw()
+            for ending in endings:
+                write_figure(out / f"{name}{ending}", figure)
+                written.append(out / f"{name}{ending}")
+    progress("tables", len(jobs), len(jobs) + 1)
+    points = [linearised_point("Q1", "q1"), linearised_point("Q2", "q2")]
+    write_text(out / "captions.md", captions_text(captions))
+    write_text(out / "tables.md", linearisation_tables(points))
+    write_json(out / "linearisation.json", linearisation_document(points))
+    return [*written, *(out / name for name in ("captions.md", "tables.md", "linearisation.json"))]
+
+
+def write_paper(out: Path, lines: Sequence[Line], progress: Watch) -> list[Path]:
+    """Write the ledger, as JSON and as a page of Markdown, and all figures and tables into a folder.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder cannot be made.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ScenarioError(f"--out {out}: the folder cannot be made: {error.strerror}") from error
+    write_json(out / "ledger.json", ledger_document(lines))
+    write_text(out / "ledger.md", markdown(lines))
+    return [out / "ledger.json", out / "ledger.md", *write_figures(out, progress)]
+
+
+def _jobs() -> dict[str, Callable[[], Drawn]]:
+    """Name of a figure to what computes and draws it, in the paper's order."""
+    jobs: dict[str, Callable[[], Drawn]] = {name: partial(_families, name) for name in ALPHAS}
+    jobs |= {"figure-6": _configurations, "figure-8": _departure, "figure-9": _disturbed}
+    return dict(sorted(jobs.items()))
+
+
+def _families(name: str) -> Drawn:
+    alpha, marked = ALPHAS[name], {key.upper(): start_named(key) for key in MARKS.get(name, ())}
+    marks = {key: _figures(_motion(start)) for key, start in marked.items()}
+    document = paper_document(alpha)
+    return solution_figure(document, Bicycle().front_wheel_radius, marks), families_caption(
+        document, Bicycle().front_wheel_radius
+    )
+
+
+def paper_document(alpha: float) -> dict[str, Any]:
+    """The document of `velodrome families`, with every curve that holds a part of the four families.
+
+    On steep bowls families join and leave parts behind; those are further curves, each under the number of
+    the family that it was a part of.
+    """
+    document = families_document(alpha)
+    bicycle, surface = Bicycle(), Paraboloid(alpha)
+    further = []
+    for number, rates in ANCHORS.items():
+        for rate in rates[:-1]:
+            equations, start, directions = anchor(bicycle, surface, number, rate)
+            motion = equations.motion(start)
+            if not _lies_on(document["families"], motion):
+                further.append(_curve(number, equations, start, directions[0]))
+    if not any("large circle" in f["ends"] and max(f["points"]["steer"]) > 3 for f in document["families"]):
+        further.append(_reversed_circles(alpha))
+    return {**document, "families": [*document["families"], *(family_document(curve) for curve in further)]}
+
+
+def _lies_on(families: Iterable[Mapping[str, Any]], motion: CircularMotion) -> bool:
+    for family in families:
+        points = family["points"]
+        if np.hypot(np.array(points["lean"]) - motion.lean, np.array(points["steer"]) - motion.steer).min() < _MERGED:
+            return True
+    return False
+
+
+def _curve(number: int, equations: Steady, start: np.ndarray, towards: np.ndarray) -> Family:
+    """The curve through a solution, both ways, a static equilibrium at its end solved for."""
+    halves = []
+    for direction in (towards, -towards):
+        points = list(follow(equations, start, direction, LONGEST_STEP))
+        if points[-1].unknowns[SIGMA] < 0:
+            points[-1] = root_between(equations, points[-2], points[-1], _squared_speed)
+        halves.append(points)
+    turned = [Point(point.unknowns, -point.tangent) for point in reversed(halves[1][1:])]
+    return Family(number, equations, turned + halves[0])
+
+
+def _squared_speed(point: Point) -> float:
+    return float(point.unknowns[SIGMA])
+
+
+def _reversed_circles(alpha: float) -> Family:
+    """Circles with the handlebar reversed, the large ones tending to C: of family 4 at alpha = 1/5, carried from it."""
+    bicycle, known = Bicycle(), trace(Bicycle(), Paraboloid(ALPHAS["figure-5"]), 4)
+    # Past the greatest lean, where no angle nor speed changes much with the bowl.
+    lean = [known.equations.motion(point.unknowns).lean for point in known.points]
+    u = known.points[(int(np.argmax(lean)) + len(lean)) // 2].unknowns
+    for step in np.linspace(ALPHAS["figure-5"], alpha, 41)[1:]:
+        u, _ = newton(Steady(bicycle, Paraboloid(float(step))), u, unknown_condition(STEER, float(u[STEER])))
+    return _curve(4, Steady(bicycle, Paraboloid(alpha)), u, np.eye(len(u))[STEER])
+
+
+def _configurations() -> Drawn:
+    starts = {name: start_named(name) for name in MARKS["figure-5"]}
+    shown = [Configuration(name.upper(), start.family or 0, _motion(start)) for name, start in starts.items()]
+    problem = starts["p1"].problem
+    figure = configurations_figure(problem.bicycle, problem.surface, shown)
+    return figure, configurations_caption(ALPHAS["figure-5"])
+
+
+def _departure() -> Drawn:
+    start = start_named("q1", DEPARTURE)
+    ride, motion = ride_from("Q1", start), _motion(start)
+    return departure_figure(ride, motion, start.growth_rate), departure_caption(ride, motion, start.growth_rate)
+
+
+def _disturbed() -> Drawn:
+    circle = _motion(start_named("q2"))
+    starts = {words: start_named(name, SETTLING) for words, name in DISTURBED.items()}
+    rides = [ride_from(words, start) for words, start in starts.items()]
+    neighbours = {words: circle_of_equal_energy(start, circle) for words, start in starts.items()}
+    return disturbed_figure(rides, circle, neighbours), disturbed_caption(rides, circle, neighbours)
+
+
+def ride_from(name: str, start: Start) -> Ride:
+    """Integrate a start precisely and by the paper's method, as far as both wheels are pushed."""
+    problem = start.problem
+    motions = [
+        integrate(problem.bicycle, problem.surface, problem.q, problem.qd, problem.times)
+        for integrate in (simulate, simulate_modified_euler)
+    ]
+    return Ride(name, *(while_pushed(motion, problem.bicycle, problem.surface) for motion in motions))
+
+
+def circle_of_equal_energy(start: Start, circle: CircularMotion) -> CircularMotion:
+    """The circular motion of a start's energy, which the ride keeps, in the family of a circle."""
+    problem, surface = start.problem, Paraboloid(ALPHAS["figure-3"])
+
+    def energy(q: np.ndarray, qd: np.ndarray) -> float:
+        seen = observe(problem.bicycle, problem.surface, q[None], qd[None])
+        return float(seen.kinetic_energy[0] + seen.potential_energy[0])
+
+    def at(rate: float) -> CircularMotion:
+        return find_motion(problem.bicycle, surface, rate, start.family, (circle.lean, circle.steer))[1]
+
+    wanted = energy(problem.q, problem.qd)
+    nearby = (circle.rear_rate, circle.rear_rate + 0.05)
+    found: Any = root_scalar(
+        lambda rate: energy(*at(rate).state()) - wanted, method="secant", x0=nearby[0], x1=nearby[1]
+    )
+    return at(float(found.root))
+
+
+def linearised_point(words: str, name: str) -> LinearisedPoint:
+    """The reduced linear system at a scenario's circular motion."""
+    start = start_named(name)
+    problem, motion = start.problem, _motion(start)
+    variables = np.array([*motion.position[:2], motion.lean, motion.steer, 0.0, 0.0, motion.rear_rate])
+    return LinearisedPoint(words, variables, linearise(problem.bicycle, problem.surface, *motion.state()))
+
+
+def start_named(name: str, duration: float | None = None) -> Start:
+    """Start of a scenario of the library, its duration changed if one is given [s]."""
+    changes = {} if duration is None else {"simulation.duration": duration}
+    return make_start(load_scenario(name, changes)[1])
+
+
+def _motion(start: Start) -> CircularMotion:
+    if start.motion is None:
+        raise ValueError("the paper's points are circular motions")
+    return start.motion
+
+
+def _figures(motion: CircularMotion) -> dict[str, float]:
+    return {"lean": motion.lean, "steer": motion.steer, "front_rate": motion.front_rate}
