@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -103,6 +103,24 @@ class Settings(BaseModel):
     """Base of an engine's settings: unknown names are refused, values are checked, nothing changes later."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def refined(self, factor: float) -> Self:
+        """These settings with another step, for a study of convergence.
+
+        Parameters
+        ----------
+        factor : float
+            Of the step. A method that chooses its own steps scales what it chooses them by.
+
+        Raises
+        ------
+        ValueError
+            If there is no step, or it would be out of its range.
+        """
+        values = self.model_dump()
+        if "step" not in values:
+            raise ValueError(f"{type(self).__name__} has no step to refine")
+        return self.model_validate(values | {"step": values["step"] * factor})
 
 
 class Engine(Protocol):

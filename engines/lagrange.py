@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from importlib.metadata import version
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import Field
 
@@ -14,15 +14,25 @@ from reference.simulate import simulate, simulate_modified_euler, steps_per_outp
 
 from .engine import REFERENCE, EngineError, Problem, Progress, Settings, Trajectory
 
+ORDER = 8  # of dop853: a step's error goes with this power of it
+
 
 class LagrangeSettings(Settings):
     """Settings of the reference."""
 
     integrator: Literal["dop853", "modified-euler"] = Field(
-        "dop853", description="adaptive order 8 with projection, or the paper's own method"
+        default="dop853", description="adaptive order 8 with projection, or the paper's own method"
     )
-    tolerance: float = Field(1e-13, ge=1e-15, le=1e-3, description="error of a step of dop853, relative to 1 + |state|")
-    step: float = Field(1e-3, ge=1e-6, le=0.1, description="step of modified-euler [s]")
+    tolerance: float = Field(
+        default=1e-13, ge=1e-15, le=1e-3, description="error of a step of dop853, relative to 1 + |state|"
+    )
+    step: float = Field(default=1e-3, ge=1e-6, le=0.1, description="step of modified-euler [s]")
+
+    def refined(self, factor: float) -> Self:
+        """These settings with another step; for dop853 the tolerance that such steps would leave."""
+        if self.integrator == "modified-euler":
+            return super().refined(factor)
+        return self.model_validate(self.model_dump() | {"tolerance": self.tolerance * factor**ORDER})
 
 
 class LagrangeEngine:

@@ -118,7 +118,7 @@ def horizon(trajectory: Trajectory, reference: Trajectory, growth_rate: float, s
         # Meaningless from the start, or without any error at all.
         return 0.0 if error.max() > 0 else None
     seed = float(np.max(np.log(error[small]) - growth_rate * time[small]))
-    law = max(0.0, (np.log(size) - seed) / growth_rate)
+    law = max(0.0, float(np.log(size) - seed) / growth_rate)
     # Other causes may be faster than the law: an engine's own drift, a fall.
     beyond = np.flatnonzero(error >= size)
     return min(law, float(time[beyond[0]])) if len(beyond) else law

@@ -1,0 +1,85 @@
+"""What a sequence of results with halved steps tells: the order seen, and the limit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+_LEAST_ORDER = 0.5  # a sequence that converges more slowly is noise, or has not begun to converge
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Extrapolated limit of a sequence.
+
+    Attributes
+    ----------
+    value : ndarray
+        Of the shape of the sequence's members.
+    uncertainty : float
+        Largest change that the last extrapolation made.
+    """
+
+    value: np.ndarray
+    uncertainty: float
+
+
+def observed_orders(values: Sequence[np.ndarray]) -> list[float]:
+    """Order seen by each three successive members, log2 |v1 - v0| / |v2 - v1|.
+
+    No reference enters: an engine that converges to another limit shows its order all the same.
+
+    Parameters
+    ----------
+    values : sequence of ndarray
+        Results of one shape, each with half the step of the one before.
+
+    Returns
+    -------
+    list of float
+        Two shorter than the sequence; NaN where two members are equal.
+    """
+    moves = [_size(b - a) for a, b in pairwise(values)]
+    return [float(np.log2(a / b)) if a > 0 and b > 0 else np.nan for a, b in pairwise(moves)]
+
+
+def extrapolate(values: Sequence[np.ndarray]) -> Limit:
+    """Richardson's extrapolation of a sequence with halved steps.
+
+    Each column of the table removes the power that its own last three entries show, rounded to an integer
+    as an expansion in powers of the step has it. The last column, whose power cannot be seen any more,
+    removes the next one. Extrapolation ends where it changes the result by more than the column before
+    did: what is left there is no power of the step but round-off or unconverged iterations.
+
+    Parameters
+    ----------
+    values : sequence of ndarray
+        At least two results of one shape, each with half the step of the one before.
+
+    Returns
+    -------
+    Limit
+    """
+    column = [np.asarray(value, float) for value in values]
+    best = Limit(column[-1], _size(column[-1] - column[-2]))
+    power = 0
+    while len(column) > 1:
+        seen = observed_orders(column[-3:])
+        if seen and not seen[0] > _LEAST_ORDER:
+            break
+        if not seen and power == 0:
+            break  # two members show no order at all
+        power = max(round(seen[0]), power + 1) if seen else power + 1
+        column = [b + (b - a) / (2**power - 1) for a, b in pairwise(column)]
+        moved = _size(column[-1] - (column[-2] if len(column) > 1 else best.value))
+        if moved >= best.uncertainty:
+            break
+        best = Limit(column[-1], moved)
+    return best
+
+
+def _size(values: np.ndarray) -> float:
+    return float(np.abs(values).max())

@@ -1,0 +1,213 @@
+"""`velodrome precision`: every engine at halved steps, and about the motion its own linear system."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory
+from engines.identify import LEVELS as IDENTIFY_LEVELS
+from engines.identify import Identified, identify
+from reference.stability import linearise
+from reports.metrics import metrics
+from reports.precision import Level, comparison_horizon, eigenvalue_document, engine_document
+
+from .error import ScenarioError
+from .runner import Plan, Watch, library_versions, plan_run, write_json
+from .scenario import Perturbation, Scenario
+from .start import Start, make_start
+
+COARSEST = 4.0  # times the scenario's step
+LEVELS = 5
+_LONGEST_INTERVAL = 200  # output intervals of the scenario merged so that the coarsest steps divide them
+
+
+@dataclass(frozen=True)
+class Study:
+    """Levels of one engine that ran to the end, those that did not, its own linear system or why there is none."""
+
+    levels: list[Level]
+    failures: list[dict[str, Any]]
+    identified: Identified | str | None
+
+
+def precision(
+    name: str, scenario: Scenario, wanted: list[str] | None, levels: int, eigenvalues: bool, watch: Watch
+) -> dict[str, Any]:
+    """Study the engines of a scenario.
+
+    Parameters
+    ----------
+    name : str
+    scenario : Scenario
+    wanted : list of str or None
+        Engines beside the reference; all that are installed if None.
+    levels : int
+        Steps, each half the one before, from `COARSEST` times the scenario's on.
+    eigenvalues : bool
+        Whether to measure each engine's linear system too.
+    watch : callable
+        Called with what is run, the simulated time reached and the duration.
+
+    Returns
+    -------
+    dict
+        The JSON document of `velodrome precision`.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario cannot be run, or no output interval fits all steps.
+    """
+    plan = plan_run(name, scenario, wanted)
+    factors = [COARSEST / 2**level for level in range(levels)]
+    # The reference is the yardstick: its own levels are coarser than itself.
+    coarser = [2.0 ** (levels - level) for level in range(levels)]
+    ladders = {
+        engine: _ladder(settings, coarser if engine == REFERENCE else factors)
+        for engine, (_, settings) in plan.engines.items()
+    }
+    problem = _sampled(plan, ladders)
+    engine, settings = plan.engines[REFERENCE]
+    watch(REFERENCE, 0.0, _duration(problem))
+    reference = engine.simulate(problem, settings, lambda t: watch(REFERENCE, t, _duration(problem)))
+    if reference.ended is not None:
+        raise ScenarioError(f"{name}: the reference ends at {reference.time[-1]:.6g} s: {reference.ended}")
+    studies = {}
+    undisturbed = make_start(scenario.model_copy(update={"perturbation": Perturbation()})).problem
+    for engine_name, (engine, settings) in plan.engines.items():
+        runs = list(_runs(engine, ladders[engine_name], plan.start, problem, reference, watch))
+        # As far as the reference can be refined it is the yardstick.
+        coarsest = settings.refined(2.0 ** (IDENTIFY_LEVELS - 1)) if engine_name == REFERENCE else settings
+        identified = _identified(engine, coarsest, undisturbed, watch) if eigenvalues else None
+        found = [run for run in runs if isinstance(run, Level)]
+        studies[engine_name] = Study(found, [run for run in runs if not isinstance(run, Level)], identified)
+    return _document(name, plan.start, problem, reference, undisturbed, studies)
+
+
+def _duration(problem: Problem) -> float:
+    return float(problem.times[-1])
+
+
+def _ladder(settings: Settings, factors: list[float]) -> list[Settings]:
+    """Settings of all levels that are in range."""
+    found = []
+    for factor in factors:
+        try:
+            found.append(settings.refined(factor))
+        except ValueError:
+            continue  # beyond what the engine allows: fewer levels
+    return found
+
+
+def _sampled(plan: Plan, ladders: Mapping[str, list[Settings]]) -> Problem:
+    """The scenario's problem, sampled at the shortest interval that all steps divide."""
+    simulation = plan.scenario.simulation
+    samples = round(simulation.duration * simulation.output_rate)
+    for merged in range(1, min(samples, _LONGEST_INTERVAL) + 1):
+        if samples % merged:
+            continue
+        times = np.arange(samples // merged + 1) * merged / simulation.output_rate
+        problem = replace(plan.start.problem, times=times)
+        try:
+            for name, ladder in ladders.items():
+                for settings in ladder:
+                    plan.engines[name][0].check(problem, settings)
+        except ValueError:
+            continue
+        return problem
+    raise ScenarioError(
+        f"{plan.name}: no output interval up to {_LONGEST_INTERVAL / simulation.output_rate:g} s is a multiple of all "
+        "engines' steps; steps and a duration that are multiples of one another would do"
+    )
+
+
+def _runs(
+    engine: Engine, ladder: list[Settings], start: Start, problem: Problem, reference: Trajectory, watch: Watch
+) -> Iterator[Level | dict[str, Any]]:
+    for settings in ladder:
+        step = getattr(settings, "step", None)
+        try:
+            trajectory = engine.simulate(problem, settings, lambda t: watch(engine.name, t, _duration(problem)))
+        except (EngineError, ValueError, ArithmeticError) as error:
+            yield {"step": step, "reason": " ".join(str(error).split())}
+            continue
+        measured = metrics(
+            trajectory,
+            reference,
+            problem.bicycle,
+            problem.surface,
+            start.growth_rate,
+            start.size,
+            circular=start.motion is not None,
+        )
+        if trajectory.ended is not None:
+            yield {"step": step, "reason": f"ended at {trajectory.time[-1]:.6g} s: {trajectory.ended}"}
+        elif measured["fell_at"] is not None:
+            yield {"step": step, "reason": f"fell at {measured['fell_at']:.6g} s"}
+        else:
+            yield Level(_duration(problem) / trajectory.steps, trajectory, measured)
+
+
+def _identified(engine: Engine, settings: Settings, undisturbed: Problem, watch: Watch) -> Identified | str:
+    label = f"{engine.name} modes"
+    try:
+        return identify(engine, settings, undisturbed, lambda done: watch(label, done, 1.0))
+    except (EngineError, ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+        return " ".join(str(error).split())
+
+
+def _document(
+    name: str,
+    start: Start,
+    problem: Problem,
+    reference: Trajectory,
+    undisturbed: Problem,
+    studies: Mapping[str, Study],
+) -> dict[str, Any]:
+    horizons = [comparison_horizon(study.levels) for engine, study in studies.items() if engine != REFERENCE]
+    known = [horizon for horizon in horizons if horizon is not None]
+    horizon = max(known) if known else None
+    exact = linearise(undisturbed.bicycle, undisturbed.surface, undisturbed.q, undisturbed.qd)
+    engines = {}
+    for engine, study in studies.items():
+        entry = engine_document(study.levels, study.failures, reference, start.size, horizon)
+        found = study.identified
+        entry["eigenvalues"] = None
+        if isinstance(found, Identified):
+            entry["eigenvalues"] = eigenvalue_document(found, exact.eigenvalues)
+        elif found is not None:
+            entry["failures"].append({"step": None, "reason": f"no eigenvalues: {found}"})
+        engines[engine] = entry
+    return {
+        "scenario": name,
+        "duration": _duration(problem),
+        "horizon": horizon,
+        "growth_rate": start.growth_rate,
+        "engines": engines,
+        "libraries": library_versions(),
+    }
+
+
+def write_precision(document: Mapping[str, Any], out: Path) -> list[Path]:
+    """Write the document and its figure into a folder, which is made if need be.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder cannot be made.
+    """
+    from reports.precision_figure import precision_figure
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ScenarioError(f"--out {out}: the folder cannot be made: {error.strerror}") from error
+    files = [out / f"precision-{document['scenario']}.json", out / f"precision-{document['scenario']}.png"]
+    write_json(files[0], document)
+    precision_figure(files[1], document)
+    return files
