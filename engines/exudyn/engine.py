@@ -1,49 +1,50 @@
-"""Exudyn: rigid bodies and revolute joints of the library, and a knife-edge rolling joint on the surface."""
+"""Exudyn: rigid bodies and revolute joints of the library, and its ways to roll on the ground.
+
+`exudyn` rolls on true constraints, `exudyn-plane-normal` on the library's rolling disc whose plane follows
+the contact, `exudyn-builtin` on that disc as it is, on the level plane.
+"""
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable
+from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import Field
 
-from engines.engine import EngineError, Problem, Progress, Settings, Trajectory
+from engines.engine import EngineError, Problem, Progress, Trajectory
 from reference.kinematics import quaternions
 from reference.simulate import steps_per_output
+from reference.surface import is_level
+
+from .settings import ExudynSettings, SolverSettings
 
 if TYPE_CHECKING:
-    from .joint import RollingJoint
     from .model import Model
-    from .solve import Outcome
+    from .solve import Integration, Outcome
+    from .wheels import PutOnGround
 
 
-class ExudynSettings(Settings):
-    """Settings of the generalized-alpha solver (Chung and Hulbert 1993; Arnold and Bruels 2007)."""
+@dataclass(frozen=True)
+class ExudynEngine:
+    """An engine on Exudyn; the library is imported when a problem is run.
 
-    step: float = Field(
-        default=1e-3, ge=1e-6, le=0.05, description="Step size [s]; the output interval is a multiple of it."
-    )
-    spectral_radius: float = Field(
-        default=0.8,
-        ge=0,
-        lt=1,
-        description="Spectral radius at infinite frequency: below 1, or errors of the contact forces never die out.",
-    )
-    newton_relative_tolerance: float = Field(
-        default=1e-10, gt=0, le=1e-4, description="Newton's method stops when its residual has fallen by this factor."
-    )
-    newton_absolute_tolerance: float = Field(
-        default=1e-12, gt=0, le=1e-4, description="Newton's method stops below this residual."
-    )
+    Attributes
+    ----------
+    name : str
+    settings : type
+        Model of its settings.
+    put_on_ground : callable
+        Imports and returns its way to put the wheels on the ground.
+    level_only : bool
+        Whether it rolls on the level plane only.
+    """
 
-
-class _Exudyn:
-    """The engine `exudyn`; the library is imported when a problem is run."""
-
-    name = "exudyn"
-    settings = ExudynSettings
+    name: str
+    settings: type[SolverSettings]
+    put_on_ground: Callable[[], PutOnGround]
+    level_only: bool = False
     gives = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
 
     @property
@@ -51,57 +52,44 @@ class _Exudyn:
         """Version of the library."""
         return version("exudyn")
 
-    def check(self, problem: Problem, settings: ExudynSettings) -> None:
-        """Refuse output times that the step does not meet; see `engines.engine.Engine`."""
+    def check(self, problem: Problem, settings: SolverSettings) -> None:
+        """Refuse output times that the step does not meet, and ground; see `engines.engine.Engine`."""
+        if self.level_only and not is_level(problem.surface):
+            raise ValueError(f"{self.name} rolls on the level plane only; exudyn rides on any surface")
         steps_per_output(problem.times, settings.step)
 
-    def step_noise(self, settings: ExudynSettings) -> float:
+    def step_noise(self, settings: SolverSettings) -> float:
         """What Newton's method may leave unconverged in a step; see `engines.engine.Engine`."""
         return settings.newton_relative_tolerance
 
-    def simulate(self, problem: Problem, settings: ExudynSettings, progress: Progress) -> Trajectory:
+    def simulate(self, problem: Problem, settings: SolverSettings, progress: Progress) -> Trajectory:
         """Run a problem; see `engines.engine.Engine.simulate`.
 
         Raises
         ------
         ValueError
-            If the output times are no uniform grid from 0, or the step does not divide its interval.
+            If the output times are no uniform grid from 0, the step does not divide its interval, or the
+            engine knows no such ground.
         EngineError
             If the engine does not even accept the initial state.
         """
-        from .joint import add_rolling_joint, release_slip
         from .model import build_model
-        from .solve import Integration, integrate, silent
+        from .solve import integrate, silent
 
-        per_interval = steps_per_output(problem.times, settings.step)
-        intervals = len(problem.times) - 1
-        integration = Integration(
-            end=float(problem.times[-1]),
-            steps=intervals * per_interval,
-            samples=intervals,
-            **settings.model_dump(exclude={"step"}),
-        )
-
+        self.check(problem, settings)
         with silent():
-            model = build_model(problem, partial(add_rolling_joint, surface=problem.surface))
-
-            def release() -> None:
-                for joint in model.joints:
-                    release_slip(model.system, joint)
-
-            outcome = integrate(model.system, integration, release, progress)
+            model = build_model(problem, settings, self.put_on_ground())
+            outcome = integrate(model.system, _integration(problem, settings, model), progress)
         return self._trajectory(problem, settings, model, outcome)
 
-    def _trajectory(
-        self, problem: Problem, settings: ExudynSettings, model: Model[RollingJoint], outcome: Outcome
-    ) -> Trajectory:
+    def _trajectory(self, problem: Problem, settings: SolverSettings, model: Model, outcome: Outcome) -> Trajectory:
         from .model import read_motion
         from .results import coordinates, energies, measure_contacts
 
         motion = read_motion(model)
         contacts = measure_contacts(problem, model, motion)
         if not np.all(np.isfinite(contacts.gap[0])):
-            raise EngineError("exudyn could not start: a wheel has no contact point")
+            raise EngineError(f"{self.name} could not start: a wheel has no contact point")
         q, qd = coordinates(problem, motion)
         kinetic, potential = energies(problem.bicycle, motion)
         return Trajectory(
@@ -125,4 +113,42 @@ class _Exudyn:
         )
 
 
-ENGINE = _Exudyn()
+def _integration(problem: Problem, settings: SolverSettings, model: Model) -> Integration:
+    from .solve import Integration
+
+    intervals = len(problem.times) - 1
+    corrected = (
+        isinstance(settings, ExudynSettings)
+        and settings.start == "second-order"
+        and settings.solver == "generalized-alpha"
+    )
+    return Integration(
+        end=float(problem.times[-1]),
+        steps=intervals * steps_per_output(problem.times, settings.step),
+        samples=intervals,
+        settings=settings,
+        slip_equations=model.rolling.slip_equations(model.system) if corrected else None,
+    )
+
+
+def _constrain() -> PutOnGround:
+    from .wheels import constrain
+
+    return constrain
+
+
+def _roll_discs_on_tangents() -> PutOnGround:
+    from .wheels import roll_discs_on_tangents
+
+    return roll_discs_on_tangents
+
+
+def _roll_discs() -> PutOnGround:
+    from .wheels import roll_discs
+
+    return roll_discs
+
+
+ENGINE = ExudynEngine("exudyn", ExudynSettings, _constrain)
+PLANE_NORMAL = ExudynEngine("exudyn-plane-normal", SolverSettings, _roll_discs_on_tangents)
+BUILTIN = ExudynEngine("exudyn-builtin", SolverSettings, _roll_discs, level_only=True)

@@ -1,13 +1,31 @@
-"""A rolling joint of a knife-edge wheel on any smooth surface, out of the engine's general connector.
+"""A rolling joint of knife-edge wheels on any smooth surface, for any Exudyn model.
 
-The engine's own rolling disc knows flat ground only. Here each wheel gets two constraints on the
-coordinates of its node: the gap, holonomic, and the two rows of slip, nonholonomic. Both are evaluated in
-Python around one compiled kernel, and bring their own analytic Jacobian.
+The engine's own rolling disc knows flat ground only. Here a wheel gets three constraints on the
+coordinates of its node: the two rows of slip, nonholonomic, and the gap, holonomic. One object of the
+engine's general connector holds all rows of one wheel or of two, with one compiled kernel behind it, which
+brings the analytic Jacobian::
+
+    wheel = mbs.CreateRigidBody(...)
+    joint = CreateRollingJointOnSurface(
+        mbs, bodyNumbers=[wheel], axisVector=[0, 1, 0], discRadius=0.3, surface=Paraboloid(0.2)
+    )
+    force = CreateRollingJointSensor(mbs, joint, "ContactForce")
+    mbs.Assemble()
+    mbs.SolveDynamic(simulationSettings)
+
+The object is declared holonomic as a whole. On position level a row of slip stands as what the contact
+slips in a step, about ``newmarkRatio * step * slip``: it is zero exactly where the slip is, and its
+derivative in the positions of the step's end is the row's own Jacobian, as the engine expects. So gap
+and slip share one call, no slip is differentiated away, and the engine's initial accelerations, which
+omit the term (W q')_q q' of a constraint declared nonholonomic, are right.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from struct import Struct
 from typing import Any
 
 import exudyn as exu
@@ -16,117 +34,182 @@ from exudyn.itemInterface import (
     MarkerNodeCoordinates,
     NodePointGround,
     ObjectConnectorCoordinateVector,
-    SensorObject,
 )
-from numba import typeof
 
 from reference.surface import Surface
 
 from . import kernel
 
+SLIP_ROWS = (0, 1)  # of a wheel's three
+
 
 @dataclass(frozen=True)
 class RollingJoint:
-    """A wheel's two constraints, the gap (one row) and the slip (lateral, forward), and their multipliers' sensors."""
+    """A rolling joint in an Exudyn model.
 
-    gap: Any
-    slip: Any
-    gap_multiplier: Any
-    slip_multipliers: Any
-
-
-class _VelocityRows:
-    """Gap and velocity rows of one wheel, computed once for each set of coordinates.
-
-    The engine asks four times at every iterate: residual and Jacobian of both constraints.
+    Attributes
+    ----------
+    objectNumber : exudyn.ObjectIndex
+        Of the constraint; its output variable `Force` holds minus the contact forces' components
+        (lateral, forward, normal), wheel after wheel [N].
+    nodeNumbers : tuple
+        The wheels' nodes.
+    surface : Surface
+    centres : ndarray, shape (k, 3)
+        Wheel centres in the bodies' axes [m].
+    triads : ndarray, shape (k, 3, 3)
+        Rows are right-handed unit vectors in the bodies' axes; the middle one is the axle.
+    radii : ndarray, shape (k,)
+        Radii of the knife edges [m].
     """
 
-    def __init__(self, radius: float, surface: Surface):
-        self.gap = np.nan
-        self.rows = np.zeros((3, 7))
-        # Views: the engine copies what it is given, so the same memory serves every call.
-        self.slip_rows, self.gap_row = self.rows[:2], self.rows[2:]
-        self._coordinates = np.array([0.0, 0.0, radius, 1.0, 0.0, 0.0, 0.0])
-        self._arguments = (self._coordinates, radius, surface.function.real, surface.parameters, self.rows)
-        kernel.velocity_rows(*self._arguments)
-        # The compiled entry itself: the dispatcher would spend 10 us a call on the type of the surface's function.
-        signature = tuple(typeof(argument) for argument in self._arguments)
-        self._kernel = kernel.velocity_rows.get_overload(signature)
-        self._seen: Any = None
-
-    def update(self, coordinates: Any) -> None:
-        """Bring gap and rows to coordinates of seven."""
-        if coordinates != self._seen:
-            self._seen = coordinates
-            self._coordinates[:] = coordinates
-            self.gap = self._kernel(*self._arguments)
+    objectNumber: Any
+    nodeNumbers: tuple[Any, ...]
+    surface: Surface
+    centres: np.ndarray
+    triads: np.ndarray
+    radii: np.ndarray
 
 
-def add_rolling_joint(system: exu.MainSystem, wheel: dict[str, Any], radius: float, surface: Surface) -> RollingJoint:
-    """Add a wheel's rolling joint to a system.
+def CreateRollingJointOnSurface(
+    mbs: exu.MainSystem,
+    name: str = "",
+    bodyNumbers: Sequence[Any] = (),
+    axisPosition: Sequence[float] = (0.0, 0.0, 0.0),
+    axisVector: Sequence[float] = (1.0, 0.0, 0.0),
+    discRadius: float | Sequence[float] = 0.0,
+    surface: Surface | None = None,
+    newmarkRatio: float = 0.5,
+    activeConnector: bool = True,
+) -> RollingJoint:
+    """Let one or two wheels roll on a surface, as knife edges that neither slip nor lift off.
+
+    Two wheels in one joint cost less than in two: the engine asks for all their constraints at once.
+    The wheels touch where their edges are closest to the surface, from above. The joint suits the engine's
+    implicit solvers; with ``useIndex2Constraints`` all rows are velocities, as they are.
 
     Parameters
     ----------
-    system : exudyn.MainSystem
-    wheel : dict
-        What ``CreateRigidBody(..., returnDict=True)`` gave for a wheel: its node (Euler parameters) lies in
-        the centre, its axle is its y axis.
-    radius : float
-        Radius of the knife edge [m].
+    mbs : exudyn.MainSystem
+        Not yet assembled.
+    name : str
+        Name of the constraint.
+    bodyNumbers : sequence
+        The wheels: one or two rigid bodies whose nodes have Euler parameters.
+    axisPosition, axisVector : array_like, shape (3,)
+        Wheel centre [m] and axle, of any length, in the body's axes; the same for both wheels.
+    discRadius : float or sequence of float
+        Radius of the edge [m], one for all or one each.
     surface : Surface
-        The ground.
+        The ground, fixed in space; see `reference.surface`.
+    newmarkRatio : float
+        Newmark's beta / gamma of the time integration: 0.5 for the trapezoidal rule, up to 2/3 for
+        generalized alpha (see `method`). It changes nothing but how fast Newton's method converges.
+    activeConnector : bool
+        Whether the constraint is active.
 
     Returns
     -------
     RollingJoint
-        Its slip rows are still declared holonomic: call `release_slip` once integration starts.
+
+    Raises
+    ------
+    ValueError
+        If the bodies, the radii, the axle or the surface are not as above.
     """
-    contact = _VelocityRows(radius, surface)
-
-    def gap(_system, _time, _item, coordinates, rates, at_velocity_level):
-        contact.update(coordinates)
-        return [float(contact.gap_row[0] @ rates)] if at_velocity_level else [contact.gap]
-
-    def gap_jacobian(_system, _time, _item, coordinates, _rates, _at_velocity_level):
-        contact.update(coordinates)
-        return contact.gap_row
-
-    def slip(_system, _time, _item, coordinates, rates, _at_velocity_level):
-        contact.update(coordinates)
-        return contact.slip_rows @ rates
-
-    def slip_jacobian(_system, _time, _item, coordinates, _rates, _at_velocity_level):
-        contact.update(coordinates)
-        return contact.slip_rows
-
-    origin: Any = system.AddNode(NodePointGround())
-    ground = system.AddMarker(MarkerNodeCoordinates(nodeNumber=origin))
-    markers = [ground, system.AddMarker(MarkerNodeCoordinates(nodeNumber=wheel["nodeNumber"]))]
-
-    def connector(rows: int, constraint: Any, jacobian: Any) -> Any:
-        item = ObjectConnectorCoordinateVector(
-            markerNumbers=markers,
-            scalingMarker1=np.zeros((rows, 7)),  # tells the number of rows; the functions do the rest
-            constraintUserFunction=constraint,
-            jacobianUserFunction=jacobian,
-            visualization={"show": False},
-        )
-        return system.AddObject(item)
-
-    def multipliers(constraint: Any) -> Any:
-        kind: Any = exu.OutputVariableType.Force
-        sensor = SensorObject(objectNumber=constraint, outputVariableType=kind, storeInternal=True, writeToFile=False)
-        return system.AddSensor(sensor)
-
-    holonomic, nonholonomic = connector(1, gap, gap_jacobian), connector(2, slip, slip_jacobian)
-    return RollingJoint(holonomic, nonholonomic, multipliers(holonomic), multipliers(nonholonomic))
+    nodes = [_euler_parameter_node(mbs, body) for body in bodyNumbers]
+    if len(nodes) not in (1, 2) or surface is None:
+        raise ValueError("a rolling joint takes one or two bodyNumbers and a surface")
+    radii = np.broadcast_to(np.asarray(discRadius, float), len(nodes)).copy()
+    if not np.all(radii > 0) or not np.all(np.isfinite(radii)):
+        raise ValueError(f"discRadius is {discRadius!r}; a wheel's radius is a positive number [m]")
+    if not (math.isfinite(newmarkRatio) and newmarkRatio > 0):
+        raise ValueError(f"newmarkRatio is {newmarkRatio!r}; it must be a positive number, about 0.5")
+    shape = (np.tile(np.asarray(axisPosition, float), (len(nodes), 1)), np.stack([_triad(axisVector)] * len(nodes)))
+    constraint, jacobian = _user_functions(shape, radii, surface, newmarkRatio)
+    item = ObjectConnectorCoordinateVector(
+        name=name,
+        markerNumbers=_markers(mbs, nodes),
+        scalingMarker1=np.zeros((3 * len(nodes), 7)),  # tells the number of rows; the functions do the rest
+        constraintUserFunction=constraint,
+        jacobianUserFunction=jacobian,
+        activeConnector=activeConnector,
+        visualization={"show": False},
+    )
+    return RollingJoint(mbs.AddObject(item), tuple(nodes), surface, *shape, radii)
 
 
-def release_slip(system: exu.MainSystem, joint: RollingJoint) -> None:
-    """Declare the slip rows nonholonomic, as they are.
+def slip_equations(mbs: exu.MainSystem, joint: RollingJoint) -> list[int]:
+    """Numbers of the slip rows among the algebraic equations of an assembled system."""
+    equations = mbs.systemData.GetObjectLTGAE(joint.objectNumber)
+    return [equations[3 * wheel + row] for wheel in range(len(joint.radii)) for row in SLIP_ROWS]
 
-    The engine's initial accelerations omit (W q')_q q' of constraints on velocity level, which falsifies
-    the first contact forces. The Jacobian of the slip rows stands on either level, so they take part in
-    the initial accelerations as if holonomic and are released before the first step.
+
+def _euler_parameter_node(mbs: exu.MainSystem, body: Any) -> Any:
+    item = mbs.GetObject(body)
+    if item["objectType"] != "RigidBody":
+        raise ValueError(f"body {body} is a {item['objectType']}; a wheel is a rigid body (CreateRigidBody)")
+    kind = mbs.GetNode(item["nodeNumber"])["nodeType"]
+    if kind != "RigidBodyEP":
+        raise ValueError(f"body {body} has a {kind} node; a wheel needs nodeType=NodeType.RotationEulerParameters")
+    return item["nodeNumber"]
+
+
+def _markers(mbs: exu.MainSystem, nodes: list[Any]) -> list[Any]:
+    """Markers of the connector's two sides: both wheels, or the ground and one wheel."""
+    if len(nodes) == 1:
+        nodes = [mbs.AddNode(NodePointGround()), *nodes]
+    return [mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=node)) for node in nodes]
+
+
+def _triad(axle: Sequence[float]) -> np.ndarray:
+    """Right-handed unit vectors (3, 3) with an axle in the middle; the y axis gives the identity."""
+    along = np.asarray(axle, float)
+    length = np.linalg.norm(along)
+    if along.shape != (3,) or not (np.isfinite(length) and length > 0):
+        raise ValueError(f"axisVector is {axle!r}; it must be a vector of three numbers, not all zero")
+    along = along / length
+    other = np.eye(3)[0 if abs(along[0]) < 0.9 else 1]
+    across = np.cross(other, along)
+    across /= np.linalg.norm(across)
+    return np.stack([np.cross(along, across), along, across])
+
+
+def _user_functions(shape: tuple[np.ndarray, np.ndarray], radii: np.ndarray, surface: Surface, ratio: float) -> Any:
+    """Build the connector's two user functions, which share one evaluation.
+
+    The engine asks for the Jacobian and for the constraints at every iterate, with the same coordinates.
     """
-    system.SetObjectParameter(joint.slip, "velocityLevel", True)
+    count = len(radii)
+    state, rows, values, scale = (
+        np.zeros(size) for size in ((2 * count, 7), (3 * count, 7 * count), (2, 3 * count), 1)
+    )
+    state[:count, 2], state[:count, 3] = radii, 1.0
+    function = surface.function.real
+    evaluate = kernel.constraints(state, *shape, radii, function, surface.parameters, scale, rows, values).__next__
+    evaluate()  # compiles
+    memory, pack = state.data.cast("B"), Struct(f"{14 * count}d").pack_into
+    on_position_level, on_velocity_level = values[0].tolist, values[1].tolist
+    start: Any = exu.ConfigurationType.StartOfStep
+    seen: tuple[Any, Any, Any] = (None, None, None)
+
+    def update(mbs, time, coordinates, rates):
+        nonlocal seen
+        if time != seen[0]:
+            scale[0] = ratio * (time - mbs.systemData.GetTime(start))
+        pack(memory, 0, *coordinates, *rates)
+        evaluate()
+        seen = (time, coordinates, rates)
+
+    def constraint(mbs, time, _item, coordinates, rates, velocity_level):
+        if (time, coordinates, rates) != seen:
+            update(mbs, time, coordinates, rates)
+        return on_velocity_level() if velocity_level else on_position_level()
+
+    # The generator does not keep the surface's compiled function alive: the default argument does.
+    def jacobian(mbs, time, _item, coordinates, rates, _velocity_level, _function=function):
+        if (time, coordinates, rates) != seen:
+            update(mbs, time, coordinates, rates)
+        return rows  # the engine copies what it is given
+
+    return constraint, jacobian

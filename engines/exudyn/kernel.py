@@ -1,10 +1,11 @@
 """A knife-edge wheel as the engine sees it: one rigid body whose coordinates are Euler parameters.
 
-With the body's centre c, its rotation A(theta) and its axle y = A e_y, the contact search gives the vector
-d from the centre to the contact and the contact frame F = (lateral, forward, normal). The material
-velocity of the contact, in that frame, is linear in the coordinates' rates:
+With the node's position x, the body's rotation A(theta), the wheel's centre c = x + A p and its axle
+a = A b (p and b fixed in the body), the contact search gives the vector d from the centre to the contact
+and the contact frame F = (lateral, forward, normal). The material velocity of the contact, in that frame,
+is linear in the coordinates' rates:
 
-    F (c' + w x d) = F [I, -skew(d) G(theta)] (c', theta') = W q'
+    F (x' + w x (A p + d)) = F [I, -skew(A p + d) G(theta)] (x', theta') = W q'
 
 whose normal row is the gap's gradient, since the contact is a closest approach.
 """
@@ -14,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference.kernels import contact
-from reference.kernels.vector import cross, dot, jit
+from reference.kernels.vector import add, cross, dot, jit
 
 
 @jit
@@ -32,6 +33,16 @@ def axes(t0, t1, t2, t3):
 
 
 @jit
+def turned(body, v):
+    """Inertial components of a vector ``v`` fixed in a body with unit vectors ``body``."""
+    return (
+        body[0][0] * v[0] + body[1][0] * v[1] + body[2][0] * v[2],
+        body[0][1] * v[0] + body[1][1] * v[1] + body[2][1] * v[2],
+        body[0][2] * v[0] + body[1][2] * v[1] + body[2][2] * v[2],
+    )
+
+
+@jit
 def contact_frame(centre, x, axle, z, radius, function, parameters):
     """Return (gap, d, (lateral, forward, normal)) of a wheel; the gap is NaN where no contact is found."""
     xi, eta, angle = contact.first_guess(centre, x, z, radius, function, parameters)
@@ -44,15 +55,28 @@ def contact_frame(centre, x, axle, z, radius, function, parameters):
 
 
 @jit
-def velocity_rows(coordinates, radius, function, parameters, rows):
+def wheel_contact(coordinates, centre, triad, radius, function, parameters):
+    """Return (gap, A p + d, (lateral, forward, normal)) of a wheel at its node's coordinates (7,).
+
+    ``centre`` (3,) is p, the rows of ``triad`` (3, 3) are right-handed unit vectors of the body with the
+    axle in the middle.
+    """
+    body = axes(coordinates[3], coordinates[4], coordinates[5], coordinates[6])
+    offset = turned(body, centre)
+    middle = (coordinates[0] + offset[0], coordinates[1] + offset[1], coordinates[2] + offset[2])
+    x, axle, z = turned(body, triad[0]), turned(body, triad[1]), turned(body, triad[2])
+    gap, d, frame = contact_frame(middle, x, axle, z, radius, function, parameters)
+    return gap, add(offset, d), frame
+
+
+@jit
+def velocity_rows(coordinates, centre, triad, radius, function, parameters, rows):
     """Fill ``rows`` (3, 7) with W (lateral, forward, normal) at coordinates (7,); return the gap."""
     t0, t1, t2, t3 = coordinates[3], coordinates[4], coordinates[5], coordinates[6]
-    x, axle, z = axes(t0, t1, t2, t3)
-    centre = (coordinates[0], coordinates[1], coordinates[2])
-    gap, d, frame = contact_frame(centre, x, axle, z, radius, function, parameters)
+    gap, arm, frame = wheel_contact(coordinates, centre, triad, radius, function, parameters)
     for i in range(3):
         # e . (w x d) = w . (d x e), and w = G theta' is twice the vector part of theta' conj(theta).
-        m0, m1, m2 = cross(d, frame[i])
+        m0, m1, m2 = cross(arm, frame[i])
         for j in range(3):
             rows[i, j] = frame[i][j]
         rows[i, 3] = -2 * (t1 * m0 + t2 * m1 + t3 * m2)
@@ -63,11 +87,73 @@ def velocity_rows(coordinates, radius, function, parameters, rows):
 
 
 @jit
+def constraints(state, centres, triads, radii, function, parameters, scale, rows, values):
+    """Evaluate the rolling constraints of k wheels again at every `next`.
+
+    A generator: its arguments are unpacked once, which would otherwise cost ten times the evaluation.
+
+    state (2 k, 7) holds the wheels' coordinates, then their rates; centres (k, 3), triads (k, 3, 3) and
+    radii (k,) are the wheels; scale (1,) multiplies the slip on position level. Fills rows (3 k, 7 k) with
+    W of all wheels, and values (2, 3 k): on position level (scale lateral, scale forward, gap), on velocity
+    level W q'.
+    """
+    count = radii.size
+    while True:
+        for wheel in range(count):
+            block = rows[3 * wheel : 3 * wheel + 3, 7 * wheel : 7 * wheel + 7]
+            shape = (centres[wheel], triads[wheel], radii[wheel])
+            gap = velocity_rows(state[wheel], shape[0], shape[1], shape[2], function, parameters, block)
+            for i in range(3):
+                velocity = 0.0
+                for j in range(7):
+                    velocity += block[i, j] * state[count + wheel, j]
+                values[1, 3 * wheel + i] = velocity
+                values[0, 3 * wheel + i] = scale[0] * velocity
+            values[0, 3 * wheel + 2] = gap
+        yield True
+
+
+@jit
+def probe(state, centre, triad, radius, function, parameters, point, frame, slip, gap):
+    """Measure the contact of one wheel again at every `next`.
+
+    state (2, 7) holds its coordinates and their rates. Fills point (3,), frame (3, 3) with rows lateral,
+    forward and normal, slip (2,), and gap (1,).
+    """
+    rows = np.empty((3, 7))
+    while True:
+        gap[0], arm, axes_of_contact = wheel_contact(state[0], centre, triad, radius, function, parameters)
+        velocity_rows(state[0], centre, triad, radius, function, parameters, rows)
+        for i in range(3):
+            point[i] = state[0, i] + arm[i]
+            for j in range(3):
+                frame[i, j] = axes_of_contact[i][j]
+        for i in range(2):
+            slip[i] = 0.0
+            for j in range(7):
+                slip[i] += rows[i, j] * state[1, j]
+        yield True
+
+
+@jit
+def normals(coordinates, centres, triads, radii, function, parameters, out):
+    """Fill ``out`` (k, 3) with the surface's normals at the contacts of k wheels, again at every `next`."""
+    while True:
+        for wheel in range(radii.size):
+            where = (coordinates[wheel], centres[wheel], triads[wheel], radii[wheel])
+            _, _, frame = wheel_contact(where[0], where[1], where[2], where[3], function, parameters)
+            for i in range(3):
+                out[wheel, i] = frame[2][i]
+        yield True
+
+
+@jit
 def observe(position, velocity, rotation, spin, radius, function, parameters, point, frames, gap, slip):
     """Measure one wheel's contact along n samples of its own motion.
 
-    position, velocity, spin (n, 3) and rotation (n, 3, 3) are the body's, in inertial axes. Fills point
-    (n, 3), frames (n, 3, 3) with rows lateral, forward and normal, gap (n,), and slip (n, 2).
+    position, velocity, spin (n, 3) and rotation (n, 3, 3) are the body's, in inertial axes; its centre is
+    the wheel's, its y axis the axle. Fills point (n, 3), frames (n, 3, 3) with rows lateral, forward and
+    normal, gap (n,), and slip (n, 2).
     """
     for n in range(position.shape[0]):
         a = rotation[n]

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import exudyn as exu
 import numpy as np
@@ -15,14 +14,12 @@ from engines.engine import Problem
 from reference.bicycle import BODIES, Bicycle
 from reference.kinematics import angular_velocities, body_positions, body_velocities, rotations
 
-Joint = TypeVar("Joint")
-AddJoint = Callable[[exu.MainSystem, dict[str, Any], float], Joint]
-
-LEFT = np.array([0.0, 1.0, 0.0])
+from .settings import SolverSettings
+from .wheels import LEFT, PutOnGround, Rolling
 
 
 @dataclass(frozen=True)
-class Model(Generic[Joint]):
+class Model:
     """An assembled system, ready to solve.
 
     Attributes
@@ -30,39 +27,28 @@ class Model(Generic[Joint]):
     container : exudyn.SystemContainer
         Owner of the system; it must outlive it.
     system : exudyn.MainSystem
-    joints : tuple
-        What the wheels' joint factory returned, rear then front.
+    rolling : Rolling
+        Both wheels on the ground.
     sensors : tuple of dict
         Per body, in the order of `BODIES`, sensor numbers of position, velocity, rotation and spin.
     """
 
     container: exu.SystemContainer
     system: exu.MainSystem
-    joints: tuple[Joint, Joint]
+    rolling: Rolling
     sensors: tuple[dict[str, Any], ...]
 
 
-def build_model(problem: Problem, add_joint: AddJoint[Joint]) -> Model[Joint]:
-    """Build and assemble the bicycle in its initial state.
-
-    Parameters
-    ----------
-    problem : Problem
-        Bicycle and initial state; its surface belongs to the wheels' joint.
-    add_joint : callable
-        ``(system, wheel, radius) -> joint`` puts one wheel on the ground. ``wheel`` is what
-        ``CreateRigidBody`` returned; its axle is the y axis.
-    """
+def build_model(problem: Problem, settings: SolverSettings, put_on_ground: PutOnGround) -> Model:
+    """Build and assemble the bicycle in its initial state."""
     container = exu.SystemContainer()
     system = container.AddSystem()
-    bicycle = problem.bicycle
     bodies = _add_bodies(system, problem)
-    _connect(system, bicycle, problem.q, [body["bodyNumber"] for body in bodies])
-    radii = (bicycle.rear_wheel_radius, bicycle.front_wheel_radius)
-    rear, front = (add_joint(system, body, radius) for body, radius in zip(bodies[2:], radii, strict=True))
+    _connect(system, problem.bicycle, problem.q, [body["bodyNumber"] for body in bodies])
+    rolling = put_on_ground(system, bodies[2:], problem, settings)
     sensors = tuple(_watch(system, body["bodyNumber"]) for body in bodies)
     system.Assemble()
-    return Model(container, system, (rear, front), sensors)
+    return Model(container, system, rolling, sensors)
 
 
 def _add_bodies(system: exu.MainSystem, problem: Problem) -> list[dict[str, Any]]:
@@ -139,12 +125,12 @@ class Motion:
     spin: np.ndarray
 
 
-def stored(model: Model[Any], sensor: Any) -> np.ndarray:
+def stored(model: Model, sensor: Any) -> np.ndarray:
     """Samples of a sensor after a run, shape (n, 1 + k): time and values."""
     return np.atleast_2d(model.system.GetSensorStoredData(sensor))
 
 
-def read_motion(model: Model[Any]) -> Motion:
+def read_motion(model: Model) -> Motion:
     """Collect the samples of the bodies' sensors after a run."""
     values = {
         name: np.stack([stored(model, sensors[name])[:, 1:] for sensors in model.sensors], axis=1)

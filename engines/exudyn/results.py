@@ -11,8 +11,8 @@ from reference.bicycle import BODIES, Bicycle
 from reference.kinematics import YAW, coordinates_from_bodies
 
 from . import kernel
-from .joint import RollingJoint
-from .model import Model, Motion, stored
+from .model import Model, Motion
+from .wheels import wheel_radii
 
 
 @dataclass(frozen=True)
@@ -25,17 +25,13 @@ class Contacts:
     slip: np.ndarray
 
 
-def measure_contacts(problem: Problem, model: Model[RollingJoint], motion: Motion) -> Contacts:
-    """Measure gap and slip on the wheels' own bodies, and collect the contact forces.
-
-    The engine adds W^T lambda to the inertia forces' side, so the force on the wheel is minus the
-    multipliers along the contact's axes.
-    """
+def measure_contacts(problem: Problem, model: Model, motion: Motion) -> Contacts:
+    """Measure gap and slip on the wheels' own bodies, and turn the contact forces to inertial axes."""
     n = len(motion.time)
     point, force, gap, slip = np.empty((n, 2, 3)), np.empty((n, 2, 3)), np.empty((n, 2)), np.empty((n, 2, 2))
     function, parameters = problem.surface.function.real, problem.surface.parameters
-    radii = (problem.bicycle.rear_wheel_radius, problem.bicycle.front_wheel_radius)
-    for wheel, (radius, joint) in enumerate(zip(radii, model.joints, strict=True)):
+    local_forces = model.rolling.local_forces(model.system)
+    for wheel, radius in enumerate(wheel_radii(problem)):
         body = 2 + wheel
         frames = np.empty((n, 3, 3))
         kernel.observe(
@@ -43,9 +39,7 @@ def measure_contacts(problem: Problem, model: Model[RollingJoint], motion: Motio
             *(radius, function, parameters),
             *(point[:, wheel], frames, gap[:, wheel], slip[:, wheel]),
         )
-        tangential = stored(model, joint.slip_multipliers)[:, 1:]
-        normal = stored(model, joint.gap_multiplier)[:, 1:]
-        force[:, wheel] = -np.einsum("ni,nij->nj", np.hstack([tangential, normal]), frames)
+        force[:, wheel] = np.einsum("ni,nij->nj", local_forces[:, wheel], frames)
     return Contacts(point, force, gap, slip)
 
 

@@ -1,17 +1,21 @@
-"""Integration by the engine's generalized-alpha solver."""
+"""Integration by the engine's implicit solvers."""
 
 from __future__ import annotations
 
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from typing import Any
 
 import exudyn as exu
 
 from engines.engine import EngineError, Progress
+
+from .settings import SolverSettings
+from .start import Start, begin, correct, second_order_start
 
 PROGRESS_STEPS = 100
 
@@ -20,15 +24,15 @@ PROGRESS_STEPS = 100
 class Integration:
     """How to integrate: until ``end`` [s] in equal ``steps``, with ``samples`` evenly spaced samples after the start.
 
-    The rest are parameters of the solver, see `engines.exudyn.engine.ExudynSettings`.
+    With ``slip_equations`` generalized alpha starts as in `engines.exudyn.start`; None leaves the start to
+    the engine.
     """
 
     end: float
     steps: int
     samples: int
-    spectral_radius: float
-    newton_relative_tolerance: float
-    newton_absolute_tolerance: float
+    settings: SolverSettings
+    slip_equations: Sequence[int] | None = None
 
 
 @dataclass(frozen=True)
@@ -40,9 +44,7 @@ class Outcome:
     ended: str | None
 
 
-def integrate(
-    system: exu.MainSystem, integration: Integration, start: Callable[[], None], progress: Progress
-) -> Outcome:
+def integrate(system: exu.MainSystem, integration: Integration, progress: Progress) -> Outcome:
     """Integrate a system from its initial state; its sensors hold the result.
 
     Parameters
@@ -50,8 +52,6 @@ def integrate(
     system : exudyn.MainSystem
         Assembled.
     integration : Integration
-    start : callable
-        Called once, after the initial accelerations and before the first step.
     progress : callable
         Called now and then with the simulated time [s]; what it raises ends the run and is raised again.
 
@@ -63,15 +63,16 @@ def integrate(
     raised: list[BaseException] = []
     taken = 0
     step = integration.end / integration.steps
+    start: Start | None = None
 
     with _interruptible() as interrupted:
 
         def before_step(_system, _time):
             nonlocal taken
             try:
-                if taken == 0:
-                    start()
-                elif taken % PROGRESS_STEPS == 0:
+                if taken == 0 and start is not None:
+                    correct(system, start)
+                elif taken > 0 and taken % PROGRESS_STEPS == 0:
                     progress(taken * step)
             except BaseException as error:  # an exception must not cross the engine, which would swallow it
                 raised.append(error)
@@ -79,13 +80,18 @@ def integrate(
             return not (raised or interrupted.is_set())
 
         system.SetPreStepUserFunction(before_step)
-        solver = exu.MainSolverImplicitSecondOrder()
-        settings = _simulation_settings(integration)
-        begin = time.process_time()
+        solver: Any = exu.MainSolverImplicitSecondOrder()
+        settings = simulation_settings(integration)
+        cpu_time = -time.process_time()
         success = False
         with suppress(exu.SolverError):  # raised where the Jacobian is singular
-            success = solver.SolveSystem(system, settings)  # pyright: ignore[reportCallIssue]
-        cpu_time = time.process_time() - begin
+            if integration.slip_equations is None:
+                success = solver.SolveSystem(system, settings)
+            else:
+                start = second_order_start(system, settings, step, integration.slip_equations)
+                success = begin(system, settings, solver, start) and solver.SolveSteps(system, settings)
+                solver.FinalizeSolver(system, settings)
+        cpu_time += time.process_time()
     if raised:
         raise raised[0]
     if interrupted.is_set():  # by a signal that the caller has made harmless
@@ -98,21 +104,27 @@ def integrate(
     return Outcome(max(taken - 1, 0), cpu_time, f"{failure} at t = {taken * step:.6g} s")
 
 
-def _simulation_settings(integration: Integration) -> exu.SimulationSettings:
+def simulation_settings(integration: Integration) -> exu.SimulationSettings:
+    """Settings of the library."""
+    chosen = integration.settings
     settings = exu.SimulationSettings()
     settings.solution.file.write = False
     settings.solution.sensors.writePeriod = integration.end / integration.samples
-    method = settings.timeIntegration
+    # The default inverts the matrix of some fifty unknowns, which takes nearly as long as the rest of the step.
+    settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
+    method: Any = settings.timeIntegration
     method.verboseMode = 0
     method.numberOfSteps = integration.steps
     method.endTime = integration.end
     # A refused step ends the run: a shorter one would miss the output times and hide the failure.
     method.adaptiveStep = False
-    method.generalizedAlpha.spectralRadius = integration.spectral_radius
-    method.newton.useModifiedNewton = True
-    method.newton.modifiedNewtonJacUpdatePerStep = True
-    method.newton.relativeTolerance = integration.newton_relative_tolerance
-    method.newton.absoluteTolerance = integration.newton_absolute_tolerance
+    method.generalizedAlpha.spectralRadius = chosen.spectral_radius
+    trapezoidal = chosen.solver == "trapezoidal-index2"
+    method.generalizedAlpha.useNewmark = method.generalizedAlpha.useIndex2Constraints = trapezoidal
+    method.newton.useModifiedNewton = chosen.jacobian != "iteration"
+    method.newton.modifiedNewtonJacUpdatePerStep = chosen.jacobian == "step"
+    method.newton.relativeTolerance = chosen.newton_relative_tolerance
+    method.newton.absoluteTolerance = chosen.newton_absolute_tolerance
     return settings
 
 

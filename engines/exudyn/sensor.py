@@ -1,0 +1,84 @@
+"""What a rolling joint shows: contact point, gap, slip and contact force, as sensors of the engine."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, get_args
+
+import exudyn as exu
+import numpy as np
+from exudyn.itemInterface import SensorUserFunction
+
+from . import kernel
+from .joint import RollingJoint
+
+Quantity = Literal["ContactPoint", "Gap", "Slip", "ContactForce"]
+
+
+def CreateRollingJointSensor(
+    mbs: exu.MainSystem,
+    joint: RollingJoint,
+    quantity: Quantity,
+    wheel: int = 0,
+    name: str = "",
+    storeInternal: bool = True,
+    fileName: str = "",
+) -> Any:
+    """Add a sensor of a rolling joint.
+
+    Parameters
+    ----------
+    mbs : exudyn.MainSystem
+    joint : RollingJoint
+    quantity : {"ContactPoint", "Gap", "Slip", "ContactForce"}
+        Point of the edge closest to the surface, (3,) [m]; its distance from the surface, (1,) [m];
+        the material velocity there, lateral and forward, (2,) [m/s]; force of the ground on the wheel,
+        (3,) [N]. Vectors in inertial axes.
+    wheel : int
+        Which of the joint's wheels.
+    name, storeInternal, fileName
+        As the engine's sensors take them.
+
+    Returns
+    -------
+    exudyn.SensorIndex
+
+    Raises
+    ------
+    ValueError
+        If there is no such quantity or wheel.
+    """
+    if quantity not in get_args(Quantity):
+        raise ValueError(f"there is no quantity {quantity!r}; there are {', '.join(get_args(Quantity))}")
+    if wheel not in range(len(joint.radii)):
+        raise ValueError(f"the joint has no wheel {wheel!r}; it has {len(joint.radii)}")
+    item = SensorUserFunction(
+        name=name,
+        sensorUserFunction=_user_function(joint, quantity, wheel),
+        storeInternal=storeInternal,
+        writeToFile=bool(fileName),
+        fileName=fileName,
+    )
+    return mbs.AddSensor(item)
+
+
+def _user_function(joint: RollingJoint, quantity: Quantity, wheel: int) -> Any:
+    state = np.zeros((2, 7))
+    state[0, 2], state[0, 3] = joint.radii[wheel], 1.0
+    point, frame, slip, gap = np.empty(3), np.empty((3, 3)), np.empty(2), np.empty(1)
+    function = joint.surface.function.real
+    shape = (joint.centres[wheel], joint.triads[wheel], joint.radii[wheel])
+    measure = kernel.probe(state, *shape, function, joint.surface.parameters, point, frame, slip, gap).__next__
+    seen = {"ContactPoint": point, "Gap": gap, "Slip": slip}
+    node, kind = joint.nodeNumbers[wheel], exu.OutputVariableType
+
+    # The generator does not keep the surface's compiled function alive: the default argument does.
+    def value(mbs, _time, _sensors, _factors, configuration, _function=function):
+        state[0] = mbs.GetNodeOutput(node, kind.CoordinatesTotal, configuration)
+        state[1] = mbs.GetNodeOutput(node, kind.Coordinates_t, configuration)
+        measure()
+        if quantity == "ContactForce":
+            multipliers = mbs.GetObjectOutput(joint.objectNumber, kind.Force, configuration)
+            return (-multipliers[3 * wheel : 3 * wheel + 3] @ frame).tolist()
+        return seen[quantity].tolist()
+
+    return value

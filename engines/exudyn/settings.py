@@ -1,0 +1,50 @@
+"""Settings of the engine's implicit solvers."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from engines.engine import Settings
+
+
+class SolverSettings(Settings):
+    """What every model in Exudyn is solved with."""
+
+    step: float = Field(
+        default=1e-3, ge=1e-6, le=0.05, description="Step size [s]; the output interval is a multiple of it."
+    )
+    solver: Literal["generalized-alpha", "trapezoidal-index2"] = Field(
+        default="generalized-alpha",
+        description="Generalized alpha (Chung and Hulbert 1993; Arnold and Bruels 2007) with positions constrained, "
+        "or the trapezoidal rule with velocities constrained (index 2), whose gaps and joints may drift.",
+    )
+    spectral_radius: float = Field(
+        default=0.8,
+        ge=0,
+        lt=1,
+        description="Generalized alpha's spectral radius at infinite frequency: below 1, or errors of the contact "
+        "forces never die out. The trapezoidal rule has none.",
+    )
+    jacobian: Literal["iteration", "step", "reuse"] = Field(
+        default="step",
+        description="When Newton's method renews its Jacobian: at every iteration, once a step, or when it converges "
+        "too slowly.",
+    )
+    newton_relative_tolerance: float = Field(
+        default=1e-10, gt=0, le=1e-4, description="Newton's method stops when its residual has fallen by this factor."
+    )
+    newton_absolute_tolerance: float = Field(
+        default=1e-12, gt=0, le=1e-4, description="Newton's method stops below this residual."
+    )
+
+
+class ExudynSettings(SolverSettings):
+    """Settings of the engine with true constraints."""
+
+    start: Literal["second-order", "engine"] = Field(
+        default="second-order",
+        description="How generalized alpha starts: corrected, so that contact forces are of second order from the "
+        "first step (Arnold, Bruels and Cardona 2015), or as the engine does, of first order until that dies out.",
+    )

@@ -1,0 +1,138 @@
+"""Start values for generalized alpha that give the multipliers its second order from the first step.
+
+Generalized alpha with positions constrained keeps q_n on the constraints, but its velocities leave them:
+with D = alpha_m - alpha_f the position formula has the error C h^3 q''', C = (1 - 6 beta - 3 D) / 6, so the
+velocities of the smooth numerical solution satisfy B v_n = C h^2 B q''' with B the constraints' Jacobian,
+and the auxiliary accelerations belong to the time t_n + D h. A start with B v = 0 and a_0 = q''_0, which is
+what the engine does, excites an oscillation of the multipliers of first order in h, damped by nothing but
+the spectral radius (Arnold, Bruels and Cardona: Error analysis of generalized-alpha Lie group time
+integration methods for constrained mechanical systems. Numerische Mathematik 129, 2015). The cure is to
+start from
+
+    v_0 + C h^2 P q''',    a_0 = q''_0 + D h q''',
+
+where P takes q''' to the velocities of smallest kinetic energy with the same B v and no slip: rows that
+hold velocities do so exactly. All of it comes from the engine: accelerations at the start and one step
+before and after, mass matrix, Jacobian. The initial sample keeps the velocities that it was given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+
+from engines.engine import EngineError
+
+from .method import generalized_alpha
+
+INITIAL: Any = exu.ConfigurationType.Initial
+CURRENT: Any = exu.ConfigurationType.Current
+
+
+@dataclass(frozen=True)
+class Start:
+    """Start values.
+
+    Attributes
+    ----------
+    acceleration, multipliers : ndarray
+        Of the given state.
+    auxiliary : ndarray
+        Generalized alpha's accelerations a_0.
+    velocity : ndarray
+        Corrected, to be set before the first step.
+    """
+
+    acceleration: np.ndarray
+    multipliers: np.ndarray
+    auxiliary: np.ndarray
+    velocity: np.ndarray
+
+
+def second_order_start(
+    system: exu.MainSystem, settings: exu.SimulationSettings, step: float, slip_equations: Sequence[int]
+) -> Start:
+    """Compute the start values from an assembled system's initial state.
+
+    Parameters
+    ----------
+    system : exudyn.MainSystem
+        Its initial state satisfies the constraints and is left as it is.
+    settings : exudyn.SimulationSettings
+        With generalized alpha.
+    step : float
+        Step size h [s].
+    slip_equations : sequence of int
+        Algebraic equations that hold velocities.
+
+    Raises
+    ------
+    EngineError
+        If the engine finds no accelerations.
+    """
+    data: Any = system.systemData
+    q, v = np.array(data.GetODE2Coordinates(INITIAL)), np.array(data.GetODE2Coordinates_t(INITIAL))
+    a, multipliers, mass, jacobian = _dynamics(system, settings, q, v)
+    if not np.all(np.isfinite(a)):
+        raise EngineError("exudyn could not start: it finds no initial accelerations; is a wheel without contact?")
+
+    def acceleration(h: float) -> np.ndarray:
+        return _dynamics(system, settings, q + h * v + h * h / 2 * a, v + h * a)[0]
+
+    jerk = (acceleration(step) - acceleration(-step)) / (2 * step)
+    _set_initial(system, q, v)
+    beta, _, shift = generalized_alpha(settings.timeIntegration.generalizedAlpha.spectralRadius)
+    excess = (1 - 6 * beta - 3 * shift) / 6 * step**2 * jacobian @ jerk
+    excess[list(slip_equations)] = 0.0
+    matrix = np.block([[mass, jacobian.T], [jacobian, np.zeros((len(excess), len(excess)))]])
+    correction = np.linalg.solve(matrix, np.concatenate([np.zeros(len(v)), excess]))[: len(v)]
+    return Start(a, multipliers, a + shift * step * jerk, v + correction)
+
+
+def begin(system: exu.MainSystem, settings: exu.SimulationSettings, solver: Any, start: Start) -> bool:
+    """Initialize a solver with start values; the velocity is left to `correct`."""
+    settings.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
+    # What the solver finds as initial accelerations becomes its auxiliary ones; the true ones follow.
+    data: Any = system.systemData
+    data.SetODE2Coordinates_tt(start.auxiliary, INITIAL)
+    ready = solver.InitializeSolver(system, settings)
+    data.SetODE2Coordinates_tt(start.acceleration, CURRENT)
+    data.SetAECoordinates(start.multipliers, CURRENT)
+    return ready
+
+
+def correct(system: exu.MainSystem, start: Start) -> None:
+    """Set the corrected velocity: after the initial sample, before the first step."""
+    data: Any = system.systemData
+    data.SetODE2Coordinates_t(start.velocity, CURRENT)
+
+
+def _set_initial(system: exu.MainSystem, q: np.ndarray, v: np.ndarray) -> None:
+    data: Any = system.systemData
+    data.SetODE2Coordinates(q, INITIAL)
+    data.SetODE2Coordinates_t(v, INITIAL)
+
+
+def _dynamics(
+    system: exu.MainSystem, settings: exu.SimulationSettings, q: np.ndarray, v: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Accelerations, multipliers, mass matrix and constraint Jacobian of a state, by the engine."""
+    _set_initial(system, q, v)
+    solver: Any = exu.MainSolverImplicitSecondOrder()
+    solver.InitializeSolver(system, settings)
+    try:
+        acceleration = np.array(system.systemData.GetODE2Coordinates_tt(CURRENT))
+        multipliers = np.array(system.systemData.GetAECoordinates(CURRENT))
+        solver.ComputeMassMatrix(system, 1.0)
+        mass = np.array(solver.GetSystemMassMatrix())
+        size = len(q) + len(multipliers)
+        solver.SetSystemJacobian(np.zeros((size, size)))
+        solver.ComputeJacobianAE(system, 1.0, 1.0, False)
+        jacobian = np.array(solver.GetSystemJacobian())[len(q) :, : len(q)]
+    finally:
+        solver.FinalizeSolver(system, settings)
+    return acceleration, multipliers, mass, jacobian
