@@ -1,1 +1,1 @@
-"""MuJoCo on the bicycle: the model as its users build it."""
+"""MuJoCo on the bicycle: a ladder of models, from its defaults to what its solver can be pushed to."""

@@ -1,31 +1,27 @@
-"""The ride itself: MuJoCo's steps, the planes that follow the wheels, and what is measured on the way."""
+"""The ride itself: MuJoCo's steps, and what is measured on the way."""
 
 # MuJoCo's compiled bindings carry no types.
 # pyright: reportAttributeAccessIssue=false
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from time import process_time
 
 import mujoco
 import numpy as np
-from numba import typeof
 
 from engines.engine import EngineError, Problem, Progress
-from engines.mujoco.model import mjcf
-from engines.mujoco.settings import NativeSettings
+from engines.mujoco.model import Touching, mjcf
+from engines.mujoco.settings import StepSettings
 from engines.mujoco.state import to_mujoco
-from engines.mujoco.tangent import place
 from reference.bicycle import BODIES
-from reference.kernels.dynamics import guess_contacts
-from reference.kinematics import WHEELS, constants
-from reference.surface import is_level
+from reference.kinematics import WHEELS
 
 REPORT_INTERVAL = 0.05
-# How often a bicycle on a resting plane is looked at: a wheel turns by far less than half a turn meanwhile.
+# How often a bicycle is looked at whose ground needs no care: a wheel turns by far less than half a turn meanwhile.
 LOOK_INTERVAL = 0.01
 UNSTABLE = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
@@ -68,93 +64,79 @@ class Recording:
         return Recording(*(getattr(self, name)[:n] for name in self.__dataclass_fields__))
 
 
-class Ground:
-    """The planes under the wheels, and the contact parameters at which the next search starts.
-
-    Parameters
-    ----------
-    problem : Problem
-    data : mujoco.MjData
-    moving : bool
-        Whether the model has one moving plane a wheel; otherwise this only looks for the contacts.
-    step : float
-        Time step [s].
-
-    Attributes
-    ----------
-    stride : int
-        Steps from one `follow` to the next, counted from the start, so that a ride ends where it ends
-        whatever the output times.
-    """
-
-    def __init__(self, problem: Problem, data: mujoco.MjData, moving: bool, step: float) -> None:
-        self.stride = 1 if moving else max(1, int(LOOK_INTERVAL / step))
-        position, quaternion = (data.mocap_pos, data.mocap_quat) if moving else (np.empty((2, 3)), np.empty((2, 4)))
-        c, contact = constants(problem.bicycle), np.empty(6)
-        function, parameters = problem.surface.function.real, problem.surface.parameters
-        guess_contacts(problem.q, contact, function, parameters, c)
-        self._arguments = (data.qpos, c, function, parameters, contact, position, quaternion)
-        # The types never change, and finding them out takes numba longer than MuJoCo its step.
-        self._place = place.compile(tuple(typeof(argument) for argument in self._arguments))
-
-    def follow(self) -> bool:
-        """Put the planes under the wheels where they are; False if a wheel has no contact point."""
-        return self._place(*self._arguments)
-
-
 @dataclass(frozen=True)
 class Rig:
-    """A model with its state and its ground.
+    """A model with its state, and how it touches the ground.
 
     Attributes
     ----------
     model : mujoco.MjModel
     data : mujoco.MjData
-    ground : Ground
     bodies : list of int
         MuJoCo's numbers of the four bodies, in the order of `BODIES`.
     wheels : dict of int
         From MuJoCo's number of a wheel's geom to the wheel, 0 rear and 1 front.
+    follow : callable
+        To be called every ``stride`` steps and before the first; False if a wheel has no contact point.
+    stride : int
+        Counted from the start, so that a ride ends where it ends whatever the output times.
+    forces : callable
+        Fills an array (2, 3) with the contact forces of the last evaluation, inertial axes [N].
+    callbacks : callable
+        Gives the context in which the model may be stepped.
     """
 
     model: mujoco.MjModel
     data: mujoco.MjData
-    ground: Ground
     bodies: list[int]
     wheels: dict[int, int]
+    follow: Callable[[], bool]
+    stride: int
+    forces: Callable[[np.ndarray], None]
+    callbacks: Callable[[], AbstractContextManager[None]] = nullcontext
 
 
-def build(problem: Problem, settings: NativeSettings) -> Rig:
-    """Everything at the start of a problem.
+def start(problem: Problem, settings: StepSettings, touching: Touching) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """The model, and its state at the start of a problem.
 
     Raises
     ------
     EngineError
-        If MuJoCo refuses the model or a wheel has no contact point.
+        If MuJoCo refuses the model.
     """
-    moving = not is_level(problem.surface)
     try:
-        model = mujoco.MjModel.from_xml_string(mjcf(problem.bicycle, settings, moving))
+        model = mujoco.MjModel.from_xml_string(mjcf(problem.bicycle, settings, touching))
     except ValueError as error:
         raise EngineError(f"MuJoCo refuses the bicycle: {error}") from error
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = to_mujoco(problem.q, problem.qd)
-    ground = Ground(problem, data, moving, settings.step)
-    if not ground.follow():
-        raise EngineError("a wheel has no contact point with the surface at the start")
-    bodies = [model.body(name).id for name in BODIES]
-    return Rig(model, data, ground, bodies, {model.geom(name).id: k for k, name in enumerate(WHEELS)})
+    return model, data
 
 
-def contact_forces(rig: Rig, out: np.ndarray) -> None:
+def look_stride(step: float) -> int:
+    """Steps in `LOOK_INTERVAL`."""
+    return max(1, int(LOOK_INTERVAL / step))
+
+
+def bodies(model: mujoco.MjModel) -> list[int]:
+    """MuJoCo's numbers of the four bodies, in the order of `BODIES`."""
+    return [model.body(name).id for name in BODIES]
+
+
+def wheel_geoms(model: mujoco.MjModel) -> dict[int, int]:
+    """From MuJoCo's number of a wheel's geom to the wheel, 0 rear and 1 front."""
+    return {model.geom(name).id: k for k, name in enumerate(WHEELS)}
+
+
+def contact_forces(model: mujoco.MjModel, data: mujoco.MjData, wheels: dict[int, int], out: np.ndarray) -> None:
     """Fill ``out`` (2, 3) with MuJoCo's contact forces on the wheels, inertial axes; zero without contact."""
     out[:] = 0
     wrench = np.empty(6)
-    contacts = rig.data.contact
-    for i in range(rig.data.ncon):
-        mujoco.mj_contactForce(rig.model, rig.data, i, wrench)
+    contacts = data.contact
+    for i in range(data.ncon):
+        mujoco.mj_contactForce(model, data, i, wrench)
         # The frame's rows are its axes; the normal points from the plane, the first geom, to the wheel.
-        out[rig.wheels[int(contacts.geom[i, 1])]] += contacts.frame[i].reshape(3, 3).T @ wrench[:3]
+        out[wheels[int(contacts.geom[i, 1])]] += contacts.frame[i].reshape(3, 3).T @ wrench[:3]
 
 
 def record(rig: Rig, recording: Recording, k: int) -> None:
@@ -170,7 +152,7 @@ def record(rig: Rig, recording: Recording, k: int) -> None:
     recording.qpos[k], recording.qvel[k] = data.qpos, data.qvel
     recording.position[k], recording.quaternion[k] = data.xipos[rig.bodies], data.xquat[rig.bodies]
     recording.energy[k] = data.energy
-    contact_forces(rig, recording.force[k])
+    rig.forces(recording.force[k])
 
 
 def trouble(data: mujoco.MjData, standing: bool) -> str | None:
@@ -183,12 +165,11 @@ def trouble(data: mujoco.MjData, standing: bool) -> str | None:
 
 def advance(rig: Rig, steps: int, until: int) -> tuple[int, bool]:
     """Go on from ``steps`` to ``until`` steps, or as far as there is ground; returns the steps and whether there is."""
-    stride = rig.ground.stride
     while steps < until:
-        count = min(until - steps, stride - steps % stride)
+        count = min(until - steps, rig.stride - steps % rig.stride)
         mujoco.mj_step(rig.model, rig.data, count)
         steps += count
-        if steps % stride == 0 and not rig.ground.follow():
+        if steps % rig.stride == 0 and not rig.follow():
             return steps, False
     return steps, True
 
@@ -204,15 +185,14 @@ def silent() -> Iterator[None]:
         mujoco.set_mju_user_warning(previous)
 
 
-def ride(
-    problem: Problem, settings: NativeSettings, counts: list[int], progress: Progress
-) -> tuple[Recording, int, float, str | None]:
-    """Integrate a problem.
+def ride(rig: Rig, step: float, counts: list[int], progress: Progress) -> tuple[Recording, int, float, str | None]:
+    """Integrate from the state that a rig is in.
 
     Parameters
     ----------
-    problem : Problem
-    settings : NativeSettings
+    rig : Rig
+    step : float
+        Time step [s].
     counts : list of int
         Steps from the start to each output time.
     progress : callable
@@ -226,12 +206,19 @@ def ride(
         Process CPU time of the steps [s].
     ended : str or None
         Why the ride ended early.
+
+    Raises
+    ------
+    EngineError
+        If a wheel stands nowhere at the start.
     """
-    rig = build(problem, settings)
     recording = Recording.empty(len(counts))
     steps, cpu_time, reported = 0, 0.0, 0
-    most = max(1, int(REPORT_INTERVAL / settings.step))
-    with silent():
+    most = max(1, int(REPORT_INTERVAL / step))
+    with silent(), rig.callbacks():
+        mujoco.mj_forward(rig.model, rig.data)
+        if not rig.follow():
+            raise EngineError("a wheel has no contact point with the surface at the start")
         record(rig, recording, 0)
         for k in range(1, len(counts)):
             while steps < counts[k]:
@@ -240,9 +227,9 @@ def ride(
                 cpu_time += process_time() - begun
                 ended = trouble(rig.data, standing)
                 if ended is not None:
-                    return recording.first(k), steps, cpu_time, f"{ended} at {steps * settings.step:.6g} s"
+                    return recording.first(k), steps, cpu_time, f"{ended} at {steps * step:.6g} s"
                 if steps - reported >= most:
                     reported = steps
-                    progress(steps * settings.step)
+                    progress(steps * step)
             record(rig, recording, k)
     return recording, steps, cpu_time, None

@@ -14,14 +14,16 @@ from pydantic import ValidationError
 from scipy.optimize import root
 
 from engines.engine import EngineError, Problem, Trajectory
-from engines.mujoco.model import IMPEDANCE
+from engines.mujoco.creep import contact_acceleration
 from engines.mujoco.native import ENGINE
-from engines.mujoco.ride import Rig, build
+from engines.mujoco.planes import build
+from engines.mujoco.ride import Rig
+from engines.mujoco.settings import IMPEDANCES
 from engines.mujoco.state import HINGES, from_mujoco, spin_matrix, to_mujoco
+from engines.mujoco.study import slip_power
 from reference.bicycle import Bicycle
 from reference.contact import observe
 from reference.dae import consistent_state, dynamics
-from reference.kernels import contact as contact_kernel
 from reference.kernels import dynamics as kernel
 from reference.kinematics import body_positions, constants, quaternions, rotations
 from reference.surface import Paraboloid, Plane, Surface, surface_function
@@ -214,24 +216,9 @@ def test_moving_planes_on_flat_ground_change_nothing(circle):
 
 
 def creep(problem: Problem, trajectory: Trajectory) -> tuple[np.ndarray, float]:
-    """Slip (n, 2, 2) that balances J' q' / b at each sample, and b.
-
-    `rolling` gives J' q' of the contacts in inertial axes; b = 2 / (d_max time_constant).
-    """
-    c, surface = constants(problem.bicycle), problem.surface
-    function, parameters = surface.function.real, surface.parameters
-    b = 2 / (IMPEDANCE[1] * ENGINE.settings(**trajectory.settings).contact_time)
-    out = np.empty((len(trajectory.time), 2, 2))
-    jacobian, gamma, rate, p = np.empty((6, 9)), np.empty(6), np.empty(6), np.empty(6)
-    for n, (q, qd) in enumerate(zip(trajectory.q, trajectory.qd, strict=True)):
-        kernel.guess_contacts(q, p, function, parameters, c)
-        assert kernel.find_contacts(q, p, function, parameters, c)
-        kernel.rolling(q, qd, p, function, parameters, c, jacobian, gamma, rate)
-        for k, (centre, x, axle, z, radius) in enumerate(kernel.wheels(q, c)):
-            xi, eta, angle = p[3 * k : 3 * k + 3]
-            normal = contact_kernel.equations(centre, x, z, radius, xi, eta, angle, function, parameters)[3]
-            out[n, k] = [direction @ gamma[3 * k : 3 * k + 3] for direction in contact_kernel.tangents(axle, normal)]
-    return out / b, b
+    """Slip (n, 2, 2) that balances J' q' / b at each sample, and b."""
+    b = ENGINE.settings(**trajectory.settings).damping
+    return contact_acceleration(problem.bicycle, problem.surface, trajectory.q, trajectory.qd) / b, b
 
 
 @pytest.mark.parametrize("step", [0.002, 0.001])
@@ -251,22 +238,10 @@ def test_wheels_creep_by_the_missing_acceleration(start, step, request):
     error = np.linalg.norm(trajectory.slip - predicted, axis=2)
     size = np.linalg.norm(predicted, axis=2)
     depth = np.abs(trajectory.qd[:, 7:]) * np.abs(trajectory.gap) / 2
-    compliance = 2 * (1 - IMPEDANCE[0]) / IMPEDANCE[0] / 100
+    compliance = 2 * (1 - IMPEDANCES[0]) / IMPEDANCES[0] / 100
     settled = trajectory.time > 0.1  # 1 / b is 2 ms
     assert np.all((error <= depth + size * (FASTEST_MODE / b + compliance))[settled])
     assert size[settled].min() > 10 * step * 0.5  # v^2 / R is about 12 m/s^2: the law is not met by zeros
-
-
-def friction_power(problem: Problem, trajectory: Trajectory) -> np.ndarray:
-    """Power of the contact forces on the slipping wheels, shape (n,) [W]."""
-    seen = observe(problem.bicycle, problem.surface, trajectory.q, trajectory.qd)
-    power = np.zeros(len(trajectory.time))
-    assert trajectory.contact_force is not None
-    for n, q in enumerate(trajectory.q):
-        for k, wheel in enumerate(kernel.wheels(q, constants(problem.bicycle))):
-            directions = np.array(contact_kernel.tangents(wheel[2], tuple(seen.normal[n, k])))
-            power[n] += (directions @ trajectory.contact_force[n, k]) @ seen.slip[n, k]
-    return power
 
 
 def euler_power(problem: Problem, step: float) -> float:
@@ -299,7 +274,7 @@ def test_energy_is_lost_to_creep_and_gained_by_the_integrator(circle, integrator
     trajectory = run(circle, integrator=integrator)
     settled = trajectory.time >= 0.1
     time, energy = trajectory.time[settled], total_energy(trajectory)[settled]
-    work = np.trapezoid(friction_power(circle, trajectory)[settled], time)
+    work = np.trapezoid(slip_power(circle, trajectory)[settled], time)
     gain = euler_power(circle, 0.002) * (time[-1] - time[0]) if integrator == "implicitfast" else 0.0
     # The gain is taken at the start; the wheels lose 1.5 % of their speed in 2 s, power goes with its cube,
     # so its mean is half of 4.5 % off. The next order in the step, spin * step, is 3.6 %.

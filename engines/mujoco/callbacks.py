@@ -1,0 +1,56 @@
+"""Installing compiled callbacks in MuJoCo, for a while and one user at a time: MuJoCo has them once a process."""
+
+# MuJoCo's compiled bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Lock
+from typing import Any
+
+import mujoco
+
+from engines.engine import EngineError
+from engines.mujoco.compiled import board
+from engines.mujoco.library import collision_slot
+
+_in_use = Lock()
+
+
+@contextmanager
+def installed(control: Any, collision: Any = None) -> Iterator[None]:
+    """Let MuJoCo call compiled functions; what it called before is restored, however the block ends.
+
+    Parameters
+    ----------
+    control : numba cfunc
+        Called in every evaluation of the dynamics, after MuJoCo knows its constraints and bias forces.
+    collision : numba cfunc, optional
+        Called for planes with cylinders.
+
+    Raises
+    ------
+    EngineError
+        If callbacks are in use already, here or by someone else in this process.
+    """
+    if not _in_use.acquire(blocking=False):
+        raise EngineError("another model with compiled callbacks runs in this process; one must end before the next")
+    try:
+        if mujoco.get_mjcb_control() is not None:
+            raise EngineError("MuJoCo has a control callback already; mujoco.set_mjcb_control(None) ends it")
+        slot = collision_slot()
+        before = slot.value
+        try:
+            if collision is not None:
+                board["collision"] = before
+                slot.value = ctypes.cast(collision.ctypes, ctypes.c_void_p).value
+            mujoco.set_mjcb_control(control.ctypes)
+            yield
+        finally:
+            mujoco.set_mjcb_control(None)
+            slot.value = before
+    finally:
+        _in_use.release()

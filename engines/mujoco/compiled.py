@@ -1,0 +1,367 @@
+"""Compiled callbacks that MuJoCo calls inside its step: knife-edge contacts, and forces instead of contacts.
+
+A wheel is a circle of radius r about its geom's z axis. Its contact with the ground z = f(x, y) is the
+closest approach of the two (`reference.kernels.contact`), and a material point of the rim there has
+
+    velocity      v = Jp q'
+    acceleration  Jp q'' + gamma,    gamma = Jp' q' + w x (r a' t)
+
+where Jp' follows the material point and a' t r is how the contact runs along the rim. MuJoCo's contact rows
+prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `correct` subtracts it.
+
+`press` leaves the contacts to itself: it solves, for the six forces on two wheels,
+
+    Jp M^-1 Jp^T F = -(Jp a + gamma + s^2 gap n + 2 s v),    M a = passive - bias
+
+and applies Jp^T F; s is a rate of stabilisation, which on the constraints adds nothing.
+
+What the callbacks work on is one `BLACKBOARD` a process: numbers, and addresses of arrays that stay where
+they are while a model lives. Its own address comes from a function that the linker resolves, so that the
+code can be kept on disk. All of it is in one file, because a changed file is what renews numba's cache.
+"""
+
+# numba gives an intrinsic its typing context, and knows what its results are.
+# pyright: reportCallIssue=false, reportGeneralTypeIssues=false
+
+from __future__ import annotations
+
+import llvmlite.binding as llvm
+import numpy as np
+from numba import cfunc, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numba.np.numpy_support import carray
+
+from engines.mujoco.library import announce
+from reference.kernels import contact
+from reference.kernels.linear import factorise, solve_factorised
+from reference.kernels.vector import add, cross, dot, jit, scale
+
+WHEELS = 8  # the most that a blackboard has room for
+# A wheel whose centre is less than this above its contact lies flat [m].
+FLAT = 1e-4
+
+_ADDRESS = np.uintp
+BLACKBOARD = np.dtype(
+    [
+        # Callbacks are for one model's one state; others pass.
+        ("model", _ADDRESS),
+        ("data", _ADDRESS),
+        ("collision", _ADDRESS),  # MuJoCo's own function for planes and cylinders
+        ("surface", _ADDRESS),
+        ("parameters", _ADDRESS),
+        ("parameter_count", np.int64),
+        ("speeds", np.int64),
+        # Arrays of the state that never move.
+        ("qvel", _ADDRESS),
+        ("geom_xpos", _ADDRESS),
+        ("geom_xmat", _ADDRESS),
+        ("qfrc_bias", _ADDRESS),
+        ("qfrc_passive", _ADDRESS),
+        ("qfrc_applied", _ADDRESS),
+        # Where the state keeps what does move, and where a contact keeps its parts.
+        ("ncon_at", np.int64),
+        ("contact_at", np.int64),
+        ("efc_aref_at", np.int64),
+        ("efc_KBIP_at", np.int64),
+        ("contact_size", np.int64),
+        ("frame_at", np.int64),
+        ("margin_at", np.int64),
+        ("friction_at", np.int64),
+        ("geom_at", np.int64),
+        ("row_at", np.int64),
+        ("pyramidal", np.int64),
+        ("stabilisation", np.float64),
+        # The wheels.
+        ("wheels", np.int64),
+        ("ground", np.int64, WHEELS),
+        ("geom", np.int64, WHEELS),
+        ("body", np.int64, WHEELS),
+        ("radius", np.float64, WHEELS),
+        ("place", np.float64, (WHEELS, 3)),  # xi, eta, angle of the contacts
+        ("force", np.float64, (WHEELS, 3)),
+        ("lost", np.int64),  # how often a wheel had no contact point
+        ("found", np.int64),  # contacts made since the callbacks were installed
+    ],
+    align=True,
+)
+
+board = np.zeros(1, BLACKBOARD)
+_BOARD_AT = board.ctypes.data
+_WHERE = "velodrome_mujoco_blackboard"
+
+
+# Compiled anew in every process, the only code that knows an address.
+@cfunc(types.uintp())
+def _where_the_board_is():
+    return _BOARD_AT
+
+
+llvm.add_symbol(_WHERE, _where_the_board_is.address)
+announce("mj_jac", "mj_jacDot", "mj_solveM")
+
+_pointer = types.voidptr
+_numbers = types.CPointer(types.float64)
+_where = types.ExternalFunction(_WHERE, types.uintp())
+_jac = types.ExternalFunction("mj_jac", types.void(_pointer, _pointer, _numbers, _numbers, _numbers, types.int32))
+_jac_dot = types.ExternalFunction(
+    "mj_jacDot", types.void(_pointer, _pointer, _numbers, _numbers, _numbers, types.int32)
+)
+_solve_mass = types.ExternalFunction("mj_solveM", types.void(_pointer, _pointer, _numbers, _numbers, types.int32))
+_SURFACE = types.FunctionType(
+    types.UniTuple(types.float64, 6)(types.float64, types.float64, types.Array(types.float64, 1, "C"))
+)
+COLLISION = types.int32(_pointer, _pointer, _pointer, types.int32, types.int32, types.float64)
+CONTROL = types.void(_pointer, _pointer)
+_COLLISION = types.FunctionType(COLLISION)
+
+
+@intrinsic
+def _function_at(typing, address, kind):
+    """Make an address a function of a given type, called as C functions are."""
+    function = kind.instance_type
+
+    def build(context, builder, signature, arguments):
+        made = cgutils.create_struct_proxy(function)(context, builder)
+        null = cgutils.voidptr_t(None)
+        made.c_addr = builder.inttoptr(arguments[0], cgutils.voidptr_t)
+        made.py_addr, made.jit_addr = null, null
+        return made._getvalue()
+
+    return function(address, kind), build
+
+
+@intrinsic
+def _pointer_at(typing, address):
+    """Make an integer an address."""
+
+    def build(context, builder, signature, arguments):
+        return builder.inttoptr(arguments[0], cgutils.voidptr_t)
+
+    return _pointer(address), build
+
+
+@intrinsic
+def _address_of(typing, pointer):
+    """Make an address an integer."""
+
+    def build(context, builder, signature, arguments):
+        return builder.ptrtoint(arguments[0], context.get_value_type(types.uintp))
+
+    return types.uintp(pointer), build
+
+
+@jit
+def _reals(address, count):
+    return carray(_pointer_at(address), (count,), np.float64)
+
+
+@jit
+def _integer(address):
+    return carray(_pointer_at(address), (1,), np.int32)[0]
+
+
+@jit
+def _stored(address):
+    return carray(_pointer_at(address), (1,), np.uintp)[0]
+
+
+@jit
+def _blackboard():
+    return carray(_pointer_at(_where()), (1,), BLACKBOARD)[0]
+
+
+@jit
+def _is_for(board, model, data):
+    return _address_of(model) == board.model and _address_of(data) == board.data
+
+
+@jit
+def rim_axes(axle):
+    """Axes (x, z) of a wheel's plane, x level; nan where the wheel lies flat."""
+    x = (axle[1], -axle[0], 0.0)
+    length = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    x = scale(1 / length, x)
+    return x, cross(x, axle)
+
+
+@jit
+def _wheel(board, k):
+    """Return (centre, axle) of wheel k."""
+    geom = board.geom[k]
+    at, turn = _reals(board.geom_xpos, 3 * geom + 3), _reals(board.geom_xmat, 9 * geom + 9)
+    i, j = 3 * geom, 9 * geom
+    return (at[i], at[i + 1], at[i + 2]), (turn[j + 2], turn[j + 5], turn[j + 8])
+
+
+@jit
+def _contact_at(board, k):
+    """Evaluate wheel k's contact at its place on the blackboard."""
+    centre, axle = _wheel(board, k)
+    x, z = rim_axes(axle)
+    function = _function_at(board.surface, _SURFACE)
+    xi, eta, angle = board.place[k, 0], board.place[k, 1], board.place[k, 2]
+    parameters = _reals(board.parameters, board.parameter_count)
+    here = contact.equations(centre, x, z, board.radius[k], xi, eta, angle, function, parameters)
+    return centre, axle, here
+
+
+@jit
+def _find(board, k):
+    """Search wheel k's contact from its pose alone and keep its place; True where it stands on the ground."""
+    centre, axle = _wheel(board, k)
+    x, z = rim_axes(axle)
+    radius, function = board.radius[k], _function_at(board.surface, _SURFACE)
+    parameters = _reals(board.parameters, board.parameter_count)
+    xi, eta, angle = contact.first_guess(centre, x, z, radius, function, parameters)
+    xi, eta, angle, found = contact.search(centre, x, z, radius, xi, eta, angle, function, parameters)
+    board.place[k, 0], board.place[k, 1], board.place[k, 2] = xi, eta, angle
+    if not found:
+        return False
+    here = contact.equations(centre, x, z, radius, xi, eta, angle, function, parameters)
+    # Not ">=": what is no number is no contact either. Above its centre the search went round the rim.
+    return bool(dot(here.arm, here.normal) < -FLAT) and bool(np.isfinite(here.gap))
+
+
+@jit
+def _motion(board, k, model, data, rows, turning):
+    """Fill the contact point's velocity rows (3, n); return (contact, velocity, gamma).
+
+    ``turning`` (3, n) is room for the rows of the angular velocity.
+    """
+    centre, _, here = _contact_at(board, k)
+    point, rate = np.empty(3), np.empty((6, board.speeds))
+    for i in range(3):
+        point[i] = centre[i] + here.arm[i]
+    body = types.int32(board.body[k])
+    _jac(model, data, rows.ctypes, turning.ctypes, point.ctypes, body)
+    _jac_dot(model, data, rate[:3].ctypes, rate[3:].ctypes, point.ctypes, body)
+    qvel = _reals(board.qvel, board.speeds)
+    v, w, gamma = np.zeros(3), np.zeros(3), np.zeros(3)
+    for i in range(3):
+        for j in range(board.speeds):
+            v[i] += rows[i, j] * qvel[j]
+            w[i] += turning[i, j] * qvel[j]
+            gamma[i] += rate[i, j] * qvel[j]
+    velocity, spin = (v[0], v[1], v[2]), (w[0], w[1], w[2])
+    along = board.radius[k] * contact.rates(here, velocity, spin)[2]
+    return here, velocity, add((gamma[0], gamma[1], gamma[2]), cross(spin, scale(along, here.tangent)))
+
+
+@cfunc(COLLISION, cache=True, error_model="numpy")
+def touch(model, data, made, ground, geom, margin):
+    """Collision function for planes and cylinders: a knife edge's contact with the true ground.
+
+    Other planes and cylinders, and other models, get MuJoCo's own. A wheel without a contact point makes
+    no contact and is counted.
+    """
+    board = _blackboard()
+    if _is_for(board, model, data):
+        for k in range(board.wheels):
+            if board.geom[k] == geom and board.ground[k] == ground:
+                if not _find(board, k):
+                    board.lost += 1
+                    return types.int32(0)
+                board.found += 1
+                centre, _, here = _contact_at(board, k)
+                out = _reals(_address_of(made), 10)
+                out[0] = here.gap
+                for i in range(3):
+                    out[1 + i] = centre[i] + here.arm[i]
+                    out[4 + i] = here.normal[i]
+                    out[7 + i] = here.tangent[i]
+                return types.int32(1)
+    return _function_at(board.collision, _COLLISION)(model, data, made, ground, geom, margin)
+
+
+@jit
+def _wheel_of(board, geom, ground):
+    for k in range(board.wheels):
+        if board.geom[k] == geom and board.ground[k] == ground:
+            return k
+    return -1
+
+
+@jit
+def _correct_rows(board, contact_at, first_row, aref, kbip, gamma):
+    """Subtract gamma from the reference accelerations of one contact, and the margin from its distance."""
+    frame = _reals(contact_at + board.frame_at, 9)
+    margin = _reals(contact_at + board.margin_at, 1)[0]
+    along = np.zeros(3)
+    for i in range(3):
+        for j in range(3):
+            along[i] += frame[3 * i + j] * gamma[j]
+    # MuJoCo holds a wheel at its margin; it shall touch.
+    stiffness = kbip[4 * first_row] * kbip[4 * first_row + 2]
+    if board.pyramidal:
+        friction = _reals(contact_at + board.friction_at, 2)
+        for i in range(2):
+            for side in range(2):
+                sign = 1 - 2 * side
+                aref[first_row + 2 * i + side] -= along[0] + sign * friction[i] * along[1 + i] + stiffness * margin
+        return
+    aref[first_row] -= along[0] + stiffness * margin
+    aref[first_row + 1] -= along[1]
+    aref[first_row + 2] -= along[2]
+
+
+@cfunc(CONTROL, cache=True, error_model="numpy")
+def correct(model, data):
+    """Control callback: bring the contacts' own acceleration into MuJoCo's reference accelerations."""
+    board = _blackboard()
+    if not _is_for(board, model, data):
+        return
+    base = _address_of(data)
+    count = _integer(base + types.uintp(board.ncon_at))
+    if count == 0:
+        return
+    contacts = _stored(base + types.uintp(board.contact_at))
+    rows, turning = np.empty((3, board.speeds)), np.empty((3, board.speeds))
+    for i in range(count):
+        contact_at = contacts + types.uintp(i * board.contact_size)
+        pair = contact_at + types.uintp(board.geom_at)
+        k = _wheel_of(board, _integer(pair + types.uintp(4)), _integer(pair))
+        first_row = _integer(contact_at + types.uintp(board.row_at))
+        if k < 0 or first_row < 0:
+            continue
+        aref = _reals(_stored(base + types.uintp(board.efc_aref_at)), first_row + 4)
+        kbip = _reals(_stored(base + types.uintp(board.efc_KBIP_at)), 4 * first_row + 4)
+        _, _, gamma = _motion(board, k, model, data, rows, turning)
+        _correct_rows(board, contact_at, first_row, aref, kbip, gamma)
+
+
+@cfunc(CONTROL, cache=True, error_model="numpy")
+def press(model, data):
+    """Control callback: the contact forces of rolling without slip, as applied forces."""
+    board = _blackboard()
+    if not _is_for(board, model, data):
+        return
+    n, size = board.speeds, 3 * board.wheels
+    applied = _reals(board.qfrc_applied, n)
+    applied[:] = 0
+    rows, spread, turning = np.empty((size, n)), np.empty((size, n)), np.empty((3, n))
+    force, free, smooth = np.empty(size), np.empty(n), np.empty(n)
+    bias, passive = _reals(board.qfrc_bias, n), _reals(board.qfrc_passive, n)
+    for j in range(n):
+        smooth[j] = passive[j] - bias[j]
+    _solve_mass(model, data, free.ctypes, smooth.ctypes, types.int32(1))
+    s = board.stabilisation
+    for k in range(board.wheels):
+        if not _find(board, k):
+            board.lost += 1
+            return
+        board.found += 1
+        here, velocity, gamma = _motion(board, k, model, data, rows[3 * k : 3 * k + 3], turning)
+        for i in range(3):
+            total = gamma[i] + s * s * here.gap * here.normal[i] + 2 * s * velocity[i]
+            for j in range(n):
+                total += rows[3 * k + i, j] * free[j]
+            force[3 * k + i] = -total
+    _solve_mass(model, data, spread.ctypes, rows.ctypes, types.int32(size))
+    schur = rows @ spread.T
+    factorise(schur, size)
+    solve_factorised(schur, force, size)
+    for i in range(size):
+        board.force[i // 3, i % 3] = force[i]
+        for j in range(n):
+            applied[j] += rows[i, j] * force[i]

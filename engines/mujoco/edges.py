@@ -1,0 +1,66 @@
+"""The bicycle on knife edges: with MuJoCo's contact solver, or with forces that are solved for it."""
+
+# MuJoCo's compiled bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from engines.engine import Problem
+from engines.mujoco.knife_edge import knife_edges, pressing_forces, rolling_forces, standing, stiffen
+from engines.mujoco.ride import Rig, bodies, contact_forces, look_stride, start, wheel_geoms
+from engines.mujoco.settings import ExactContactSettings, MultiplierSettings
+from reference.kinematics import WHEELS
+
+GROUNDS: dict[str, str] = dict.fromkeys(WHEELS, "ground")
+
+
+def build_contacts(problem: Problem, settings: ExactContactSettings) -> Rig:
+    """MuJoCo's contact rows and solver on exact contacts.
+
+    Raises
+    ------
+    EngineError
+        If MuJoCo refuses the model.
+    """
+    model, data = start(problem, settings, "edges")
+    stiffen(model, GROUNDS, settings.softness)
+    wheels = wheel_geoms(model)
+    return Rig(
+        model=model,
+        data=data,
+        bodies=bodies(model),
+        wheels=wheels,
+        follow=standing,
+        stride=look_stride(settings.step),
+        forces=partial(contact_forces, model, data, wheels),
+        callbacks=lambda: knife_edges(model, data, problem.surface, GROUNDS),
+    )
+
+
+def build_multipliers(problem: Problem, settings: MultiplierSettings) -> Rig:
+    """MuJoCo's tree under the exact forces of rolling.
+
+    Raises
+    ------
+    EngineError
+        If MuJoCo refuses the model.
+    """
+    model, data = start(problem, settings, "nothing")
+
+    def forces(out: np.ndarray) -> None:
+        out[:] = pressing_forces(2)
+
+    return Rig(
+        model=model,
+        data=data,
+        bodies=bodies(model),
+        wheels=wheel_geoms(model),
+        follow=standing,
+        stride=look_stride(settings.step),
+        forces=forces,
+        callbacks=lambda: rolling_forces(model, data, problem.surface, GROUNDS, settings.stabilisation),
+    )

@@ -1,0 +1,127 @@
+"""What all of MuJoCo's models have in common as engines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+import numpy as np
+
+from engines.engine import Problem, Progress, Trajectory
+from engines.mujoco.settings import StepSettings
+from engines.mujoco.state import from_mujoco
+from reference.contact import observe
+
+if TYPE_CHECKING:
+    from engines.mujoco.ride import Rig
+
+S = TypeVar("S", bound=StepSettings)
+GIVES = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
+# Output times and steps are both rounded decimals: a millionth of a step is far above their round-off.
+ROUND_OFF = 1e-6
+
+
+def step_counts(times: np.ndarray, step: float) -> list[int]:
+    """Whole numbers of steps from the start to each of the output times (n,).
+
+    Raises
+    ------
+    ValueError
+        If an output time lies between two steps.
+    """
+    counts = np.round(times / step)
+    if np.any(np.abs(times - counts * step) > ROUND_OFF * step) or np.any(np.diff(counts) < 1):
+        interval = float(np.diff(times).min())
+        right = interval / np.ceil(interval / step * (1 - ROUND_OFF))
+        raise ValueError(
+            f"step is {step!r}; it must divide the output interval of {interval:.9g} s, as {right:.9g} would"
+        )
+    return [int(count) for count in counts]
+
+
+@dataclass(frozen=True)
+class MujocoEngine(Generic[S]):
+    """A MuJoCo model as an engine.
+
+    Attributes
+    ----------
+    name : str
+    settings : type
+    builder : str
+        Module and name of the function that makes a `Rig` of a problem and settings. It is imported when
+        something runs, so that listing the engines does not load the library.
+    gives : tuple of str
+    """
+
+    name: str
+    settings: type[S]
+    builder: str
+    gives: tuple[str, ...] = GIVES
+
+    @property
+    def version(self) -> str:
+        """Version of MuJoCo."""
+        return version("mujoco")
+
+    def check(self, problem: Problem, settings: Any) -> None:
+        """Refuse output times that the step does not meet; see `engines.engine.Engine`."""
+        step_counts(problem.times, settings.step)
+
+    def step_noise(self, settings: Any) -> float:
+        """What the contact solver may leave unconverged in a step, or round-off; see `engines.engine.Engine`."""
+        return settings.noise
+
+    def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
+        """Run a problem.
+
+        Parameters
+        ----------
+        problem : Problem
+            Its output times must be multiples of the step.
+        settings : StepSettings
+        progress : callable
+            Called with the simulated time [s] at most every 50 ms of it.
+
+        Returns
+        -------
+        Trajectory
+            Gap and slip are those of the wheels' knife edges on the true surface.
+
+        Raises
+        ------
+        ValueError
+            If an output time lies between two steps.
+        EngineError
+            If MuJoCo refuses the model, or a wheel stands nowhere at the start.
+        """
+        counts = step_counts(problem.times, settings.step)
+        from engines.mujoco.ride import ride
+
+        module, name = self.builder.split(":")
+        build: Callable[[Problem, Any], Rig] = getattr(import_module(module), name)
+        recording, steps, cpu_time, ended = ride(build(problem, settings), settings.step, counts, progress)
+        time = problem.times[: len(recording.qpos)]
+        q, qd = from_mujoco(time, recording.qpos, recording.qvel, problem.q)
+        seen = observe(problem.bicycle, problem.surface, q, qd)
+        return Trajectory(
+            engine=self.name,
+            version=self.version,
+            settings=settings.model_dump(mode="json"),
+            time=time,
+            q=q,
+            qd=qd,
+            body_position=recording.position,
+            body_quaternion=recording.quaternion,
+            contact_point=seen.point if seen.found else None,
+            contact_force=recording.force,
+            gap=seen.gap if seen.found else None,
+            slip=seen.slip if seen.found else None,
+            kinetic_energy=recording.energy[:, 1],
+            potential_energy=recording.energy[:, 0],
+            steps=steps,
+            cpu_time=cpu_time,
+            ended=ended,
+        )

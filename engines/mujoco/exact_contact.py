@@ -1,0 +1,13 @@
+"""MuJoCo's contact solver on exact knife-edge contacts: how far its own rows can be pushed.
+
+Distance, point and normal of each contact are exact in every stage of the integrator, and the reference
+accelerations get the contact's own acceleration, which MuJoCo leaves out (`knife_edge`). Friction cone,
+lift-off and solver are MuJoCo's own. What is left is the softness of the rows, a slip of R F / b.
+"""
+
+from __future__ import annotations
+
+from engines.mujoco.engine import MujocoEngine
+from engines.mujoco.settings import ExactContactSettings
+
+ENGINE = MujocoEngine("mujoco-exact-contact", ExactContactSettings, "engines.mujoco.edges:build_contacts")

@@ -1,0 +1,177 @@
+"""Knife-edge wheels on curved ground for any MuJoCo model.
+
+    <geom name="ground" type="plane" size="0 0 1"/>                            in the world
+    <geom name="wheel" type="cylinder" size="0.3 0.001"/>                      on the wheel's body
+    <pair geom1="ground" geom2="wheel" condim="3" margin="1e-3" gap="1e9"      in <contact>
+          solref="0.05 1" solimp="0.9999 0.9999 0.001 0.5 2" friction="2 2 0 0 0"/>
+
+    with knife_edges(model, data, Paraboloid(0.1), {"wheel": "ground"}):
+        mujoco.mj_step(model, data)
+
+Inside the block the cylinder touches the ground z = f(x, y) as a circle without thickness would, at the
+exact point of closest approach, with the exact normal, in every stage of every integrator; MuJoCo's
+reference accelerations get the contact's own acceleration, which they lack; solver, friction cone and
+lift-off stay MuJoCo's own. The plane is only a name for the ground, wherever it lies.
+
+MuJoCo's rows stay soft, if only by the factor (1 - impedance) / impedance: a force F on a row leaves
+
+    slip = R F / b,    gap = R F / k
+
+with R = efc_R the row's softness, b = 2 / (impedance time constant) and k its stiffness. `stiffen` makes R
+smaller than impedances can.
+"""
+
+# MuJoCo's compiled bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+import mujoco
+import numpy as np
+
+from engines.engine import EngineError
+from engines.mujoco import compiled, layout
+from engines.mujoco.callbacks import installed
+from reference.surface import Surface
+
+
+@contextmanager
+def knife_edges(
+    model: mujoco.MjModel, data: mujoco.MjData, surface: Surface, wheels: Mapping[str, str]
+) -> Iterator[None]:
+    """Let wheels touch a surface as knife edges do.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+        Each wheel's geom is a cylinder and paired with a plane; see the module's example.
+    data : mujoco.MjData
+        The state that is stepped inside the block; other states are left alone.
+    surface : Surface
+    wheels : mapping
+        Name of each wheel's geom to the name of its plane.
+
+    Raises
+    ------
+    ValueError
+        If a geom or pair is missing or of the wrong kind.
+    EngineError
+        If callbacks are in use already, or this version of MuJoCo is built otherwise.
+    """
+    _check_pairs(model, wheels)
+    with installed(compiled.correct, compiled.touch), _written(model, data, surface, wheels, 0.0):
+        yield
+
+
+@contextmanager
+def rolling_forces(
+    model: mujoco.MjModel, data: mujoco.MjData, surface: Surface, wheels: Mapping[str, str], stabilisation: float
+) -> Iterator[None]:
+    """Let the exact forces of rolling without slip act on wheels, instead of MuJoCo's contacts.
+
+    They are solved from MuJoCo's own mass matrix and bias forces in every evaluation of the dynamics, and
+    put into ``qfrc_applied``. Ground and wheel are bilateral: nothing lifts off or slides.
+
+    Parameters
+    ----------
+    model, data, surface, wheels
+        As in `knife_edges`; no pairs are needed.
+    stabilisation : float
+        Rate at which gaps and slip are brought back to zero [1/s].
+    """
+    with installed(compiled.press), _written(model, data, surface, wheels, stabilisation):
+        yield
+
+
+def standing() -> bool:
+    """Whether every wheel has had a contact point with the ground, ever since the block began.
+
+    One that has not flies on.
+
+    Raises
+    ------
+    EngineError
+        If MuJoCo never asked for a contact.
+    """
+    found, lost = int(compiled.board["found"][0]), int(compiled.board["lost"][0])
+    if found + lost == 0:
+        raise EngineError(f"MuJoCo {mujoco.__version__} did not call the wheels' contacts; MuJoCo 4.0 does")
+    return lost == 0
+
+
+def pressing_forces(wheels: int) -> np.ndarray:
+    """Forces of the last evaluation inside `rolling_forces`, shape (wheels, 3), inertial axes [N]."""
+    return compiled.board["force"][0, :wheels].copy()
+
+
+def stiffen(model: mujoco.MjModel, wheels: Mapping[str, str], softness: float) -> None:
+    """Multiply the softness of the contact rows of wheels by a factor, in place.
+
+    MuJoCo takes R = (1 - impedance) / impedance times the mean inverse weight of the wheel's body: that
+    weight is what changes, and nothing but constraints uses it.
+    """
+    for name in wheels:
+        model.body_invweight0[model.geom(name).bodyid[0]] *= softness
+
+
+def _check_pairs(model: mujoco.MjModel, wheels: Mapping[str, str]) -> None:
+    for wheel, ground in wheels.items():
+        ids = {model.geom(wheel).id, model.geom(ground).id}
+        pairs = [i for i in range(model.npair) if {int(model.pair_geom1[i]), int(model.pair_geom2[i])} == ids]
+        if len(pairs) != 1:
+            raise ValueError(f"there must be one contact pair of {ground!r} and {wheel!r}, not {len(pairs)}")
+        if model.pair_dim[pairs[0]] != 3:
+            raise ValueError(f"the pair of {ground!r} and {wheel!r} must have condim 3")
+        if not model.pair_margin[pairs[0]] > 0:
+            raise ValueError(f"the pair of {ground!r} and {wheel!r} must have a margin above 0, as 1e-3")
+
+
+@contextmanager
+def _written(
+    model: mujoco.MjModel, data: mujoco.MjData, surface: Surface, wheels: Mapping[str, str], stabilisation: float
+) -> Iterator[None]:
+    """Write the blackboard, and wipe it at the end; what it points to lives as long as the block."""
+    if not 0 < len(wheels) <= compiled.WHEELS:
+        raise ValueError(f"there are {len(wheels)} wheels; there must be 1 to {compiled.WHEELS}")
+    found, function, parameters = layout.find(), surface.function.real, np.ascontiguousarray(surface.parameters, float)
+    board = compiled.board[0]
+    board["surface"], board["parameters"], board["parameter_count"] = (
+        function.address,
+        parameters.ctypes.data,
+        len(parameters),
+    )
+    for name in ("qvel", "geom_xpos", "geom_xmat", "qfrc_bias", "qfrc_passive", "qfrc_applied"):
+        board[name] = getattr(data, name).ctypes.data
+    for name in ("ncon", "contact", "efc_aref", "efc_KBIP"):
+        board[f"{name}_at"] = found.data[name]
+    for name, field in (
+        ("frame", "frame"),
+        ("margin", "includemargin"),
+        ("friction", "friction"),
+        ("geom", "geom"),
+        ("row", "efc_address"),
+    ):
+        board[f"{name}_at"] = found.contact[field]
+    board["contact_size"], board["speeds"], board["stabilisation"] = found.contact_size, model.nv, stabilisation
+    board["pyramidal"] = model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
+    _write_wheels(board, model, wheels)
+    board["model"], board["data"] = model._address, data._address
+    try:
+        yield
+    finally:
+        board["model"] = board["data"] = 0
+
+
+def _write_wheels(board: np.void, model: mujoco.MjModel, wheels: Mapping[str, str]) -> None:
+    board["wheels"], board["lost"], board["found"] = len(wheels), 0, 0
+    for k, (wheel, ground) in enumerate(wheels.items()):
+        geom, plane = model.geom(wheel), model.geom(ground)
+        if geom.type[0] != mujoco.mjtGeom.mjGEOM_CYLINDER:
+            raise ValueError(f"{wheel!r} must be a cylinder: its radius and axis are the wheel's")
+        if plane.type[0] != mujoco.mjtGeom.mjGEOM_PLANE or plane.bodyid[0] != 0:
+            raise ValueError(f"{ground!r} must be a plane that belongs to the world")
+        board["geom"][k], board["body"][k], board["ground"][k] = geom.id, geom.bodyid[0], plane.id
+        board["radius"][k] = geom.size[0]

@@ -1,0 +1,158 @@
+"""Where MuJoCo keeps what the compiled callbacks need, found out and checked before anything runs.
+
+Arrays of the state that never move are given by MuJoCo's Python views. What lives in its arena moves with
+every step; there the callbacks follow the pointers of `mjData`. Their places come from MuJoCo's own
+description of its structures, and are held against the addresses that the views show: a version that
+moves a field gives an error here, not a crash in a step.
+"""
+
+# MuJoCo's compiled bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco.introspect import ast_nodes, enums, functions, structs
+
+from engines.engine import EngineError
+
+_SIZES = {
+    "mjtNum": 8,
+    "double": 8,
+    "mjtSize": 8,
+    "size_t": 8,
+    "uintptr_t": 8,
+    "uint64_t": 8,
+    "int": 4,
+    "float": 4,
+    "mjtBool": 1,
+    "mjtByte": 1,
+}
+# The C functions that the callbacks call, and MuJoCo's description of their parameters.
+_CALLED = {
+    "mj_jac": "const mjModel * | const mjData * | mjtNum * | mjtNum * | const mjtNum [3] | int",
+    "mj_jacDot": "const mjModel * | const mjData * | mjtNum * | mjtNum * | const mjtNum [3] | int",
+    "mj_solveM": "const mjModel * | mjData * | mjtNum * | const mjtNum * | int",
+}
+_PRE_CONTACT = {"dist": 0, "pos": 8, "normal": 32, "tangent": 56}
+# Two spheres sunk into a plane, and far from it: with contacts and without.
+_PROBE = """<mujoco><option cone="elliptic"/><worldbody><geom type="plane" size="0 0 1"/>
+<body pos="0 0 .09"><freejoint/><geom size=".1"/></body><body pos="1 0 .09"><freejoint/><geom size=".1"/></body>
+</worldbody></mujoco>"""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Offsets in bytes.
+
+    Attributes
+    ----------
+    data, contact : dict
+        Of fields of `mjData` and of `mjContact`.
+    contact_size : int
+    """
+
+    data: dict[str, int]
+    contact: dict[str, int]
+    contact_size: int
+
+
+def _moved(what: str) -> EngineError:
+    return EngineError(
+        f"MuJoCo {mujoco.__version__} keeps {what} elsewhere than its description says; "
+        "mujoco-native needs none of it, MuJoCo 4.0 has it in place"
+    )
+
+
+def _extent(kind: Any) -> tuple[int, int]:
+    """Size and alignment of a type [bytes]."""
+    if isinstance(kind, ast_nodes.PointerType):
+        size = ctypes.sizeof(ctypes.c_void_p)
+        return size, size
+    if isinstance(kind, ast_nodes.ArrayType):
+        size, alignment = _extent(kind.inner_type)
+        return size * int(np.prod(kind.extents)), alignment
+    if isinstance(kind, ast_nodes.ValueType):
+        if kind.name in _SIZES:
+            return _SIZES[kind.name], _SIZES[kind.name]
+        if kind.name in enums.ENUMS:
+            return 4, 4
+        if kind.name in structs.STRUCTS:
+            return _place(kind.name)[1:]
+    raise EngineError(f"MuJoCo {mujoco.__version__} has a field of the unknown type {kind}")
+
+
+@cache
+def _place(name: str) -> tuple[dict[str, int], int, int]:
+    """Offsets of a structure's fields, its size and its alignment, by the rules of C."""
+    offsets, at, widest = {}, 0, 1
+    for field in structs.STRUCTS[name].fields:
+        size, alignment = _extent(field.type)
+        at = -(-at // alignment) * alignment
+        offsets[field.name] = at
+        at, widest = at + size, max(widest, alignment)
+    return offsets, -(-at // widest) * widest, widest
+
+
+def _check_functions() -> None:
+    for name, expected in _CALLED.items():
+        parameters = functions.FUNCTIONS[name].parameters if name in functions.FUNCTIONS else ()
+        if " | ".join(str(parameter.type) for parameter in parameters) != expected:
+            raise EngineError(f"MuJoCo {mujoco.__version__} has another function {name}; MuJoCo 4.0 has the right one")
+    if "mjPreContact" not in structs.STRUCTS or _place("mjPreContact")[0] != _PRE_CONTACT:
+        raise EngineError(f"MuJoCo {mujoco.__version__} takes contacts in another form; MuJoCo 4.0 has the right one")
+
+
+def _check_state(layout: Layout, data: mujoco.MjData) -> None:
+    """Hold the offsets against what the views of a state show."""
+    base = data._address
+    # An array inside the structure itself: nothing is read before its place is known to be right.
+    if data.energy.ctypes.data != base + layout.data["energy"]:
+        raise _moved("its state")
+    for name in ("ncon", "nefc"):
+        if ctypes.c_int.from_address(base + layout.data[name]).value != getattr(data, name):
+            raise _moved(name)
+    views = {"qpos": data.qpos, "qvel": data.qvel, "geom_xpos": data.geom_xpos}
+    if data.nefc:
+        views |= {"efc_aref": data.efc_aref, "efc_KBIP": data.efc_KBIP, "contact": data.contact.dist}
+    for name, view in views.items():
+        if ctypes.c_void_p.from_address(base + layout.data[name]).value != view.ctypes.data:
+            raise _moved(name)
+    for name in ("frame", "includemargin", "friction", "geom", "efc_address") if data.ncon else ():
+        view = getattr(data.contact, name)
+        if view.ctypes.data - data.contact.dist.ctypes.data != layout.contact[name]:
+            raise _moved(f"a contact's {name}")
+        if view.strides[0] != layout.contact_size:
+            raise _moved("its contacts")
+
+
+@cache
+def find() -> Layout:
+    """Find and check all offsets, once a process.
+
+    Raises
+    ------
+    EngineError
+        If this version of MuJoCo keeps something elsewhere.
+    """
+    try:
+        _check_functions()
+        contact, contact_size, _ = _place("mjContact")
+        layout = Layout(_place("mjData")[0], contact, contact_size)
+        model = mujoco.MjModel.from_xml_string(_PROBE)
+        if not model._address:
+            raise _moved("its model")
+        for height in (0.0, 1.0):
+            data = mujoco.MjData(model)
+            data.qpos[[2, 9]] += height
+            mujoco.mj_forward(model, data)
+            _check_state(layout, data)
+    except (AttributeError, KeyError) as error:
+        raise EngineError(f"MuJoCo {mujoco.__version__} describes itself otherwise than 4.0: {error}") from error
+    return layout

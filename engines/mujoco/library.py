@@ -1,0 +1,67 @@
+"""MuJoCo's own shared library: its C functions for compiled code, and its table of collision functions."""
+
+# MuJoCo's compiled bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding as llvm
+import mujoco
+
+from engines.engine import EngineError
+
+_GEOM_TYPES = 9  # mjNGEOMTYPES, the table's width
+_PATTERNS = ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll")
+
+
+@cache
+def library() -> ctypes.CDLL:
+    """The library that MuJoCo's Python package has loaded.
+
+    Raises
+    ------
+    EngineError
+        If it is not where the package keeps it.
+    """
+    folder = Path(mujoco.__file__).parent
+    found = [path for pattern in _PATTERNS for path in sorted(folder.glob(pattern))]
+    if not found:
+        raise EngineError(f"no library of MuJoCo in {folder}; installing the package mujoco again brings it")
+    return ctypes.CDLL(str(found[0]))
+
+
+def announce(*names: str) -> None:
+    """Make C functions of MuJoCo known to the linker of compiled code.
+
+    Raises
+    ------
+    EngineError
+        If the library lacks one.
+    """
+    for name in names:
+        try:
+            function = getattr(library(), name)
+        except AttributeError as error:
+            raise EngineError(f"MuJoCo {mujoco.__version__} has no function {name}; MuJoCo 4.0 has") from error
+        llvm.add_symbol(name, ctypes.cast(function, ctypes.c_void_p).value)
+
+
+def collision_slot() -> Any:
+    """MuJoCo's pointer (its ``value`` can be set) to the collision function of planes with cylinders.
+
+    Raises
+    ------
+    EngineError
+        If the library has no such table.
+    """
+    place = int(mujoco.mjtGeom.mjGEOM_PLANE) * _GEOM_TYPES + int(mujoco.mjtGeom.mjGEOM_CYLINDER)
+    try:
+        table = (ctypes.c_void_p * _GEOM_TYPES**2).in_dll(library(), "mjCOLLISIONFUNC")
+    except ValueError as error:
+        raise EngineError(f"MuJoCo {mujoco.__version__} has no table mjCOLLISIONFUNC; MuJoCo 4.0 has") from error
+    return ctypes.c_void_p.from_buffer(table, place * ctypes.sizeof(ctypes.c_void_p))

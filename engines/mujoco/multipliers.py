@@ -1,0 +1,14 @@
+"""MuJoCo's tree and integrator under the exact forces of rolling: a cross-check of the tree.
+
+The contact forces are ours, solved in every stage from MuJoCo's mass matrix and bias forces
+(`knife_edge.rolling_forces`); MuJoCo's contacts have no part in it. What this agrees on with the reference
+is MuJoCo's kinematics, inertia and integrator. It says nothing about MuJoCo's contacts: wheels neither
+lift off nor slide, whatever the forces.
+"""
+
+from __future__ import annotations
+
+from engines.mujoco.engine import MujocoEngine
+from engines.mujoco.settings import MultiplierSettings
+
+ENGINE = MujocoEngine("mujoco-multipliers", MultiplierSettings, "engines.mujoco.edges:build_multipliers")

@@ -1,0 +1,52 @@
+"""The bicycle on planes: one that rests, or one a wheel that moves with the surface's tangent plane."""
+
+# MuJoCo's compiled bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from numba import typeof
+
+from engines.engine import EngineError, Problem
+from engines.mujoco.ride import Rig, bodies, contact_forces, look_stride, start, wheel_geoms
+from engines.mujoco.settings import ContactSettings
+from engines.mujoco.tangent import place
+from reference.kernels.dynamics import guess_contacts
+from reference.kinematics import constants
+from reference.surface import is_level
+
+
+def build(problem: Problem, settings: ContactSettings) -> Rig:
+    """Everything at the start of a problem.
+
+    On level ground the planes need no care, and `Rig.follow` only looks for the contacts.
+
+    Raises
+    ------
+    EngineError
+        If MuJoCo refuses the model or a wheel has no contact point.
+    """
+    moving = not is_level(problem.surface)
+    model, data = start(problem, settings, "planes" if moving else "plane")
+    position, quaternion = (data.mocap_pos, data.mocap_quat) if moving else (np.empty((2, 3)), np.empty((2, 4)))
+    c, contact = constants(problem.bicycle), np.empty(6)
+    function, parameters = problem.surface.function.real, problem.surface.parameters
+    guess_contacts(problem.q, contact, function, parameters, c)
+    arguments = (data.qpos, c, function, parameters, contact, position, quaternion)
+    # The types never change, and finding them out takes numba longer than MuJoCo its step.
+    follow = partial(place.compile(tuple(typeof(argument) for argument in arguments)), *arguments)
+    if not follow():
+        raise EngineError("a wheel has no contact point with the surface at the start")
+    wheels = wheel_geoms(model)
+    return Rig(
+        model=model,
+        data=data,
+        bodies=bodies(model),
+        wheels=wheels,
+        follow=follow,
+        stride=1 if moving else look_stride(settings.step),
+        forces=partial(contact_forces, model, data, wheels),
+    )
