@@ -17,6 +17,8 @@ import typer
 from .error import ScenarioError
 
 if TYPE_CHECKING:
+    from reference.surface import Surface
+
     from .runner import Plan
 
 app = typer.Typer(
@@ -29,6 +31,13 @@ app = typer.Typer(
 
 _STARTING = "computing the motion (the first time on a machine, kernels are compiled: half a minute)"
 
+_Alpha = Annotated[
+    float | None, typer.Option("--alpha", help="Shape of the bowl z = alpha (x² + y²) [1/m]; 0 is the plane.")
+]
+_Ground = Annotated[
+    str | None,
+    typer.Option("--surface", metavar="KIND:KEY=VALUE,...", help="Another bowl instead, e.g. sphere:radius=20."),
+]
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else.")]
 
 
@@ -111,8 +120,9 @@ def run_command(
 
 @app.command("circular")
 def circular_command(
-    alpha: Annotated[float, typer.Option(help="Shape of the bowl z = alpha (x² + y²) [1/m]; 0 is the plane.")],
     rear_rate: Annotated[float, typer.Option(max=1e4, help="Rear-wheel rate [rad/s].")],
+    alpha: _Alpha = None,
+    surface: _Ground = None,
     family: Annotated[int | None, typer.Option(help="Solution family, 1 to 4.")] = None,
     near: Annotated[str | None, typer.Option(metavar="LEAN,STEER", help="Angles it is near to [rad].")] = None,
     as_json: Json = False,
@@ -122,9 +132,9 @@ def circular_command(
 
     from . import present
 
-    angles = _angles(near)
+    angles, ground = _angles(near), _ground(alpha, surface)
     with present.working(_STARTING):
-        found = present.circular(alpha, rear_rate, family, angles)
+        found = present.circular(ground, rear_rate, family, angles)
     if as_json:
         _print_json(found)
     else:
@@ -133,7 +143,8 @@ def circular_command(
 
 @app.command("families")
 def families_command(
-    alpha: Annotated[float, typer.Option(help="Shape of the bowl z = alpha (x² + y²) [1/m]; 0 is the plane.")],
+    alpha: _Alpha = None,
+    surface: _Ground = None,
     out: Annotated[Path | None, typer.Option(help="Folder for families.json and the figure families.png.")] = None,
     as_json: Json = False,
 ) -> None:
@@ -143,8 +154,9 @@ def families_command(
     from . import present
     from .survey import families_document, write_families
 
+    ground = _ground(alpha, surface)
     with present.working(_STARTING):
-        document = families_document(alpha)
+        document = families_document(ground)
     if out is not None:
         write_families(document, out)
     if as_json:
@@ -155,7 +167,7 @@ def families_command(
 
 @app.command("critical")
 def critical_command(as_json: Json = False) -> None:
-    """The critical α: cusps collide, families merge, their last stable sections vanish (a minute or two)."""
+    """The critical α: cusps collide, families merge, their last stable sections vanish."""
     from rich.console import Console
 
     from . import present
@@ -167,6 +179,96 @@ def critical_command(as_json: Json = False) -> None:
         _print_json(document)
     else:
         present.show_critical(Console(), document)
+
+
+@app.command("atlas")
+def atlas_command(
+    out: Annotated[
+        Path, typer.Option(help="Folder for atlas.parquet (some 60 MB), boundaries.json and the figures.")
+    ] = Path("atlas"),
+    size: Annotated[int, typer.Option(help="Number of motions, roughly.")] = 400_000,
+    largest: Annotated[float, typer.Option(help="Largest alpha [1/m], at most 1.")] = 1.0,
+    as_json: Json = False,
+) -> None:
+    """Stability of all circular motions over alpha and rear rate: data, boundaries, figures (half a minute)."""
+    from rich.console import Console
+
+    from . import present
+    from .atlas import make_atlas
+
+    with present.Progress() as progress:
+        document = make_atlas(out, size, largest, lambda done: progress.watch("atlas", done, 1.0))
+    if as_json:
+        _print_json(document)
+    else:
+        present.show_atlas(Console(), document, out)
+
+
+@app.command("paper")
+def paper_command(
+    out: Annotated[Path | None, typer.Option(help="Folder for the figures, tables and ledger.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Every figure and printed number of Xiong et al. (2020), computed and held against the print."""
+    from rich.console import Console
+
+    from reports.paper.ledger import document
+    from reports.paper.table import show_ledger
+
+    from . import present
+    from .paper import ledger
+    from .paper_figures import write_paper
+
+    with present.Progress() as progress:
+        lines = ledger(lambda part, done, parts: progress.watch(part, done, parts))
+        written = [] if out is None else write_paper(out, lines, progress.watch)
+    found = document(lines)
+    if as_json:
+        _print_json(found)
+    else:
+        show_ledger(Console(), lines)
+        for path in written:
+            Console().print(f"written: {path}", markup=False, highlight=False, soft_wrap=True)
+    if not found["holds"]:
+        raise typer.Exit(1)
+
+
+@app.command("precision")
+def precision_command(
+    scenario: Annotated[str, typer.Argument(help="Library name or path to a TOML file.")],
+    engine: Annotated[list[str] | None, typer.Option(help="Study only this engine, beside the reference.")] = None,
+    change: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Override a field, e.g. engines.exudyn.step=0.002."),
+    ] = None,
+    duration: Annotated[float | None, typer.Option(help="Simulated time [s].")] = None,
+    levels: Annotated[
+        int, typer.Option(min=2, max=12, help="Steps: four times the scenario's, then halved each time.")
+    ] = 5,
+    eigenvalues: Annotated[bool, typer.Option(help="Measure each engine's own eigenvalues too.")] = True,
+    out: Annotated[Path | None, typer.Option(help="Folder for the document and its figure.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Work-precision: error and CPU time over step sizes, observed order, limit, the engine's own eigenvalues."""
+    from rich.console import Console
+
+    from . import present
+    from .precision import precision, write_precision
+    from .scenario import load_scenario
+
+    changes = dict(_assignment(text) for text in change or [])
+    if duration is not None:
+        changes["simulation.duration"] = duration
+    name, loaded = load_scenario(scenario, changes)
+    with present.Progress() as progress:
+        document = precision(name, loaded, engine, levels, eigenvalues, progress.watch)
+    written = [] if out is None else write_precision(document, out)
+    if as_json:
+        _print_json(document)
+        return
+    present.show_precision(Console(), document)
+    for path in written:
+        Console().print(f"written: {path}", markup=False, highlight=False, soft_wrap=True)
 
 
 @app.command("check")
@@ -249,6 +351,18 @@ def _angles(text: str | None) -> tuple[float, float] | None:
     except ValueError:
         raise ScenarioError(f"--near {text}: must be two angles LEAN,STEER in rad, e.g. 0.74,2.84") from None
     return lean, steer
+
+
+def _ground(alpha: float | None, surface: str | None) -> Surface | float:
+    """What a motion rides on: one of --alpha and --surface."""
+    if (alpha is None) == (surface is None):
+        raise ScenarioError("give the bowl by one of --alpha and --surface, e.g. --alpha 0.005")
+    if surface is None:
+        assert alpha is not None
+        return alpha
+    from .surfaces import parse_surface
+
+    return parse_surface(surface)
 
 
 def _print_json(data: Any) -> None:

@@ -21,10 +21,11 @@ from reference.contact import observe
 from reference.families import find_motion
 from reference.kinematics import YAW
 from reference.stability import growth_rate, linearise
-from reference.surface import Paraboloid
+from reference.surface import Surface
 from reports.summary import COLUMNS, cell, remarks, verdict_line
 
 from .error import ScenarioError
+from .surfaces import bowl, named
 
 if TYPE_CHECKING:
     from reports.drift import Verdict
@@ -117,17 +118,28 @@ def outcome_json(plan: Plan, outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def circular(alpha: float, rear_rate: float, family: int | None, near: tuple[float, float] | None) -> dict[str, Any]:
+def circular(
+    ground: Surface | float, rear_rate: float, family: int | None, near: tuple[float, float] | None
+) -> dict[str, Any]:
     """Compute one circular motion of the benchmark bicycle as the JSON document of `velodrome circular`.
+
+    Parameters
+    ----------
+    ground : Surface or float
+        A surface of revolution, or the alpha of a paraboloid [1/m].
+    rear_rate : float
+        [rad/s].
+    family : int or None
+    near : tuple of float or None
+        Lean and steer that it is near to [rad].
 
     Raises
     ------
     ScenarioError
         If there is none.
     """
-    bicycle = Bicycle()
+    bicycle, surface = Bicycle(), bowl(ground)
     try:
-        surface = Paraboloid(alpha)
         number, motion = find_motion(bicycle, surface, rear_rate, family, near)
         q, qd = motion.state()
         reduced = linearise(bicycle, surface, q, qd)
@@ -137,7 +149,7 @@ def circular(alpha: float, rear_rate: float, family: int | None, near: tuple[flo
     normal_force = np.einsum("wi,wi->w", motion.force, seen.normal[0])
     growth = growth_rate(surface, reduced.eigenvalues, float(qd[YAW]))
     return {
-        "alpha": alpha,
+        **named(surface),
         "family": number,
         **_constants(motion),
         "contact_point": _by_wheel(seen.point[0].tolist()),
@@ -164,8 +176,13 @@ def _by_wheel(pair: list[Any]) -> dict[str, Any]:
 def show_circular(console: Console, found: dict[str, Any]) -> None:
     """Print a circular motion."""
     table = Table(box=None, show_header=False, pad_edge=False)
+    if found["alpha"] is not None:
+        table.add_row("alpha", _shown(found["alpha"]), "1/m")
+    else:
+        for name, value in found["surface"].items():
+            table.add_row("surface" if name == "kind" else name, _shown(value))
     for name, unit in (
-        *(("alpha", "1/m"), ("family", ""), ("rear_rate", "rad/s"), ("front_rate", "rad/s"), ("yaw_rate", "rad/s")),
+        *(("family", ""), ("rear_rate", "rad/s"), ("front_rate", "rad/s"), ("yaw_rate", "rad/s")),
         *(("lean", "rad"), ("steer", "rad"), ("pitch", "rad"), ("energy", "J"), ("residual", "")),
     ):
         table.add_row(name, f"{found[name]:.12g}", unit)
@@ -183,6 +200,10 @@ def show_circular(console: Console, found: dict[str, Any]) -> None:
     stable = "Lyapunov stable" if found["lyapunov_stable"] else "unstable"
     physical = "both wheels are pushed" if found["physical"] else "not physical: the ground would have to pull a wheel"
     console.print(f"{stable}; {physical}")
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
 def _numbers(values: list[float]) -> str:
@@ -230,6 +251,56 @@ def show_critical(console: Console, document: Mapping[str, Any]) -> None:
     for number, point in document["last_stable"].items():
         if point is None:
             console.print(f"family {number} has no stable section", markup=False, highlight=False)
+
+
+def show_atlas(console: Console, document: Mapping[str, Any], out: Path) -> None:
+    """Print the stable regions of the atlas, and where it is."""
+    table = Table("family", box=None, pad_edge=False)
+    for title in ("stable from alpha", "to alpha", "where at rear rate"):
+        table.add_column(title, justify="right")
+    for region in document["stable"]:
+        end = region["vanishing"]
+        last = ("and on", "") if end is None else (f"{end['alpha']:.10f}", f"{end['rear_rate']:.6f}")
+        table.add_row(str(region["family"]), f"{region['alpha'][0]:g}", *last)
+    console.print(table)
+    console.print(f"{document['motions']} motions in {out}", markup=False, highlight=False, soft_wrap=True)
+
+
+def show_precision(console: Console, document: Mapping[str, Any]) -> None:
+    """Print a work-precision study: a table an engine."""
+    horizon, duration = document["horizon"], document["duration"]
+    shown = duration if horizon is None else min(horizon, duration)
+    limit = "" if horizon is None else "; beyond, the motion's own instability leaves nothing to compare"
+    console.print(
+        f"{document['scenario']}: errors over {shown:.4g} s{limit}", style="bold", markup=False, soft_wrap=True
+    )
+    for name, entry in document["engines"].items():
+        console.print()
+        console.print(name, style="bold", markup=False)
+        table = Table(box=None, pad_edge=False)
+        for title in ("step", "position error", "energy drift", "largest slip", "CPU time", "order"):
+            table.add_column(title, justify="right", no_wrap=True)
+        orders = ["", "", *("–" if order is None else f"{order:.3f}" for order in entry["orders"])]
+        for point, order in zip(entry["points"], orders, strict=False):
+            keys = ("step", "position_error", "energy_drift", "max_slip", "cpu_time")
+            table.add_row(*("–" if point[key] is None else f"{point[key]:.4g}" for key in keys), order)
+        console.print(table)
+        for line in _precision_lines(entry):
+            console.print(line, markup=False, highlight=False, soft_wrap=True)
+        for failure in entry["failures"]:
+            what = "" if failure["step"] is None else f"step {failure['step']:g}: "
+            console.print(f"{what}{failure['reason']}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+
+
+def _precision_lines(entry: Mapping[str, Any]) -> Iterator[str]:
+    if entry["richardson_error"] is not None:
+        yield (
+            f"limit of the steps: {entry['richardson_error']:.2g} m from the reference over {entry['window']:.4g} s, "
+            f"known to {entry['richardson_uncertainty']:.2g} m"
+        )
+    found = entry["eigenvalues"]
+    if found is not None:
+        yield f"its own eigenvalues: {found['error']:.2g} 1/s from the reference's at the most"
 
 
 STATUS_STYLES = {"holds": "green", "better": "cyan", "changed": "red", "worse": "red", "missing": "red"}
