@@ -19,7 +19,8 @@ import numpy as np
 from scipy.linalg import logm
 
 from reference.dae import consistent_state
-from reference.kinematics import LEAN, PITCH, REAR_ANGLE, STEER, YAW
+from reference.kinematics import PITCH, YAW
+from reference.stability import independent, sorted_eigenvalues
 
 from .convergence import extrapolate, observed_orders
 from .engine import Engine, EngineError, Problem, Settings
@@ -52,14 +53,6 @@ class Identified:
     uncertainty: float
     eigenvalues: np.ndarray
     order: float
-
-
-def independent(q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-    """Seven independent variables of states (..., 9), x and y in the heading frame; shape (..., 7)."""
-    cosine, sine = np.cos(q[..., YAW]), np.sin(q[..., YAW])
-    x, y = q[..., 0], q[..., 1]
-    columns = (cosine * x + sine * y, cosine * y - sine * x, q[..., LEAN], q[..., STEER])
-    return np.stack([*columns, qd[..., LEAN], qd[..., STEER], qd[..., REAR_ANGLE]], axis=-1)
 
 
 def identify(
@@ -105,11 +98,8 @@ def identify(
         )
     limit = extrapolate(jacobians)
     orders = observed_orders(jacobians)
-    eigenvalues = np.linalg.eigvals(limit.value)
-    order = orders[-1] if orders else np.nan
-    return Identified(
-        limit.value, limit.uncertainty, eigenvalues[np.lexsort((eigenvalues.imag, eigenvalues.real))], order
-    )
+    eigenvalues = sorted_eigenvalues(limit.value)
+    return Identified(limit.value, limit.uncertainty, eigenvalues, orders[-1] if orders else np.nan)
 
 
 def _interval(settings: Settings) -> float:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -15,6 +15,7 @@ from reference.bicycle import BODIES
 from reference.kinematics import COORDINATES, WHEELS
 
 from .engine import Trajectory
+from .files import whole
 
 METADATA_KEY = b"velodrome"
 FACTS = ("engine", "version", "settings", "steps", "cpu_time", "ended")
@@ -55,23 +56,39 @@ VECTORS = ("time", "kinetic_energy", "potential_energy")
 
 def write_trajectory(trajectory: Trajectory, path: Path) -> None:
     """Write a trajectory to ``path``, whole or not at all."""
-    fields, arrays = [], []
+    found = []
     for name, names in columns():
         value = getattr(trajectory, name)
         if value is None:
             continue
         flat = np.asarray(value, float).reshape(len(trajectory.time), len(names))
-        for j, (column, unit) in enumerate(names):
-            fields.append(pa.field(column, pa.float64(), nullable=False, metadata={b"unit": unit.encode()}))
-            arrays.append(pa.array(np.ascontiguousarray(flat[:, j])))
-    facts = {key: getattr(trajectory, key) for key in FACTS}
+        found += [(column, flat[:, j], unit) for j, (column, unit) in enumerate(names)]
+    write_columns(found, path, {key: getattr(trajectory, key) for key in FACTS})
+
+
+def write_columns(
+    columns: Iterable[tuple[str, np.ndarray, str | None]], path: Path, facts: Mapping[str, Any], **options: Any
+) -> None:
+    """Write columns of one length as Parquet, whole or not at all.
+
+    Parameters
+    ----------
+    columns : iterable of (str, ndarray, str or None)
+        Name, values of shape (n,), unit.
+    path : Path
+    facts : mapping
+        JSON values for the schema's metadata.
+    **options
+        Of `pyarrow.parquet.write_table`.
+    """
+    fields, arrays = [], []
+    for name, values, unit in columns:
+        metadata = None if unit is None else {b"unit": unit.encode()}
+        arrays.append(pa.array(np.ascontiguousarray(values)))
+        fields.append(pa.field(name, arrays[-1].type, nullable=False, metadata=metadata))
     schema = pa.schema(fields, metadata={METADATA_KEY: json.dumps(facts).encode()})
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        pq.write_table(pa.Table.from_arrays(arrays, schema=schema), partial)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with whole(path) as partial:
+        pq.write_table(pa.Table.from_arrays(arrays, schema=schema), partial, **options)
 
 
 def read_trajectory(path: Path) -> Trajectory:

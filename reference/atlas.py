@@ -10,9 +10,9 @@ import numpy as np
 from .bicycle import Bicycle
 from .circular import Steady
 from .critical import CriticalPoint, reconnections, vanishing_between
-from .curve import Samples, sample
+from .curve import Samples
 from .families import ANCHORS, FAMILIES, anchor, next_anchor, trace_from
-from .sections import SectionEnd, stable_sections
+from .sections import SectionEnd, sample_family, stable_sections
 from .surface import Paraboloid
 
 SIZE = 400_000
@@ -173,7 +173,7 @@ def _curve(
     equations, start, directions = _anchor(bicycle, alpha, number, anchors.pop(rear_rate, None))
     anchors[rear_rate] = alpha, start
     family = trace_from(number, equations, start, directions, longest)
-    seen = sample(equations, np.array([point.unknowns for point in family.points]))
+    seen = sample_family(family)
     return AtlasCurve(alpha, number, family.ends, seen, stable_sections(family, seen.growth_rate))
 
 

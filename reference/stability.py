@@ -14,6 +14,7 @@ from .kernels.pose import aligned
 from .kinematics import FRONT_ANGLE, LEAN, REAR_ANGLE, STEER, YAW, constants
 from .surface import Surface, is_level
 
+# x and y in the heading frame.
 VARIABLES = ("x", "y", "lean", "steer", "lean_rate", "steer_rate", "rear_rate")
 
 
@@ -39,6 +40,14 @@ class Linearisation:
     eigenvalues: np.ndarray
 
 
+def independent(q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+    """Independent variables, named in `VARIABLES`, of states (..., 9); shape (..., 7)."""
+    cosine, sine = np.cos(q[..., YAW]), np.sin(q[..., YAW])
+    x, y = q[..., 0], q[..., 1]
+    columns = (cosine * x + sine * y, -sine * x + cosine * y, q[..., LEAN], q[..., STEER])
+    return np.stack([*columns, qd[..., LEAN], qd[..., STEER], qd[..., REAR_ANGLE]], axis=-1)
+
+
 def linearise(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> Linearisation:
     """Reduced Jacobian and eigenvalues at a state on the constraints.
 
@@ -60,8 +69,7 @@ def linearise(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray)
     ValueError
         If the wheels do not reach the ground near the state.
     """
-    cosine, sine = np.cos(q[YAW]), np.sin(q[YAW])
-    x, y = cosine * q[0] + sine * q[1], -sine * q[0] + cosine * q[1]
+    x, y = independent(q, qd)[:2]
     turned = np.concatenate([[x, y, q[2], 0.0], q[LEAN:]])
     p, c, parameters = contact_parameters(bicycle, surface, turned), constants(bicycle), surface.parameters
     found = settle(turned, p, surface.function.real, parameters, c)

@@ -216,3 +216,10 @@ def evaluate(surface: Surface, x: np.ndarray | float, y: np.ndarray | float) -> 
     x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
     flat = _evaluate(surface.function.real, surface.parameters, x.ravel(), y.ravel())
     return flat.reshape(*x.shape, 6)
+
+
+def unit_normals(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Upward unit normals of a surface, shape (..., 3), at coordinates of any common shape [m]."""
+    values = evaluate(surface, x, y)
+    normal = np.stack([-values[..., 1], -values[..., 2], np.ones_like(values[..., 0])], axis=-1)
+    return normal / np.linalg.norm(normal, axis=-1, keepdims=True)

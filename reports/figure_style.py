@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +9,8 @@ from typing import Any
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+
+from engines.files import whole
 
 WIDTH = 7.2  # of a page with two columns [inch]: text below stays readable at half of it
 
@@ -73,9 +74,5 @@ def write_figure(path: Path, figure: Figure) -> None:
         Its ending gives the format: ``.svg``, ``.pdf`` or ``.png``.
     figure : Figure
     """
-    partial = path.with_name(f".partial-{path.name}")
-    try:
+    with whole(path) as partial:
         figure.savefig(partial, metadata=_NO_DATE.get(path.suffix))
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)

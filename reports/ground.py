@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference.surface import Surface, evaluate
+from reference.surface import Surface, evaluate, unit_normals
 
 # Light for the hill shading comes from here: seen from the opening view, from the upper left, where the
 # eye expects it. Then a hollow is dark at the upper left and bright at the lower right.
@@ -55,13 +55,6 @@ class Ground:
     wall_triangles: np.ndarray
     radius: float
     disc: bool
-
-
-def unit_normals(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Upward unit normals of a surface, shape (..., 3), at coordinates of any common shape [m]."""
-    values = evaluate(surface, x, y)
-    normal = np.stack([-values[..., 1], -values[..., 2], np.ones_like(values[..., 0])], axis=-1)
-    return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
 
 
 def lifted(surface: Surface, x: np.ndarray, y: np.ndarray, lift: float = 0.0) -> np.ndarray:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from engines.engine import Trajectory
+from engines.friction import normal_force
 from reference.bicycle import Bicycle
 from reference.kinematics import REAR_ANGLE
 from reference.surface import Surface, evaluate
@@ -95,12 +96,8 @@ def fell_at(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> float
 
 def least_normal_force(trajectory: Trajectory, surface: Surface) -> float | None:
     """Least normal contact force [N]; negative where the ground would have to pull, as no contact can."""
-    if trajectory.contact_force is None or trajectory.contact_point is None:
-        return None
-    point, force = trajectory.contact_point, trajectory.contact_force
-    slope = evaluate(surface, point[..., 0], point[..., 1])[..., 1:3]
-    across = np.concatenate([-slope, np.ones((*slope.shape[:-1], 1))], axis=-1)
-    return float((np.sum(force * across, axis=-1) / np.linalg.norm(across, axis=-1)).min())
+    normal = normal_force(trajectory, surface)
+    return None if normal is None else float(normal.min())
 
 
 def horizon(trajectory: Trajectory, reference: Trajectory, growth_rate: float, size: float) -> float | None:

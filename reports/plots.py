@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from engines.engine import REFERENCE, Trajectory
+from engines.friction import normal_force, required_friction
 from reference.kinematics import FRONT_ANGLE, LEAN, REAR_ANGLE, STEER, WHEELS, YAW
 from reference.surface import Surface
-
-from .ground import unit_normals
 
 # Sizes below this are round-off of quantities of order one: they have no logarithm worth a point.
 SMALLEST_SIZE = 1e-16
@@ -99,21 +98,15 @@ def energy_change(_: Ride, trajectory: Trajectory) -> np.ndarray | None:
     return (energy - energy[0]) / abs(energy[0]) if energy[0] != 0 else None
 
 
-def normal_force(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
+def pushing_force(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
     """Part of the contact forces along the surface's normal, shape (n, 2) [N]."""
-    if trajectory.contact_force is None or trajectory.contact_point is None:
-        return None
-    point = trajectory.contact_point
-    return np.einsum("nwi,nwi->nw", trajectory.contact_force, unit_normals(ride.surface, point[..., 0], point[..., 1]))
+    return normal_force(trajectory, ride.surface)
 
 
 def friction_used(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
     """Tangential over normal contact force, shape (n, 2); NaN where the ground does not push."""
-    normal = normal_force(ride, trajectory)
-    if normal is None or trajectory.contact_force is None:
-        return None
-    tangential = np.sqrt(np.maximum((trajectory.contact_force**2).sum(-1) - normal**2, 0))
-    return np.divide(tangential, normal, out=np.full_like(normal, np.nan), where=normal > 0)
+    normal = normal_force(trajectory, ride.surface)
+    return None if normal is None else np.where(normal > 0, required_friction(trajectory, ride.surface), np.nan)
 
 
 def _column(get: Values, index: int) -> Values:
@@ -154,7 +147,10 @@ STATES = (
     Plot("front_rate", "front wheel rate [rad/s]", lambda _, run: run.qd[:, FRONT_ANGLE], 0.1),
 )
 FORCES = (
-    *(Plot(f"{w}_normal_force", f"{w} normal force [N]", _column(normal_force, k), 10.0) for k, w in enumerate(WHEELS)),
+    *(
+        Plot(f"{w}_normal_force", f"{w} normal force [N]", _column(pushing_force, k), 10.0)
+        for k, w in enumerate(WHEELS)
+    ),
     *(
         Plot(f"{w}_friction", f"{w} tangential / normal force [-]", _column(friction_used, k), 0.05)
         for k, w in enumerate(WHEELS)

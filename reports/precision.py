@@ -53,6 +53,12 @@ def comparison_horizon(levels: Sequence[Level]) -> float | None:
     return levels[-1].metrics["horizon"] if levels else None
 
 
+def compared_time(document: Mapping[str, Any]) -> float:
+    """Time over which a document of `velodrome precision` takes its errors [s]."""
+    horizon, duration = document["horizon"], document["duration"]
+    return duration if horizon is None else min(horizon, duration)
+
+
 def convergence(levels: Sequence[Level], reference: Trajectory, size: float) -> Convergence | None:
     """Order and limit of levels with halved steps.
 

@@ -13,6 +13,7 @@ from engines.engine import REFERENCE
 
 from .figure_style import GREY, INK, new_figure, style, write_figure
 from .palette import colours
+from .precision import compared_time
 
 _MARKERS = "os^Dvp*hX<>"
 _DARKER = 0.72  # the engines' colours are made for a dark ground
@@ -41,7 +42,8 @@ def precision_figure(path: Path, document: Mapping[str, Any]) -> None:
         left.set_ylabel("largest position error [m]")
         handles, labels = left.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=max(1, min(len(labels), 3)))
-        figure.suptitle(_title(document), x=0.99, ha="right", fontsize=8.5)
+        title = f"{document['scenario']}, {compared_time(document):.3g} s"
+        figure.suptitle(title, x=0.99, ha="right", fontsize=8.5)
         write_figure(path, figure)
 
 
@@ -61,9 +63,3 @@ def _draw(left: Axes, right: Axes, name: str, entry: Mapping[str, Any], shade: A
         left.annotate(
             "limit", (step.min() / 2, limit), xytext=(5, -3), textcoords="offset points", color=GREY, fontsize=6.5
         )
-
-
-def _title(document: Mapping[str, Any]) -> str:
-    horizon, duration = document["horizon"], document["duration"]
-    shown = duration if horizon is None else min(horizon, duration)
-    return f"{document['scenario']}, {shown:.3g} s"

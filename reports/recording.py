@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,13 +10,14 @@ import numpy as np
 import rerun as rr
 
 from engines.engine import REFERENCE, Trajectory
+from engines.files import whole
 from reference.bicycle import BODIES, Bicycle
 from reference.kinematics import WHEELS, YAW
-from reference.surface import Surface
+from reference.surface import Surface, unit_normals
 
 from .bicycle_shape import Mesh, body_meshes
 from .blueprint import NEWTONS_PER_METRE, blueprint
-from .ground import LINE_LIFT, Ground, ground_of_ride, unit_normals
+from .ground import LINE_LIFT, Ground, ground_of_ride
 from .palette import Colour, colours
 from .plots import PLOTS, Ride, nanoseconds
 
@@ -200,13 +200,8 @@ def write_recording(
     """
     if not trajectories or any(len(run.time) == 0 for run in trajectories.values()):
         raise ValueError("a recording needs at least one trajectory, and each at least one sample")
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        with _strict():
-            _write(partial, title, bicycle, Ride(surface, trajectories), summary)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with whole(path) as partial, _strict():
+        _write(partial, title, bicycle, Ride(surface, trajectories), summary)
 
 
 def _write(path: Path, title: str, bicycle: Bicycle, ride: Ride, summary: str) -> None:

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
-from engines.storage import METADATA_KEY
+from engines.storage import write_columns
 from reference.atlas import SIZE, Atlas, Boundary, atlas, spacing
 from reference.bicycle import Bicycle
 from reference.stability import VARIABLES
 
 from .error import ScenarioError
-from .runner import write_json
+from .files import make_folder, write_json
 from .survey import critical_entry
 
 SMALLEST = 1000
@@ -72,14 +68,11 @@ def make_atlas(
         raise ScenarioError(f"--size {size}: an atlas has at least {SMALLEST} motions")
     if not 0 < largest <= 1:
         raise ScenarioError(f"--largest {largest!r}: it must lie above 0 and not above 1, in 1/m")
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ScenarioError(f"--out {out}: the folder cannot be made: {error.strerror}") from error
+    make_folder(out)
     alphas, longest = spacing(size, largest)
     found = atlas(Bicycle(), alphas, longest, lambda fraction: progress(0.9 * fraction))
     columns, document = atlas_columns(found), atlas_document(found)
-    write_columns(columns, out / "atlas.parquet", {"longest_step": longest, "bicycle": asdict(found.bicycle)})
+    write_atlas(columns, out / "atlas.parquet", {"longest_step": longest, "bicycle": asdict(found.bicycle)})
     write_json(out / "boundaries.json", document)
     growth_figure(out / "growth.png", columns, document)
     stable_figure(out / "stable.png", columns, document)
@@ -107,26 +100,20 @@ def atlas_columns(found: Atlas) -> dict[str, np.ndarray]:
     return columns
 
 
-def write_columns(columns: dict[str, np.ndarray], path: Path, facts: dict[str, Any]) -> None:
+def write_atlas(columns: dict[str, np.ndarray], path: Path, facts: dict[str, Any]) -> None:
     """Write columns with their units as Parquet, whole or not at all."""
-    fields, arrays = [], []
-    for name, values in columns.items():
-        unit = "1/s" if name.startswith("eigenvalue") else UNITS.get(name)
-        metadata = None if unit is None else {b"unit": unit.encode()}
-        arrays.append(pa.array(np.ascontiguousarray(values)))
-        fields.append(pa.field(name, arrays[-1].type, nullable=False, metadata=metadata))
-    schema = pa.schema(fields, metadata={METADATA_KEY: json.dumps(facts).encode()})
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        table = pa.Table.from_arrays(arrays, schema=schema)
-        # Neighbours differ in their last bytes only: split, they compress to three quarters.
-        repeated = ["alpha", "family"]
-        split = [name for name, values in columns.items() if values.dtype == float and name not in repeated]
-        encoding: dict[str, Any] = {"use_dictionary": repeated, "use_byte_stream_split": split}
-        pq.write_table(table, partial, compression="zstd", **encoding)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
+    units = {name: "1/s" if name.startswith("eigenvalue") else UNITS.get(name) for name in columns}
+    # Neighbours differ in their last bytes only: split, they compress to three quarters.
+    repeated = ["alpha", "family"]
+    split = [name for name, values in columns.items() if values.dtype == float and name not in repeated]
+    write_columns(
+        ((name, values, units[name]) for name, values in columns.items()),
+        path,
+        facts,
+        use_dictionary=repeated,
+        use_byte_stream_split=split,
+        compression="zstd",
+    )
 
 
 def atlas_document(found: Atlas) -> dict[str, Any]:

@@ -38,6 +38,10 @@ _Ground = Annotated[
     str | None,
     typer.Option("--surface", metavar="KIND:KEY=VALUE,...", help="Another bowl instead, e.g. sphere:radius=20."),
 ]
+_Changes = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a field, e.g. simulation.duration=5.")
+]
+_Duration = Annotated[float | None, typer.Option(help="Simulated time [s].")]
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else.")]
 
 
@@ -79,11 +83,8 @@ def run_command(
     scenario: Annotated[list[str] | None, typer.Argument(help="Library names or paths to TOML files.")] = None,
     engine: Annotated[list[str] | None, typer.Option(help="Run only this engine, beside the reference.")] = None,
     tag: Annotated[str | None, typer.Option(help="Run all library scenarios with this tag.")] = None,
-    change: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Override a field, e.g. simulation.duration=5."),
-    ] = None,
-    duration: Annotated[float | None, typer.Option(help="Simulated time [s].")] = None,
+    change: _Changes = None,
+    duration: _Duration = None,
     out: Annotated[Path, typer.Option(help="Folder for the run folders.")] = Path("runs"),
     as_json: Json = False,
 ) -> None:
@@ -96,9 +97,7 @@ def run_command(
     sources = [*(scenario or []), *(_tagged(tag) if tag is not None else [])]
     if not sources:
         raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
-    changes = dict(_assignment(text) for text in change or [])
-    if duration is not None:
-        changes["simulation.duration"] = duration
+    changes = _changed(change, duration)
     with present.working(_STARTING):
         plans = [_plan(source, changes, engine) for source in dict.fromkeys(sources)]
     console = Console(stderr=as_json)
@@ -237,11 +236,8 @@ def paper_command(
 def precision_command(
     scenario: Annotated[str, typer.Argument(help="Library name or path to a TOML file.")],
     engine: Annotated[list[str] | None, typer.Option(help="Study only this engine, beside the reference.")] = None,
-    change: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Override a field, e.g. engines.exudyn.step=0.002."),
-    ] = None,
-    duration: Annotated[float | None, typer.Option(help="Simulated time [s].")] = None,
+    change: _Changes = None,
+    duration: _Duration = None,
     levels: Annotated[
         int, typer.Option(min=2, max=12, help="Steps: four times the scenario's, then halved each time.")
     ] = 5,
@@ -256,9 +252,7 @@ def precision_command(
     from .precision import precision, write_precision
     from .scenario import load_scenario
 
-    changes = dict(_assignment(text) for text in change or [])
-    if duration is not None:
-        changes["simulation.duration"] = duration
+    changes = _changed(change, duration)
     name, loaded = load_scenario(scenario, changes)
     with present.Progress() as progress:
         document = precision(name, loaded, engine, levels, eigenvalues, progress.watch)
@@ -329,6 +323,14 @@ def _tagged(tag: str) -> list[str]:
         known = ", ".join(sorted({word for words in tags.values() for word in words}))
         raise ScenarioError(f"--tag {tag}: no scenario has it; there are {known}")
     return names
+
+
+def _changed(change: list[str] | None, duration: float | None) -> dict[str, Any]:
+    """Fields that --set and --duration override."""
+    changes = dict(_assignment(text) for text in change or [])
+    if duration is not None:
+        changes["simulation.duration"] = duration
+    return changes
 
 
 def _assignment(text: str) -> tuple[str, Any]:

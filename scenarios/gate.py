@@ -16,10 +16,11 @@ from engines.engine import Engine, EngineError, Settings, engine_names
 from engines.steady import steady_trajectory
 from reference.kinematics import REAR_ANGLE
 from reports.drift import Scale, Verdict, judge, limits, missing, quantities
-from reports.metrics import metrics, position_errors
+from reports.metrics import position_errors
 
 from .error import ScenarioError
-from .runner import Watch, configure, library_versions, write_json
+from .files import write_json
+from .runner import Watch, configure, library_versions, measure_one
 from .scenario import library_names, load_scenario
 from .start import Start, make_start
 
@@ -60,8 +61,7 @@ def sample(start: Start, engine: Engine, settings: Settings, watch: Callable[[fl
     if trajectory.ended is not None:
         raise EngineError(trajectory.ended)
     exact = steady_trajectory(problem.bicycle, motion, problem.times)
-    where = (problem.bicycle, problem.surface, start.growth_rate, start.size)
-    measured = metrics(trajectory, exact, *where, circular=True)
+    measured = measure_one(start, trajectory, exact)
     errors = position_errors(trajectory, exact)
     short = float(errors[np.searchsorted(problem.times, SHORT_HORIZON)])
     values = quantities(measured, short)

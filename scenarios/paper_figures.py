@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from scipy.optimize import root_scalar
 
 from reference.bicycle import Bicycle
 from reference.circular import SIGMA, STEER, CircularMotion, Steady, newton, unknown_condition
 from reference.contact import observe
 from reference.continuation import Point, follow, root_between
-from reference.families import ANCHORS, Family, anchor, find_motion, trace
+from reference.families import ANCHORS, Family, anchor, trace
 from reference.simulate import simulate, simulate_modified_euler
-from reference.stability import linearise
+from reference.stability import independent, linearise
 from reference.surface import Paraboloid
 from reports.figure_style import style, write_figure
 from reports.figures import solution_figure
@@ -35,8 +34,9 @@ from reports.paper_figures.configurations import Configuration, configurations_f
 from reports.paper_figures.tables import LinearisedPoint, linearisation_document, linearisation_tables
 from reports.paper_figures.trajectories import Ride, departure_figure, disturbed_figure, while_pushed
 
-from .error import ScenarioError
-from .runner import Watch, write_json, write_text
+from .files import make_folder, write_json, write_text
+from .paper.energy import motion_of_energy
+from .runner import Watch
 from .scenario import load_scenario
 from .start import Start, make_start
 from .survey import LONGEST_STEP, families_document, family_document
@@ -95,10 +95,7 @@ def write_paper(out: Path, lines: Sequence[Line], progress: Watch) -> list[Path]
     ScenarioError
         If the folder cannot be made.
     """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ScenarioError(f"--out {out}: the folder cannot be made: {error.strerror}") from error
+    make_folder(out)
     write_json(out / "ledger.json", ledger_document(lines))
     write_text(out / "ledger.md", markdown(lines))
     return [out / "ledger.json", out / "ledger.md", *write_figures(out, progress)]
@@ -209,29 +206,20 @@ def ride_from(name: str, start: Start) -> Ride:
 
 def circle_of_equal_energy(start: Start, circle: CircularMotion) -> CircularMotion:
     """The circular motion of a start's energy, which the ride keeps, in the family of a circle."""
-    problem, surface = start.problem, Paraboloid(ALPHAS["figure-3"])
-
-    def energy(q: np.ndarray, qd: np.ndarray) -> float:
-        seen = observe(problem.bicycle, problem.surface, q[None], qd[None])
-        return float(seen.kinetic_energy[0] + seen.potential_energy[0])
-
-    def at(rate: float) -> CircularMotion:
-        return find_motion(problem.bicycle, surface, rate, start.family, (circle.lean, circle.steer))[1]
-
-    wanted = energy(problem.q, problem.qd)
-    nearby = (circle.rear_rate, circle.rear_rate + 0.05)
-    found: Any = root_scalar(
-        lambda rate: energy(*at(rate).state()) - wanted, method="secant", x0=nearby[0], x1=nearby[1]
-    )
-    return at(float(found.root))
+    problem, number = start.problem, start.family
+    if number is None:
+        raise ValueError("a ride that starts on no circle has no family of circles")
+    seen = observe(problem.bicycle, problem.surface, problem.q[None], problem.qd[None])
+    energy = float(seen.kinetic_energy[0] + seen.potential_energy[0])
+    return motion_of_energy(trace(problem.bicycle, Paraboloid(ALPHAS["figure-3"]), number), energy, circle)
 
 
 def linearised_point(words: str, name: str) -> LinearisedPoint:
     """The reduced linear system at a scenario's circular motion."""
     start = start_named(name)
     problem, motion = start.problem, _motion(start)
-    variables = np.array([*motion.position[:2], motion.lean, motion.steer, 0.0, 0.0, motion.rear_rate])
-    return LinearisedPoint(words, variables, linearise(problem.bicycle, problem.surface, *motion.state()))
+    state = motion.state()
+    return LinearisedPoint(words, independent(*state), linearise(problem.bicycle, problem.surface, *state))
 
 
 def start_named(name: str, duration: float | None = None) -> Start:

@@ -13,13 +13,13 @@ from engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Tr
 from engines.identify import LEVELS as IDENTIFY_LEVELS
 from engines.identify import Identified, identify
 from reference.stability import linearise
-from reports.metrics import metrics
 from reports.precision import Level, comparison_horizon, eigenvalue_document, engine_document
 
 from .error import ScenarioError
-from .runner import Plan, Watch, library_versions, plan_run, write_json
-from .scenario import Perturbation, Scenario
-from .start import Start, make_start
+from .files import make_folder, write_json
+from .runner import Plan, Watch, library_versions, measure_one, plan_run
+from .scenario import Scenario
+from .start import Start
 
 COARSEST = 4.0  # times the scenario's step
 LEVELS = 5
@@ -78,7 +78,8 @@ def precision(
     if reference.ended is not None:
         raise ScenarioError(f"{name}: the reference ends at {reference.time[-1]:.6g} s: {reference.ended}")
     studies = {}
-    undisturbed = make_start(scenario.model_copy(update={"perturbation": Perturbation()})).problem
+    q, qd = plan.start.undisturbed
+    undisturbed = replace(plan.start.problem, q=q, qd=qd)
     for engine_name, (engine, settings) in plan.engines.items():
         runs = list(_runs(engine, ladders[engine_name], plan.start, problem, reference, watch))
         # As far as the reference can be refined it is the yardstick.
@@ -136,15 +137,7 @@ def _runs(
         except (EngineError, ValueError, ArithmeticError) as error:
             yield {"step": step, "reason": " ".join(str(error).split())}
             continue
-        measured = metrics(
-            trajectory,
-            reference,
-            problem.bicycle,
-            problem.surface,
-            start.growth_rate,
-            start.size,
-            circular=start.motion is not None,
-        )
+        measured = measure_one(start, trajectory, reference)
         if trajectory.ended is not None:
             yield {"step": step, "reason": f"ended at {trajectory.time[-1]:.6g} s: {trajectory.ended}"}
         elif measured["fell_at"] is not None:
@@ -203,10 +196,7 @@ def write_precision(document: Mapping[str, Any], out: Path) -> list[Path]:
     """
     from reports.precision_figure import precision_figure
 
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ScenarioError(f"--out {out}: the folder cannot be made: {error.strerror}") from error
+    make_folder(out)
     files = [out / f"precision-{document['scenario']}.json", out / f"precision-{document['scenario']}.png"]
     write_json(files[0], document)
     precision_figure(files[1], document)

@@ -268,12 +268,12 @@ def show_atlas(console: Console, document: Mapping[str, Any], out: Path) -> None
 
 def show_precision(console: Console, document: Mapping[str, Any]) -> None:
     """Print a work-precision study: a table an engine."""
-    horizon, duration = document["horizon"], document["duration"]
-    shown = duration if horizon is None else min(horizon, duration)
-    limit = "" if horizon is None else "; beyond, the motion's own instability leaves nothing to compare"
-    console.print(
-        f"{document['scenario']}: errors over {shown:.4g} s{limit}", style="bold", markup=False, soft_wrap=True
-    )
+    # Here, since the other commands' tables need none of what it imports.
+    from reports.precision import compared_time
+
+    limit = "" if document["horizon"] is None else "; beyond, the motion's own instability leaves nothing to compare"
+    title = f"{document['scenario']}: errors over {compared_time(document):.4g} s{limit}"
+    console.print(title, style="bold", markup=False, soft_wrap=True)
     for name, entry in document["engines"].items():
         console.print()
         console.print(name, style="bold", markup=False)

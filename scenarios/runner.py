@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
 import platform
 import signal
 import threading
@@ -24,8 +22,10 @@ from reports.metrics import metrics
 from reports.summary import summary
 
 from .error import ScenarioError
-from .scenario import Scenario, one_line, refuse_unknown
+from .files import write_json, write_text
+from .scenario import Scenario
 from .start import Start, make_start
+from .table import one_line, refuse_unknown
 
 LIBRARIES = ("velodrome", "numpy", "scipy", "numba", "exudyn", "mujoco", "rerun-sdk", "pyarrow")
 
@@ -179,20 +179,18 @@ def _reason(error: Exception) -> str:
     return " ".join(words.split())
 
 
+def measure_one(start: Start, trajectory: Trajectory, reference: Trajectory | None) -> dict[str, Any]:
+    """Metrics of a trajectory from a start, against a reference where there is one."""
+    problem, circular = start.problem, start.motion is not None
+    where = (problem.bicycle, problem.surface, start.growth_rate, start.size)
+    return metrics(trajectory, reference, *where, circular)
+
+
 def measure(plan: Plan, trajectories: Mapping[str, Trajectory]) -> dict[str, dict[str, Any]]:
     """Metrics of every trajectory against the reference's; without a reference, of each by itself."""
-    start, reference = plan.start, trajectories.get(REFERENCE)
-    problem = start.problem
+    reference = trajectories.get(REFERENCE)
     return {
-        name: metrics(
-            trajectory,
-            None if name == REFERENCE else reference,
-            problem.bicycle,
-            problem.surface,
-            start.growth_rate,
-            start.size,
-            circular=start.motion is not None,
-        )
+        name: measure_one(plan.start, trajectory, None if name == REFERENCE else reference)
         for name, trajectory in trajectories.items()
     }
 
@@ -290,21 +288,6 @@ def library_versions() -> dict[str, str]:
         except PackageNotFoundError:
             continue
     return found
-
-
-def write_json(path: Path, data: Any) -> None:
-    """Write JSON, whole or not at all."""
-    write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all."""
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        partial.write_text(text, encoding="utf-8")
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 @contextmanager

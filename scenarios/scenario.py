@@ -15,7 +15,6 @@ from reference.bicycle import Bicycle
 from .error import ScenarioError
 from .surfaces import SurfaceTable
 from .table import Table, one_line
-from .table import refuse_unknown as refuse_unknown  # part of this module's face, with `one_line`
 
 LIBRARY = files("scenarios") / "library"
 

@@ -27,6 +27,8 @@ class Start:
     Attributes
     ----------
     problem : Problem
+    undisturbed : tuple of ndarray, shapes (9,)
+        Coordinates and rates before the perturbation.
     family : int or None
         Family of the circular motion; None for an upright start.
     motion : CircularMotion or None
@@ -38,6 +40,7 @@ class Start:
     """
 
     problem: Problem
+    undisturbed: tuple[np.ndarray, np.ndarray]
     family: int | None
     motion: CircularMotion | None
     growth_rate: float
@@ -58,7 +61,7 @@ def make_start(scenario: Scenario) -> Start:
         with np.errstate(all="ignore"):
             family, motion, q, qd = _undisturbed(scenario, bicycle, surface)
             rate = _growth_rate(scenario, bicycle, surface, q, qd)
-            q, qd = _disturbed(scenario, bicycle, surface, q, qd)
+            undisturbed, (q, qd) = (q, qd), _disturbed(scenario, bicycle, surface, q, qd)
     except (ValueError, ArithmeticError) as error:
         raise ScenarioError(f"motion: {error}") from error
     simulation = scenario.simulation
@@ -66,7 +69,7 @@ def make_start(scenario: Scenario) -> Start:
     # Each time is rounded once: i / rate, not a sum of steps.
     times = np.arange(samples + 1) / simulation.output_rate
     size = float(np.hypot(*motion.position[:2])) if motion is not None else bicycle.wheelbase
-    return Start(Problem(bicycle, surface, q, qd, times), family, motion, rate, size)
+    return Start(Problem(bicycle, surface, q, qd, times), undisturbed, family, motion, rate, size)
 
 
 def _growth_rate(scenario: Scenario, bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> float:

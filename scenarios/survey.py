@@ -15,8 +15,7 @@ from reference.sections import SectionEnd, modes, sample_family, stable_sections
 from reference.special import special_points
 from reference.surface import Surface
 
-from .error import ScenarioError
-from .runner import write_json
+from .files import make_folder, write_json
 from .surfaces import bowl, named
 
 LONGEST_STEP = 0.05  # of the arc: some 100 to 300 points a family, no stable section known is shorter than three
@@ -102,10 +101,7 @@ def write_families(document: Mapping[str, Any], out: Path) -> None:
     """
     from reports.figures import family_figure
 
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ScenarioError(f"--out {out}: the folder cannot be made: {error.strerror}") from error
+    make_folder(out)
     write_json(out / "families.json", document)
     family_figure(out / "families.png", document, Bicycle().front_wheel_radius)
 

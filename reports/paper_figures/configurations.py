@@ -14,11 +14,11 @@ from matplotlib.lines import Line2D
 from reference.bicycle import BODIES, Bicycle
 from reference.circular import CircularMotion
 from reference.kinematics import body_positions, rotations
-from reference.surface import Surface
+from reference.surface import Surface, unit_normals
 
 from ..bicycle_shape import ball, body_meshes
 from ..figure_style import FAMILY_COLOURS, INK, WIDTH, new_figure
-from ..ground import STEEPEST, disc, lifted, unit_normals
+from ..ground import STEEPEST, disc, lifted
 from .picture import Picture, View
 
 _FRONT = "#8d939a"  # of the front assembly: a reversed handlebar is seen by it

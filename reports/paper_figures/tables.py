@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 
 from reference.stability import VARIABLES, Linearisation
+from reports.paper import printed as printed_figures
 
 SYMBOLS = ("x̃", "ỹ", "θ", "δ", "θ̇", "δ̇", "φ̇r")
 
 # As printed in section 4.2; of a conjugate pair the paper prints both signs.
 PRINTED = {
-    "Q1": ("0", "-13.40", "0.38", "-1.73±5.73i", "-0.01±0.98i"),
-    "Q2": ("0", "-12.28", "-0.43", "-0.14±6.71i", "-0.01±2.35i"),
+    name: tuple(real + (f"±{imaginary}i" if float(imaginary) else "") for real, imaginary in point["eigenvalues"])
+    for name, point in printed_figures().items()
+    if name in ("Q1", "Q2")
 }
 
 

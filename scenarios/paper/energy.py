@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-import numpy as np
-
 from reference.circular import LEAN, CircularMotion
 from reference.continuation import Point, root_between
 from reference.curve import sample
 from reference.families import Family
+from reference.sections import sample_family
 
 
 def motion_of_energy(family: Family, energy: float, near: CircularMotion) -> CircularMotion:
@@ -24,7 +23,7 @@ def motion_of_energy(family: Family, energy: float, near: CircularMotion) -> Cir
     def excess(point: Point) -> float:
         return float(sample(family.equations, point.unknowns[None]).energy[0]) - energy
 
-    values = sample(family.equations, np.array([point.unknowns for point in family.points])).energy - energy
+    values = sample_family(family).energy - energy
     brackets = [pair for k, pair in enumerate(pairwise(family.points)) if values[k] * values[k + 1] < 0]
     if not brackets:
         raise ValueError(f"no motion of family {family.number} has an energy of {energy!r} J")

@@ -11,9 +11,9 @@ from reference.bicycle import Bicycle
 from reference.circular import CircularMotion
 from reference.contact import observe
 from reference.dae import consistent_state
-from reference.kinematics import LEAN, REAR_ANGLE, STEER
+from reference.kinematics import REAR_ANGLE
 from reference.simulate import Motion, simulate, simulate_modified_euler
-from reference.stability import linearise
+from reference.stability import independent, linearise
 from reference.surface import Paraboloid
 from reports.paper.ledger import Check, Line, words
 
@@ -78,17 +78,10 @@ def _leave(evidence: Evidence, ride: Motion, motion: CircularMotion, window: tup
     reduced = linearise(evidence.bicycle, Paraboloid(evidence.figures["Q1"]["alpha"]), *motion.state())
     values, right = np.linalg.eig(reduced.jacobian)
     unstable = np.real(np.linalg.inv(right)[int(np.real(values).argmax())])
-    share = np.abs((_reduced(ride.q, ride.qd) - _reduced(*(part[None] for part in motion.state()))) @ unstable)
+    share = np.abs((independent(ride.q, ride.qd) - independent(*(part[None] for part in motion.state()))) @ unstable)
     chosen = (ride.time >= window[0]) & (ride.time <= window[1])
     rate = float(np.polyfit(ride.time[chosen], np.log(share[chosen]), 1)[0]) if chosen.sum() > 2 else float("nan")
     return Leaving(leaving_time(ride, float(np.hypot(*motion.position[:2]))), rate)
-
-
-def _reduced(q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-    """The reduced system's seven variables, shape (n, 7)."""
-    cosine, sine = np.cos(q[:, 3]), np.sin(q[:, 3])
-    x, y = cosine * q[:, 0] + sine * q[:, 1], -sine * q[:, 0] + cosine * q[:, 1]
-    return np.column_stack([x, y, q[:, [LEAN, STEER]], qd[:, [LEAN, STEER, REAR_ANGLE]]])
 
 
 def _unstable(evidence: Evidence) -> Iterator[Line]:

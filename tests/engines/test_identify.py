@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from engines.engine import Problem, Settings, load_engine
-from engines.identify import identify, independent
+from engines.identify import identify
 from engines.lagrange import LagrangeSettings
 from reference.bicycle import Bicycle
 from reference.dae import consistent_state
 from reference.families import find_motion
-from reference.stability import Linearisation, free_eigenvalues, linearise
+from reference.stability import Linearisation, free_eigenvalues, independent, linearise
 from reference.surface import Paraboloid, Plane
 from reports.precision import match
 

@@ -12,11 +12,11 @@ import pytest
 from pydantic import ValidationError
 
 from engines.engine import EngineError, Problem, Trajectory
+from engines.friction import cone_is_left, required_friction
 from engines.identify import identify
 from engines.lagrange import ENGINE as REFERENCE
 from engines.mujoco import default, exact_contact, multipliers, native
 from engines.mujoco.edges import build_contacts
-from engines.mujoco.friction import cone_is_left, required_friction
 from engines.mujoco.ride import start
 from engines.mujoco.settings import ExactContactSettings, MultiplierSettings
 from engines.mujoco.state import to_mujoco

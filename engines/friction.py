@@ -1,11 +1,20 @@
-"""The friction that a ride needs, and whether a contact with a given coefficient has it."""
+"""Normal forces of a ride, the friction that it needs, and whether a contact with a given coefficient has it."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from engines.engine import Trajectory
-from reference.surface import Surface, evaluate
+from reference.surface import Surface, unit_normals
+
+from .engine import Trajectory
+
+
+def normal_force(trajectory: Trajectory, surface: Surface) -> np.ndarray | None:
+    """Part of the contact forces along the surface's upward normal, shape (n, 2) [N]; None where they are not given."""
+    if trajectory.contact_force is None or trajectory.contact_point is None:
+        return None
+    point = trajectory.contact_point
+    return np.sum(trajectory.contact_force * unit_normals(surface, point[..., 0], point[..., 1]), axis=-1)
 
 
 def required_friction(trajectory: Trajectory, surface: Surface) -> np.ndarray:
@@ -30,9 +39,7 @@ def required_friction(trajectory: Trajectory, surface: Surface) -> np.ndarray:
     if trajectory.contact_point is None or trajectory.contact_force is None:
         raise ValueError(f"{trajectory.engine} gives no contact forces")
     point, force = trajectory.contact_point, trajectory.contact_force
-    slope = evaluate(surface, point[..., 0], point[..., 1])[..., 1:3]
-    across = np.concatenate([-slope, np.ones((*slope.shape[:-1], 1))], axis=-1)
-    normal = across / np.linalg.norm(across, axis=-1, keepdims=True)
+    normal = unit_normals(surface, point[..., 0], point[..., 1])
     pressure = np.sum(force * normal, axis=-1)
     sideways = np.linalg.norm(force - pressure[..., None] * normal, axis=-1)
     # Where a wheel is in the air nothing is needed either.
