@@ -7,7 +7,7 @@ An engine is any object that satisfies `Engine` and is announced under the entry
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Protocol, Self
 
@@ -98,6 +98,14 @@ class Trajectory:
     cpu_time: float
     ended: str | None = None
 
+    def first(self, samples: int) -> Self:
+        """The ride up to a number of samples; steps and CPU time stay those of the whole."""
+        cut = {name: value[:samples] for name in _SAMPLED if (value := getattr(self, name)) is not None}
+        return replace(self, **cut)
+
+
+_SAMPLED = tuple(field.name for field in fields(Trajectory) if "ndarray" in str(field.type))
+
 
 class Settings(BaseModel):
     """Base of an engine's settings: unknown names are refused, values are checked, nothing changes later."""
@@ -151,6 +159,8 @@ class Engine(Protocol):
 
         Raises
         ------
+        UnsuitableProblem
+            If no settings of this engine would do: a run that did not ask for it by name leaves it out.
         ValueError
             With one line that says what is wrong and what would be right.
         """
@@ -185,6 +195,10 @@ class Engine(Protocol):
 
 class EngineError(RuntimeError):
     """An engine could not run a problem at all."""
+
+
+class UnsuitableProblem(ValueError):
+    """A problem of a kind that an engine is not made for, such as a ground that it does not know."""
 
 
 def _announced() -> dict[str, EntryPoint]:

@@ -30,6 +30,7 @@ INTERVAL = 0.2  # short enough that the fastest oscillation known, 7 rad/s, turn
 # them (of fourth order it left 8e-5 of an eigenvalue at P3); an engine's noise is divided by them.
 DISTURBANCES = np.array([5e-3, 5e-3, 1e-3, 1e-3, 5e-3, 5e-3, 1e-2])
 _STENCIL = ((1, 45 / 60), (-1, -45 / 60), (2, -9 / 60), (-2, 9 / 60), (3, 1 / 60), (-3, -1 / 60))
+STENCIL_WEIGHT = sum(abs(weight) for _, weight in _STENCIL)
 LEVELS = 3
 
 
@@ -87,14 +88,14 @@ def identify(
     ValueError
         If the disturbed states do not exist, or the engine refuses the settings.
     """
-    interval = _interval(settings)
+    interval = interval_of(settings)
     jacobians = []
     for level in range(levels):
         refined = settings.refined(0.5**level)
         # Halved steps cost twice as much.
         before, share = (2**level - 1) / (2**levels - 1), 2**level / (2**levels - 1)
         jacobians.append(
-            _jacobian(engine, refined, problem, interval, lambda done, b=before, s=share: progress(b + s * done))
+            jacobian_at(engine, refined, problem, interval, lambda done, b=before, s=share: progress(b + s * done))
         )
     limit = extrapolate(jacobians)
     orders = observed_orders(jacobians)
@@ -102,15 +103,20 @@ def identify(
     return Identified(limit.value, limit.uncertainty, eigenvalues, orders[-1] if orders else np.nan)
 
 
-def _interval(settings: Settings) -> float:
-    """About `INTERVAL`, an even number of steps."""
+def interval_of(settings: Settings) -> float:
+    """Interval T of the flow: about `INTERVAL`, an even number of the settings' steps [s]."""
     step = getattr(settings, "step", None)
     return INTERVAL if step is None else max(1, round(INTERVAL / step / 2)) * 2 * step
 
 
-def _jacobian(
-    engine: Engine, settings: Settings, problem: Problem, interval: float, progress: Callable[[float], None]
+def jacobian_at(
+    engine: Engine,
+    settings: Settings,
+    problem: Problem,
+    interval: float,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> np.ndarray:
+    """Reduced Jacobian (7, 7) of an engine at the settings' own step, from an interval of flow [s]; see `identify`."""
     flow = np.zeros((2, 7, 7))
     for j in range(7):
         for i, (multiple, weight) in enumerate(_STENCIL):

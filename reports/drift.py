@@ -1,54 +1,35 @@
-"""The drift gate: what an engine may lose against its baseline, and the verdict.
+"""The drift gate: what engines measure on a gated scenario against their baselines, and the verdict.
 
-A baseline holds what each engine measured on a circular motion, whose exact solution is known. The
-same engine with the same settings repeats those values up to round-off and to what its iterations
-leave unconverged; anything beyond is a change of the engine. So no percentage is set by hand: with
-
-    noise = (error of the start + relative error a step may add x steps) x exp(max(growth rate, 0) x duration)
-
-the state may differ by ``noise`` relative to the motion's own sizes, and each quantity by its
-sensitivity to the state times that.
-
-Drift rates are held with their signs, and a move to smaller values is no excuse while version and
-settings are the baseline's: a fault may well cancel part of an engine's own error.
+A baseline holds what each engine measured on a circular motion, whose exact solution is known; what it may
+move by is derived in `reports.limits`. Drift rates are held with their signs, and a move to smaller values is
+no excuse while version and settings are the baseline's: a fault may well cancel part of an engine's own error.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-# A bounded disturbance |e| <= b over a duration T tilts a least-squares line by 3 b / T at the most.
-_SLOPE = 3.0
+# Of a ride, in the order shown; they are metrics but for the first.
+RIDE_QUANTITIES = (
+    "short_error",
+    "radius_drift_rate",
+    "phase_drift_rate",
+    "rear_rate_drift_rate",
+    "energy_drift",
+    "max_slip",
+    "mean_slip",
+    "contact_force_error",
+    "fell_at",
+    "steps",
+)
 
-# The start is a root of equations known to round-off, some 1e-13 of their rows, and their condition is
-# the inverse of the Jacobian's least singular value, some 1e2.
-START_ERROR = 1e-11
 
-
-@dataclass(frozen=True)
-class Scale:
-    """Sizes of a gated motion that turn a relative state error into each quantity's.
-
-    Attributes
-    ----------
-    radius, speed : float
-        Of point D [m, m/s].
-    rear_rate : float
-        Rear-wheel rate [rad/s].
-    growth_rate : float
-        Of disturbances [1/s].
-    duration : float
-        Of the gated run [s].
-    """
-
-    radius: float
-    speed: float
-    rear_rate: float
-    growth_rate: float
-    duration: float
+# Of these more is better; of all others, less in size.
+_MORE_IS_BETTER = ("fell_at", "observed_order")
+# Another number of steps is another computation, be it better or worse.
+_NEITHER = ("steps",)
 
 
 @dataclass(frozen=True)
@@ -61,8 +42,8 @@ class Verdict:
     value, baseline, limit : float or None
         The value holds within baseline +- limit.
     status : str
-        ``holds``, ``worse`` (larger in size beyond the limit), ``better`` (smaller in size beyond it,
-        with another version or other settings), ``changed`` (otherwise moved) or ``missing``.
+        ``holds``, ``worse`` (an error larger beyond the limit, an earlier fall, a lower order), ``better`` (the
+        opposite, with another version or other settings), ``changed`` (otherwise moved) or ``missing``.
     reason : str
         One line for a reader.
     """
@@ -80,13 +61,20 @@ class Verdict:
         """Whether the gate stays open."""
         return self.status in ("holds", "better")
 
+    @property
+    def share(self) -> float | None:
+        """How far the value moved, in limits; None where there is nothing to compare."""
+        if self.value is None or self.baseline is None or not self.limit:
+            return None
+        return abs(self.value - self.baseline) / self.limit
+
     def as_json(self) -> dict[str, Any]:
         """Fields as JSON values."""
         return asdict(self) | {"passes": self.passes}
 
 
 def quantities(measured: Mapping[str, Any], short_error: float) -> dict[str, float | None]:
-    """Pick the gated quantities; drifts keep their signs.
+    """Pick the gated quantities of a ride; drifts keep their signs.
 
     Parameters
     ----------
@@ -95,44 +83,14 @@ def quantities(measured: Mapping[str, Any], short_error: float) -> dict[str, flo
     short_error : float
         Position error at the short horizon [m].
     """
-    names = ("radius_drift_rate", "phase_drift_rate", "rear_rate_drift_rate", "energy_drift", "max_slip", "mean_slip")
-    return {"short_error": short_error} | {name: measured[name] for name in names}
-
-
-def limits(scale: Scale, step_noise: float, steps: int) -> dict[str, float]:
-    """What round-off, unconverged iterations and the motion's growth allow each quantity to move.
-
-    Parameters
-    ----------
-    scale : Scale
-    step_noise : float
-        Relative error that a step may add beyond the method.
-    steps : int
-        Steps of the run.
-
-    Returns
-    -------
-    dict
-        Limit by quantity, in the quantity's unit.
-    """
-    noise = (START_ERROR + step_noise * steps) * math.exp(max(scale.growth_rate, 0.0) * scale.duration)
-    return {
-        "short_error": noise * scale.radius,
-        "radius_drift_rate": _SLOPE * noise * scale.radius / scale.duration,
-        "phase_drift_rate": _SLOPE * noise / scale.duration,
-        "rear_rate_drift_rate": _SLOPE * noise * scale.rear_rate / scale.duration,
-        # Energy is quadratic in the speeds.
-        "energy_drift": 2 * noise,
-        "max_slip": noise * scale.speed,
-        "mean_slip": noise * scale.speed,
-    }
+    return {"short_error": short_error} | {name: measured[name] for name in RIDE_QUANTITIES[1:]}
 
 
 def judge(
     engine: str,
     values: Mapping[str, float | None],
     baseline: Mapping[str, Any] | None,
-    allowed: Mapping[str, float],
+    allowed: Mapping[str, float | None],
     settings: Mapping[str, Any],
     version: str,
 ) -> list[Verdict]:
@@ -144,9 +102,9 @@ def judge(
     values : mapping
         Quantities of this run.
     baseline : mapping or None
-        The engine's entry: ``quantities``, ``settings``, ``version``.
+        The engine's entry: ``quantities``, ``settings``, ``version``, and where known the date ``created``.
     allowed : mapping
-        Limits by quantity.
+        Limits by quantity; None where this run cannot tell the quantity.
     settings, version
         Of this run, to explain a change.
 
@@ -157,31 +115,47 @@ def judge(
     if baseline is None:
         return [missing(engine, "no baseline; velodrome check --update writes one")]
     changes = _changes(baseline, settings, version)
+    stored = " ".join(["the baseline", *(["of " + baseline["created"]] if "created" in baseline else [])])
+    since = f"since {stored}: {changes}" if changes else f"same version and settings as {stored}"
     verdicts = []
     for quantity, limit in allowed.items():
         value, before = values.get(quantity), baseline["quantities"].get(quantity)
         if value is None and before is None:
             continue  # the engine cannot give it, and never could
-        if value is None or before is None:
-            reason = "not given by this run" if value is None else "not in the baseline"
-            verdicts.append(Verdict(engine, quantity, value, before, limit, "missing", reason))
+        if quantity == "fell_at" and (value is None or before is None):
+            verdicts.append(_fall(engine, value, before, since, excused=bool(changes)))
             continue
-        status = _status(value, before, limit, excused=bool(changes))
+        if value is None or before is None or limit is None:
+            reason = "not in the baseline" if before is None else "not given by this run"
+            verdicts.append(Verdict(engine, quantity, value, before, limit, "missing", f"{reason}; {since}"))
+            continue
+        status = _status(quantity, value, before, limit, excused=bool(changes))
         move = f"{before:.6g} -> {value:.6g}, limit {limit:.2g}"
-        since = f"since the baseline: {changes}" if changes else "same version and settings as the baseline"
         reason = move if status == "holds" else f"{move}; {since}"
         verdicts.append(Verdict(engine, quantity, value, before, limit, status, reason))
     return verdicts
 
 
-def _status(value: float, before: float, limit: float, excused: bool) -> str:
+def _fall(engine: str, value: float | None, before: float | None, since: str, excused: bool) -> Verdict:
+    """Verdict where the bicycle fell in one of the two runs only."""
+    if value is not None:
+        return Verdict(engine, "fell_at", value, before, None, "worse", f"falls at {value:.6g} s; {since}")
+    return Verdict(
+        engine, "fell_at", value, before, None, "better" if excused else "changed", f"does not fall any more; {since}"
+    )
+
+
+def _status(quantity: str, value: float, before: float, limit: float, excused: bool) -> str:
     """Status of a value; ``excused`` where another version or other settings may have improved it."""
     if abs(value - before) <= limit:
         return "holds"
+    if quantity in _NEITHER:
+        return "changed"
+    growth = (abs(value) - abs(before)) * (-1 if quantity in _MORE_IS_BETTER else 1)
     # Not "larger than": a value that is no number is no improvement.
-    if not abs(value) <= abs(before) + limit:
+    if not growth <= limit:
         return "worse"
-    return "better" if excused and abs(value) < abs(before) - limit else "changed"
+    return "better" if excused and growth < -limit else "changed"
 
 
 def missing(engine: str, reason: str) -> Verdict:

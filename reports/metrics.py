@@ -87,11 +87,17 @@ def orientation_errors(trajectory: Trajectory, reference: Trajectory) -> np.ndar
 
 
 def fell_at(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> float | None:
-    """First sample at which the rear frame's centre of mass is nearly on the ground [s], or None."""
-    centre = trajectory.body_position[:, 0]
-    ground = evaluate(surface, centre[:, 0], centre[:, 1])[:, 0]
-    low = np.flatnonzero(centre[:, 2] - ground < _FALLEN_HEIGHT * bicycle.rear_frame_z)
-    return float(trajectory.time[low[0]]) if len(low) else None
+    """Time at which the rear frame's centre of mass is nearly on the ground [s], samples joined by lines; or None."""
+    centre, time = trajectory.body_position[:, 0], trajectory.time
+    height = centre[:, 2] - evaluate(surface, centre[:, 0], centre[:, 1])[:, 0] - _FALLEN_HEIGHT * bicycle.rear_frame_z
+    low = np.flatnonzero(height < 0)
+    if len(low) == 0:
+        return None
+    k = int(low[0])
+    if k == 0:
+        return float(time[0])
+    share = height[k - 1] / (height[k - 1] - height[k])
+    return float(time[k - 1] + share * (time[k] - time[k - 1]))
 
 
 def least_normal_force(trajectory: Trajectory, surface: Surface) -> float | None:

@@ -3,42 +3,28 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import reports
-from engines.engine import Engine, EngineError, Settings, engine_names
-from engines.steady import steady_trajectory
-from reference.kinematics import REAR_ANGLE
-from reports.drift import Scale, Verdict, judge, limits, missing, quantities
-from reports.metrics import position_errors
+from engines.engine import Engine, Settings, UnsuitableProblem, engine_names
+from reports.drift import Verdict, judge, missing
 
 from .error import ScenarioError
-from .files import write_json
-from .runner import Watch, configure, library_versions, measure_one
+from .files import make_folder, write_json
+from .gate_sample import SHORT_HORIZON, sample
+from .runner import Watch, configure, library_versions
 from .scenario import library_names, load_scenario
-from .start import Start, make_start
+from .start import make_start
 
 BASELINES = Path(next(iter(reports.__path__))) / "baselines"
 GATED_TAG = "gated"
 DURATION = 3.0  # a turn of q2 and a bit: seconds of work in the slowest engine
 OUTPUT_RATE = 50.0  # an interval that doubled steps divide as well: a coarser step is judged, not refused
-SHORT_HORIZON = 1.0
 
-
-@dataclass(frozen=True)
-class Sample:
-    """What one engine measured on one gated scenario."""
-
-    values: dict[str, float | None]
-    steps: int
-    version: str
-    settings: dict[str, Any]
+Chosen = Callable[[str, Mapping[str, Any]], tuple[Engine, Settings]]
 
 
 def gated_names() -> list[str]:
@@ -46,38 +32,12 @@ def gated_names() -> list[str]:
     return [name for name in library_names() if GATED_TAG in load_scenario(name)[1].tags]
 
 
-def sample(start: Start, engine: Engine, settings: Settings, watch: Callable[[float], None]) -> Sample:
-    """Run an engine on a circular motion and measure it against the exact one.
-
-    Raises
-    ------
-    EngineError, ValueError
-        If the engine does not run, or not to the end.
-    """
-    problem, motion = start.problem, start.motion
-    if motion is None:
-        raise ValueError("only a circular motion can be gated: its exact solution is known")
-    trajectory = engine.simulate(problem, settings, watch)
-    if trajectory.ended is not None:
-        raise EngineError(trajectory.ended)
-    exact = steady_trajectory(problem.bicycle, motion, problem.times)
-    measured = measure_one(start, trajectory, exact)
-    errors = position_errors(trajectory, exact)
-    short = float(errors[np.searchsorted(problem.times, SHORT_HORIZON)])
-    values = quantities(measured, short)
-    return Sample(values, trajectory.steps, engine.version, settings.model_dump(mode="json"))
-
-
-def scale_of(start: Start) -> Scale:
-    """Sizes of a gated start."""
-    qd = start.problem.qd
-    speed, rear_rate = float(np.hypot(qd[0], qd[1])), float(abs(qd[REAR_ANGLE]))
-    return Scale(start.size, speed, rear_rate, start.growth_rate, float(start.problem.times[-1]))
-
-
 def check(
     watch: Watch,
-    chosen: Callable[[str, Mapping[str, Any]], tuple[Engine, Settings]] = configure,
+    sources: Sequence[str] | None = None,
+    engines: Sequence[str] | None = None,
+    baselines: Path | None = None,
+    chosen: Chosen = configure,
 ) -> tuple[list[tuple[str, Verdict]], dict[str, dict[str, Any]]]:
     """Run the gate.
 
@@ -85,6 +45,12 @@ def check(
     ----------
     watch : callable
         Called with engine, time reached and duration.
+    sources : sequence of str, optional
+        Scenarios, library names or paths; the library's gated ones if not given.
+    engines : sequence of str, optional
+        Engines to judge; all that are installed or in a baseline if not given.
+    baselines : Path, optional
+        Folder of the baselines; the suite's own if not given.
     chosen : callable
         Maps an engine's name and its settings in the scenario to the engine and its settings.
 
@@ -93,44 +59,60 @@ def check(
     verdicts : list of (scenario, Verdict)
     fresh : dict
         Baseline of every scenario as this run would write it.
+
+    Raises
+    ------
+    ScenarioError
+        If a scenario or a baseline is none, or an engine is neither installed nor in a baseline.
     """
+    folder = BASELINES if baselines is None else baselines
+    changes = {"simulation.duration": DURATION, "simulation.output_rate": OUTPUT_RATE}
+    plans = [load_scenario(source, changes) for source in (sources or gated_names())]
+    known = {name: read_baseline(name, folder) for name, _ in plans}
+    # Engines of a baseline count too: one that is gone did not run.
+    names = [*engine_names(), *sorted({name for entries in known.values() for name in entries} - set(engine_names()))]
+    for engine in engines or []:
+        if engine not in names:
+            raise ScenarioError(f"engine {engine!r} is not installed; there are {', '.join(engine_names())}")
+    today = datetime.now(UTC).date().isoformat()
     verdicts: list[tuple[str, Verdict]] = []
     fresh: dict[str, dict[str, Any]] = {}
-    for name in gated_names():
-        _, scenario = load_scenario(name, {"simulation.duration": DURATION, "simulation.output_rate": OUTPUT_RATE})
+    for name, scenario in plans:
         start = make_start(scenario)
-        baseline = read_baseline(name)
+        if start.motion is None:
+            raise ScenarioError(f"{name}: only a circular motion can be gated: its exact solution is known")
+        baseline = known[name]
         entries: dict[str, Any] = {}
-        # Engines of the baseline count too: one that is gone did not run.
-        for engine_name in [*engine_names(), *sorted(set(baseline) - set(engine_names()))]:
+        for engine_name in [name for name in names if not engines or name in engines]:
+            entry = baseline.get(engine_name)
             try:
                 engine, settings = chosen(engine_name, scenario.engines.get(engine_name, {}))
                 found = sample(start, engine, settings, lambda t, e=engine_name: watch(e, t, DURATION))
             except Exception as error:  # an engine that breaks in any way did not run
-                verdicts.append((name, missing(engine_name, f"did not run: {error}")))
+                if entry is None and isinstance(error, UnsuitableProblem):
+                    continue  # it never could
+                verdicts.append((name, missing(engine_name, f"did not run: {' '.join(str(error).split())}")))
                 continue
-            allowed = limits(scale_of(start), engine.step_noise(settings), found.steps)
             entries[engine_name] = {
+                "created": today,
                 "version": found.version,
                 "settings": found.settings,
                 "steps": found.steps,
                 "quantities": found.values,
             }
-            entry = baseline.get(engine_name)
-            judged = judge(engine_name, found.values, entry, allowed, found.settings, found.version)
+            judged = judge(engine_name, found.values, entry, found.limits, found.settings, found.version)
             verdicts += [(name, verdict) for verdict in judged]
         fresh[name] = {
             "scenario": name,
             "duration": DURATION,
             "short_horizon": SHORT_HORIZON,
-            "created": datetime.now(UTC).date().isoformat(),
             "libraries": library_versions(),
             "engines": entries,
         }
     return verdicts, fresh
 
 
-def read_baseline(scenario: str) -> dict[str, Any]:
+def read_baseline(scenario: str, folder: Path | None = None) -> dict[str, Any]:
     """Committed entries of a scenario, by engine; empty where there is no baseline.
 
     Raises
@@ -138,20 +120,50 @@ def read_baseline(scenario: str) -> dict[str, Any]:
     ScenarioError
         If the file is damaged.
     """
-    path = BASELINES / f"{scenario}.json"
+    path = (BASELINES if folder is None else folder) / f"{scenario}.json"
     if not path.exists():
         return {}
     try:
-        return json.loads(path.read_text(encoding="utf-8"))["engines"]
-    except (json.JSONDecodeError, KeyError, TypeError) as error:
+        entries = json.loads(path.read_text(encoding="utf-8"))["engines"]
+        for entry in entries.values():
+            _ = entry["version"], entry["settings"].items(), entry["quantities"].items()
+    except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError, AttributeError) as error:
         raise ScenarioError(f"{path}: not a baseline: {error!r}") from error
+    return entries
 
 
-def update(fresh: Mapping[str, Mapping[str, Any]]) -> list[Path]:
-    """Write new baselines and return their paths."""
-    BASELINES.mkdir(exist_ok=True)
+def update(
+    fresh: Mapping[str, Mapping[str, Any]],
+    verdicts: Sequence[tuple[str, Verdict]],
+    reason: str | None = None,
+    baselines: Path | None = None,
+) -> list[Path]:
+    """Write new baselines, with why they were written, and return their paths.
+
+    Engines that were not run keep their entries, unless they are not installed any more.
+
+    Parameters
+    ----------
+    fresh : mapping
+    verdicts : sequence of (scenario, Verdict)
+        What the run said of the old baselines.
+    reason : str, optional
+        In somebody's words; what moved if not given.
+    baselines : Path, optional
+        Folder, made if need be; the suite's own if not given.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder cannot be made.
+    """
+    folder = BASELINES if baselines is None else baselines
+    make_folder(folder)
     paths = []
     for name, baseline in fresh.items():
-        paths.append(BASELINES / f"{name}.json")
-        write_json(paths[-1], baseline)
+        moved = [verdict for scenario, verdict in verdicts if scenario == name and verdict.status != "holds"]
+        kept = {engine: entry for engine, entry in read_baseline(name, folder).items() if engine in engine_names()}
+        words = reason or "; ".join(f"{v.engine}: {v.quantity}: {v.status}" for v in moved) or "nothing moved"
+        paths.append(folder / f"{name}.json")
+        write_json(paths[-1], {**baseline, "reason": words, "engines": kept | baseline["engines"]})
     return paths

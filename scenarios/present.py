@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
     from reports.drift import Verdict
 
     from .runner import Outcome, Plan
+
+# Of a terminal: from here on engines' names stand on one line.
+_WIDE, _NAME_WIDTH = 95, 14
 
 
 class Progress:
@@ -88,11 +92,15 @@ def show_outcome(console: Console, plan: Plan, outcome: Outcome) -> None:
     for title, unit, _, _ in COLUMNS:
         table.add_column("{}\n{}\n[dim]{}[/dim]".format(*title.split(), unit), justify="right", no_wrap=True)
     for name, values in outcome.metrics.items():
-        table.add_row(name, *(cell(values, metric, part) for _, _, metric, part in COLUMNS))
+        # A long name must not push the figures off a narrow terminal.
+        shown = name if console.width >= _WIDE else "\n".join(wrap(name, _NAME_WIDTH))
+        table.add_row(shown, *(cell(values, metric, part) for _, _, metric, part in COLUMNS))
     console.print(table)
     for name, values in outcome.metrics.items():
         for line in remarks(name, values, duration):
             console.print(line, style="yellow", markup=False, soft_wrap=True)
+    for reason in plan.left_out.values():
+        console.print(f"left out: {reason}", style="dim", markup=False, highlight=False, soft_wrap=True)
     for name, reason in outcome.failures.items():
         console.print(f"{name} did not run: {reason}", style="red", markup=False, soft_wrap=True)
     for verdict in outcome.verdicts:
@@ -114,6 +122,7 @@ def outcome_json(plan: Plan, outcome: Outcome) -> dict[str, Any]:
         "complete": not outcome.interrupted,
         "engines": outcome.metrics,
         "failures": outcome.failures,
+        "left_out": plan.left_out,
         "verdicts": outcome.verdicts,
     }
 
@@ -307,17 +316,14 @@ STATUS_STYLES = {"holds": "green", "better": "cyan", "changed": "red", "worse": 
 
 
 def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]]) -> None:
-    """Print the gate's verdicts: every quantity by scenario, then what does not hold in plain lines."""
+    """Print the gate's verdicts: a line an engine, then everything that does not hold in plain lines."""
     for name, group in groupby(verdicts, key=lambda item: item[0]):
         console.print(name, style="bold", markup=False)
-        table = Table("engine", "quantity", box=None, pad_edge=False)
-        for title in ("value", "baseline", "limit"):
-            table.add_column(title, justify="right")
-        table.add_column("verdict")
-        for _, verdict in group:
-            numbers = ("–" if x is None else f"{x:.4g}" for x in (verdict.value, verdict.baseline, verdict.limit))
-            status = Text(verdict.status, STATUS_STYLES[verdict.status])
-            table.add_row(verdict.engine, verdict.quantity, *numbers, status)
+        table = Table("engine", box=None, pad_edge=False)
+        table.add_column("hold", justify="right")
+        table.add_column("moved most, against its limit")
+        for engine, rows in groupby((verdict for _, verdict in group), key=lambda verdict: verdict.engine):
+            table.add_row(*_engine_row(engine, list(rows)))
         console.print(table)
     for name, verdict in verdicts:
         if verdict.status != "holds":
@@ -325,3 +331,14 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]]) -> None
             console.print(line, style=STATUS_STYLES[verdict.status], markup=False, highlight=False, soft_wrap=True)
     passes = all(verdict.passes for _, verdict in verdicts)
     console.print("the gate holds" if passes else "the gate fails", style="bold green" if passes else "bold red")
+
+
+def _engine_row(engine: str, verdicts: list[Verdict]) -> tuple[str, Text, str]:
+    held = sum(verdict.status == "holds" for verdict in verdicts)
+    passes = all(verdict.passes for verdict in verdicts)
+    shares = {verdict.quantity: share for verdict in verdicts if (share := verdict.share) is not None}
+    moved = "nothing moved" if shares else "–"
+    if any(shares.values()):
+        most = max(shares, key=lambda quantity: shares[quantity])
+        moved = f"{most}, {shares[most]:.2g}"
+    return engine, Text(f"{held} of {len(verdicts)}", "green" if passes else "red"), moved

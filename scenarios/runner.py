@@ -16,7 +16,16 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
-from engines.engine import REFERENCE, Engine, EngineError, Settings, Trajectory, engine_names, load_engine
+from engines.engine import (
+    REFERENCE,
+    Engine,
+    EngineError,
+    Settings,
+    Trajectory,
+    UnsuitableProblem,
+    engine_names,
+    load_engine,
+)
 from engines.storage import write_trajectory
 from reports.metrics import metrics
 from reports.summary import summary
@@ -44,12 +53,15 @@ class Plan:
     start : Start
     engines : dict
         Name to (engine, its settings), the reference first.
+    left_out : dict
+        Engines that were not asked for by name and are not made for this problem, with the reason.
     """
 
     name: str
     scenario: Scenario
     start: Start
     engines: dict[str, tuple[Engine, Settings]]
+    left_out: dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -83,7 +95,7 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
     name : str
     scenario : Scenario
     wanted : list of str, optional
-        Engines to run beside the reference; all that are installed if not given.
+        Engines to run beside the reference; all that are installed and made for the problem if not given.
 
     Raises
     ------
@@ -97,12 +109,16 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
     names = [engine for engine in installed if engine == REFERENCE or not wanted or engine in wanted]
     chosen = {engine: configure(engine, scenario.engines.get(engine, {})) for engine in names}
     start = make_start(scenario)
+    left_out: dict[str, str] = {}
     for engine, (library, settings) in chosen.items():
         try:
             library.check(start.problem, settings)
         except ValueError as error:
-            raise ScenarioError(f"engines.{engine}: {error}") from error
-    return Plan(name, scenario, start, chosen)
+            if wanted or not isinstance(error, UnsuitableProblem):
+                raise ScenarioError(f"engines.{engine}: {error}") from error
+            left_out[engine] = str(error)
+    chosen = {engine: pair for engine, pair in chosen.items() if engine not in left_out}
+    return Plan(name, scenario, start, chosen, left_out)
 
 
 def configure(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
@@ -267,6 +283,7 @@ def _write_manifest(
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "complete": complete,
         "engines": engines,
+        "left_out": plan.left_out,
         "libraries": library_versions(),
         "platform": {"system": platform.platform(), "machine": platform.machine(), "python": platform.python_version()},
         "start": {

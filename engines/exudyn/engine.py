@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from engines.engine import EngineError, Problem, Progress, Trajectory
+from engines.engine import EngineError, Problem, Progress, Trajectory, UnsuitableProblem
 from reference.kinematics import quaternions
 from reference.simulate import steps_per_output
 from reference.surface import is_level
@@ -55,7 +55,7 @@ class ExudynEngine:
     def check(self, problem: Problem, settings: SolverSettings) -> None:
         """Refuse output times that the step does not meet, and ground; see `engines.engine.Engine`."""
         if self.level_only and not is_level(problem.surface):
-            raise ValueError(f"{self.name} rolls on the level plane only; exudyn rides on any surface")
+            raise UnsuitableProblem(f"{self.name} rolls on the level plane only; exudyn rides on any surface")
         steps_per_output(problem.times, settings.step)
 
     def step_noise(self, settings: SolverSettings) -> float:
@@ -67,9 +67,10 @@ class ExudynEngine:
 
         Raises
         ------
+        UnsuitableProblem
+            If the engine knows no such ground.
         ValueError
-            If the output times are no uniform grid from 0, the step does not divide its interval, or the
-            engine knows no such ground.
+            If the output times are no uniform grid from 0, or the step does not divide its interval.
         EngineError
             If the engine does not even accept the initial state.
         """

@@ -3,70 +3,21 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra import numpy as hnp
 
-from engines.steady import steady_trajectory
-from reference.bicycle import Bicycle
-from reference.families import find_motion
-from reference.kinematics import REAR_ANGLE
-from reference.surface import Paraboloid
-from reports.drift import Scale, Verdict, judge, limits, missing, quantities
-from reports.metrics import metrics
+from reports.drift import RIDE_QUANTITIES, Verdict, judge, missing, quantities
 
-SCALE = Scale(radius=2.0, speed=5.0, rear_rate=18.0, growth_rate=-0.1, duration=4.0)
 SETTINGS = {"step": 0.001, "tolerance": 1e-10}
 ENTRY = {"version": "1.0", "settings": SETTINGS, "quantities": {"short_error": 1e-5, "max_slip": None}}
 ALLOWED = {"short_error": 1e-7, "max_slip": 1e-6}
-BICYCLE = Bicycle()
-_, MOTION = find_motion(BICYCLE, Paraboloid(0.005), 18.0, 2)
-EXACT = steady_trajectory(BICYCLE, MOTION, np.arange(41) / 10)
 
 
 def judged(value: float | None, entry: dict[str, Any] | None = ENTRY, **changes: Any) -> list[Verdict]:
     values = {"short_error": value, "max_slip": None}
     run = {"settings": SETTINGS, "version": "1.0"} | changes
     return judge("exudyn", values, entry, ALLOWED, run["settings"], run["version"])
-
-
-def test_limits_are_noise_times_sensitivity() -> None:
-    # 1000 steps of 1e-10 each: 1e-7 of every size, and the start's 1e-11 more.
-    found = limits(SCALE, 1e-10, 1000)
-    expected = {
-        "short_error": 2e-7,
-        "radius_drift_rate": 3 * 2e-7 / 4,
-        "phase_drift_rate": 3 * 1e-7 / 4,
-        "rear_rate_drift_rate": 3 * 18e-7 / 4,
-        "energy_drift": 2e-7,
-        "max_slip": 5e-7,
-        "mean_slip": 5e-7,
-    }
-    assert found == pytest.approx({name: limit * (1 + 1e-4) for name, limit in expected.items()}, rel=1e-14)
-
-
-def test_only_growth_widens_limits() -> None:
-    decaying, growing = limits(SCALE, 1e-10, 1000), limits(replace(SCALE, growth_rate=0.5), 1e-10, 1000)
-    assert limits(replace(SCALE, growth_rate=0.0), 1e-10, 1000) == decaying
-    for name, limit in growing.items():
-        assert limit == pytest.approx(decaying[name] * np.exp(2.0), rel=1e-14)
-
-
-@given(hnp.arrays(float, len(EXACT.time), elements=st.floats(-1, 1)))
-def test_a_bounded_disturbance_tilts_a_line_by_no_more_than_the_limit_says(disturbance: np.ndarray) -> None:
-    # limits() lets a slope move by 3 b / T where the samples move by b.
-    qd = EXACT.qd.copy()
-    qd[:, REAR_ANGLE] += disturbance
-    measured = metrics(replace(EXACT, qd=qd), EXACT, BICYCLE, Paraboloid(0.005), -1.0, 1.0, circular=True)
-    bound = float(np.abs(disturbance).max())
-    scale = Scale(1.0, 1.0, bound, -1.0, float(EXACT.time[-1]))
-    round_off = 18 * 2.0**-50  # of rates of size 18
-    assert abs(measured["rear_rate_drift_rate"]) <= limits(scale, 1.0, 1)["rear_rate_drift_rate"] + round_off
 
 
 @pytest.mark.parametrize(
@@ -131,16 +82,62 @@ def test_verdicts_are_json() -> None:
 
 def test_quantities_keep_their_signs() -> None:
     rates = {"radius_drift_rate": -1e-6, "phase_drift_rate": 2e-6, "rear_rate_drift_rate": -3e-6}
-    measured = rates | {"energy_drift": 1e-8, "max_slip": None, "mean_slip": None}
-    found = quantities(measured, 5e-6)
-    assert found == {
-        "short_error": 5e-6,
-        "radius_drift_rate": -1e-6,
-        "phase_drift_rate": 2e-6,
-        "rear_rate_drift_rate": -3e-6,
+    others = {
         "energy_drift": 1e-8,
         "max_slip": None,
         "mean_slip": None,
+        "contact_force_error": 2e-9,
+        "fell_at": 1.5,
+        "steps": 9,
     }
-    # Every quantity has a limit, or it would never be judged.
-    assert set(found) == set(limits(SCALE, 1e-10, 1))
+    found = quantities(rates | others | {"cpu_time": 3.0}, 5e-6)
+    assert found == {"short_error": 5e-6} | rates | others
+    assert tuple(found) == RIDE_QUANTITIES
+
+
+@pytest.mark.parametrize(
+    ("value", "before", "status"),
+    [
+        (None, 0.48, "changed"),
+        (0.48, None, "worse"),
+        (0.47, 0.48, "worse"),
+        (0.49, 0.48, "changed"),
+        (0.4801, 0.48, "holds"),
+    ],
+)
+def test_an_earlier_fall_is_worse_and_one_that_is_new_too(
+    value: float | None, before: float | None, status: str
+) -> None:
+    entry = ENTRY | {"quantities": {"fell_at": before}}
+    (verdict,) = judge("exudyn", {"fell_at": value}, entry, {"fell_at": 1e-3}, SETTINGS, "1.0")
+    assert (verdict.status, verdict.passes) == (status, status == "holds")
+    (verdict,) = judge("exudyn", {"fell_at": value}, entry, {"fell_at": 1e-3}, SETTINGS, "1.1")
+    assert verdict.status == ("better" if status == "changed" else status)
+
+
+def test_a_lower_order_is_worse() -> None:
+    entry = ENTRY | {"quantities": {"observed_order": 2.0}}
+    found = {}
+    for value in (1.0, 1.995, 4.0):
+        (verdict,) = judge("exudyn", {"observed_order": value}, entry, {"observed_order": 0.01}, SETTINGS, "1.1")
+        found[value] = verdict.status
+    assert found == {1.0: "worse", 1.995: "holds", 4.0: "better"}
+
+
+def test_another_number_of_steps_is_neither_worse_nor_better() -> None:
+    entry = ENTRY | {"quantities": {"steps": 3000}}
+    for value, status in ((3001, "holds"), (1500, "changed"), (6000, "changed")):
+        (verdict,) = judge("exudyn", {"steps": value}, entry, {"steps": 1.0}, SETTINGS, "1.1")
+        assert verdict.status == status
+
+
+def test_what_this_run_cannot_tell_from_noise_is_missing() -> None:
+    entry = ENTRY | {"quantities": {"observed_order": 2.0}}
+    (verdict,) = judge("exudyn", {"observed_order": None}, entry, {"observed_order": None}, SETTINGS, "1.0")
+    assert (verdict.status, verdict.share) == ("missing", None)
+
+
+def test_the_baselines_date_is_told() -> None:
+    (verdict,) = judged(2e-5, entry=ENTRY | {"created": "2026-01-31"})
+    assert verdict.reason.endswith("same version and settings as the baseline of 2026-01-31")
+    assert verdict.share == pytest.approx(100)

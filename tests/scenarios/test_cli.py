@@ -149,7 +149,7 @@ def test_run_as_json_is_one_document_and_the_rest_goes_to_stderr(velodrome, tmp_
     found = result.json()
     assert [entry["scenario"] for entry in found["runs"]] == ["q2", "iftomm-2"]  # each once
     for entry in found["runs"]:
-        assert set(entry) == {"scenario", "folder", "complete", "engines", "failures", "verdicts"}
+        assert set(entry) == {"scenario", "folder", "complete", "engines", "failures", "left_out", "verdicts"}
         folder = tmp_path / entry["folder"]
         assert entry["engines"] == json.loads((folder / "metrics.json").read_text())
         assert "lean_rate = 0.2" in (folder / "scenario.toml").read_text()
@@ -169,7 +169,7 @@ def test_run_shows_a_table_and_where_things_are(velodrome, tmp_path: Path) -> No
 
 def test_run_by_tag_takes_all_that_have_it(velodrome) -> None:
     result = velodrome("run", "--tag", "gated", *SHORT, "--json")
-    assert [entry["scenario"] for entry in result.json()["runs"]] == ["q2"]
+    assert [entry["scenario"] for entry in result.json()["runs"]] == ["plane-circle", "q2"]
     assert result.status == 0
 
 
@@ -275,7 +275,7 @@ def test_no_arguments_show_the_commands(velodrome) -> None:
 
 def judged(monkeypatch: pytest.MonkeyPatch, *verdicts: Verdict) -> None:
     """Make the gate come to these verdicts."""
-    monkeypatch.setattr(gate, "check", lambda _: ([("q2", verdict) for verdict in verdicts], {"q2": {}}))
+    monkeypatch.setattr(gate, "check", lambda *_: ([("q2", verdict) for verdict in verdicts], {"q2": {}}))
 
 
 WORSE = Verdict("exudyn", "short_error", 2e-5, 1e-5, 1e-7, "worse", "1e-05 -> 2e-05")
@@ -302,7 +302,7 @@ def test_check_is_status_1_when_a_verdict_fails(
 
 def test_update_writes_no_baseline_of_an_engine_that_did_not_run(velodrome, monkeypatch: pytest.MonkeyPatch) -> None:
     judged(monkeypatch, missing("exudyn", "did not run: no licence"))
-    monkeypatch.setattr(gate, "update", lambda _: pytest.fail("written"))
+    monkeypatch.setattr(gate, "update", lambda *_: pytest.fail("written"))
     result = velodrome("check", "--update")
     assert (result.status, result.stdout) == (2, "")
     assert "exudyn did not run: no licence" in result.stderr
@@ -310,10 +310,49 @@ def test_update_writes_no_baseline_of_an_engine_that_did_not_run(velodrome, monk
 
 def test_update_accepts_what_has_become_worse(velodrome, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     judged(monkeypatch, WORSE)
-    monkeypatch.setattr(gate, "update", lambda fresh: [tmp_path / f"{name}.json" for name in fresh])
+    monkeypatch.setattr(gate, "update", lambda fresh, *_: [tmp_path / f"{name}.json" for name in fresh])
     result = velodrome("check", "--update", "--json")
     assert result.status == 0
     assert result.json()["updated"] == [str(tmp_path / "q2.json")]
+
+
+def test_check_writes_its_verdicts_for_a_ci_service(velodrome, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    judged(monkeypatch, WORSE)
+    junit, markdown = tmp_path / "gate.xml", tmp_path / "gate.md"
+    assert velodrome("check", "--junit", str(junit), "--markdown", str(markdown)).status == 1
+    assert 'failures="1"' in junit.read_text(encoding="utf-8")
+    assert markdown.read_text(encoding="utf-8").startswith("# Drift gate: fails")
+    result = velodrome("check", "--junit", str(tmp_path / "nowhere" / "gate.xml"))
+    assert (result.status, result.stdout) == (2, "")
+
+
+def test_check_judges_what_it_is_asked_for(velodrome, tmp_path: Path) -> None:
+    arguments = ("check", "q2", "--engine", "mujoco-multipliers", "--baselines", str(tmp_path / "own"))
+    assert "no baseline" in velodrome(*arguments).stdout
+    result = velodrome(*arguments, "--update", "--reason", "the first of its kind", "--json")
+    assert (result.status, result.json()["updated"]) == (0, [str(tmp_path / "own" / "q2.json")])
+    assert json.loads((tmp_path / "own" / "q2.json").read_text())["reason"] == "the first of its kind"
+    assert "mujoco-multipliers  12 of 12  nothing moved" in velodrome(*arguments).stdout
+    for wrong, words in (
+        (("q2", "--engine", "warp"), "engine 'warp' is not installed"),
+        (("iftomm-1",), "iftomm-1: only a circular motion can be gated"),
+        (("--reason", "none"), "--reason: it belongs to --update"),
+    ):
+        result = velodrome("check", *wrong)
+        assert (result.status, words in result.stderr) == (2, True), wrong
+
+
+def test_an_engine_that_is_not_made_for_a_ground_is_left_out_or_refused(velodrome) -> None:
+    everything = ("--duration", "0.1", "--out", "out")
+    found = velodrome("run", "q2", *everything, "--json").json()["runs"][0]
+    assert "exudyn-builtin" not in found["engines"]
+    assert found["left_out"] == {
+        "exudyn-builtin": "exudyn-builtin rolls on the level plane only; exudyn rides on any surface"
+    }
+    assert found["failures"] == {}
+    result = velodrome("run", "q2", *everything, "--engine", "exudyn-builtin")
+    assert (result.status, "rolls on the level plane only" in result.stderr) == (2, True)
+    assert "exudyn-builtin" in velodrome("run", "plane-circle", *everything, "--json").json()["runs"][0]["engines"]
 
 
 def test_the_installed_command_starts_and_minds_a_closed_pipe() -> None:

@@ -1,0 +1,90 @@
+"""The gate's verdicts as files for a CI service: JUnit XML and Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+from xml.etree import ElementTree
+
+from .drift import Verdict
+
+Verdicts = Sequence[tuple[str, Verdict]]
+# What a reader must see first.
+_WORST_FIRST = ("missing", "worse", "changed", "better", "holds")
+
+
+def junit_xml(verdicts: Verdicts) -> str:
+    """JUnit XML: a test suite a scenario, a test case a quantity of an engine.
+
+    Parameters
+    ----------
+    verdicts : sequence of (scenario, Verdict)
+        Grouped by scenario.
+
+    Returns
+    -------
+    str
+    """
+    root = ElementTree.Element("testsuites", {"name": "velodrome check"} | _counts(verdicts))
+    for name, group in groupby(verdicts, key=lambda item: item[0]):
+        cases = list(group)
+        suite = ElementTree.SubElement(root, "testsuite", {"name": name} | _counts(cases))
+        for _, verdict in cases:
+            case = ElementTree.SubElement(
+                suite, "testcase", classname=f"{name}.{verdict.engine}", name=verdict.quantity
+            )
+            if not verdict.passes:
+                ElementTree.SubElement(case, "failure", type=verdict.status, message=_printable(verdict.reason))
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _counts(verdicts: Verdicts) -> dict[str, str]:
+    failures = sum(not verdict.passes for _, verdict in verdicts)
+    return {"tests": str(len(verdicts)), "failures": str(failures), "errors": "0"}
+
+
+def _printable(text: str) -> str:
+    """Without the control characters that XML cannot carry."""
+    return "".join(letter if letter.isprintable() else " " for letter in text)
+
+
+def markdown_page(verdicts: Verdicts) -> str:
+    """Markdown for a summary: the outcome, what moved, then all quantities, the worst first.
+
+    Parameters
+    ----------
+    verdicts : sequence of (scenario, Verdict)
+
+    Returns
+    -------
+    str
+    """
+    passes = all(verdict.passes for _, verdict in verdicts)
+    held = sum(verdict.status == "holds" for _, verdict in verdicts)
+    lines = [f"# Drift gate: {'holds' if passes else 'fails'}", "", f"{held} of {len(verdicts)} quantities hold.", ""]
+    ordered = sorted(verdicts, key=lambda item: _WORST_FIRST.index(item[1].status))
+    moved = [(name, verdict) for name, verdict in ordered if verdict.status != "holds"]
+    for name, verdict in moved:
+        reason = _cell(verdict.reason)
+        lines.append(f"- **{verdict.status}** {name}, {verdict.engine}, {verdict.quantity}: {reason}")
+    lines += [""] if moved else []
+    lines += [
+        "| scenario | engine | quantity | value | baseline | limit | verdict |",
+        "|---|---|---|---:|---:|---:|---|",
+    ]
+    for name, verdict in ordered:
+        numbers = (_number(value) for value in (verdict.value, verdict.baseline, verdict.limit))
+        lines.append(
+            f"| {name} | {verdict.engine} | {verdict.quantity} | " + " | ".join(numbers) + f" | {verdict.status} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.6g}"
+
+
+def _cell(text: str) -> str:
+    """Text of somebody else's making, shown as it is."""
+    return "".join(f"\\{letter}" if letter in "\\`*_|<>[]" else letter for letter in _printable(text))
