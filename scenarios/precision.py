@@ -13,6 +13,7 @@ from engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Tr
 from engines.identify import LEVELS as IDENTIFY_LEVELS
 from engines.identify import Identified, identify
 from reference.stability import linearise
+from reference.surface import SurfaceOfRevolution
 from reports.precision import Level, comparison_horizon, eigenvalue_document, engine_document
 
 from .error import ScenarioError
@@ -147,6 +148,8 @@ def _runs(
 
 
 def _identified(engine: Engine, settings: Settings, undisturbed: Problem, watch: Watch) -> Identified | str:
+    if not isinstance(undisturbed.surface, SurfaceOfRevolution):
+        return "the ground is no surface of revolution, so that the motion is not steady"
     label = f"{engine.name} modes"
     try:
         return identify(engine, settings, undisturbed, lambda done: watch(label, done, 1.0))
@@ -165,13 +168,13 @@ def _document(
     horizons = [comparison_horizon(study.levels) for engine, study in studies.items() if engine != REFERENCE]
     known = [horizon for horizon in horizons if horizon is not None]
     horizon = max(known) if known else None
-    exact = linearise(undisturbed.bicycle, undisturbed.surface, undisturbed.q, undisturbed.qd)
     engines = {}
     for engine, study in studies.items():
         entry = engine_document(study.levels, study.failures, reference, start.size, horizon)
         found = study.identified
         entry["eigenvalues"] = None
         if isinstance(found, Identified):
+            exact = linearise(undisturbed.bicycle, undisturbed.surface, undisturbed.q, undisturbed.qd)
             entry["eigenvalues"] = eigenvalue_document(found, exact.eigenvalues)
         elif found is not None:
             entry["failures"].append({"step": None, "reason": f"no eigenvalues: {found}"})

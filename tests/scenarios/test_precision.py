@@ -92,6 +92,14 @@ def test_eigenvalues_are_part_of_the_study() -> None:
         assert np.abs(np.subtract(found["values"], found["reference"])).max() <= found["error"]
 
 
+def test_ground_without_symmetry_has_no_eigenvalues() -> None:
+    document = study("waves", {"simulation.duration": 0.1}, ["mujoco-multipliers"], 2, eigenvalues=True)
+    entry = document["engines"]["mujoco-multipliers"]
+    assert entry["eigenvalues"] is None
+    reasons = [failure["reason"] for failure in entry["failures"]]
+    assert reasons == ["no eigenvalues: the ground is no surface of revolution, so that the motion is not steady"]
+
+
 def test_a_level_that_fails_is_a_row_with_its_reason() -> None:
     document = study("p3", {"simulation.duration": 4.0}, ["mujoco-native"], 2)
     entry = document["engines"]["mujoco-native"]
