@@ -93,7 +93,7 @@ def test_eigenvalues_are_part_of_the_study() -> None:
 
 
 def test_ground_without_symmetry_has_no_eigenvalues() -> None:
-    document = study("waves", {"simulation.duration": 0.1}, ["mujoco-multipliers"], 2, eigenvalues=True)
+    document = study("waves", {"simulation.duration": 0.4}, ["mujoco-multipliers"], 2, eigenvalues=True)
     entry = document["engines"]["mujoco-multipliers"]
     assert entry["eigenvalues"] is None
     reasons = [failure["reason"] for failure in entry["failures"]]
