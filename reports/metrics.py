@@ -10,9 +10,9 @@ from engines.engine import Trajectory
 from engines.friction import normal_force
 from reference.bicycle import Bicycle
 from reference.kinematics import REAR_ANGLE
-from reference.surface import Surface, evaluate
+from reference.surface import Surface
 
-_FALLEN_HEIGHT = 0.1  # of the upright height of the rear frame's centre of mass: a lean of some 84 degrees
+from .fall import fell_at, until_fall
 
 
 def metrics(
@@ -24,7 +24,7 @@ def metrics(
     size: float,
     circular: bool,
 ) -> dict[str, Any]:
-    """Measure a trajectory.
+    """Measure a trajectory, up to its fall if it falls.
 
     Parameters
     ----------
@@ -47,17 +47,19 @@ def metrics(
         The quantities of ``metrics.json``, JSON values; None where an engine does not give what a
         quantity needs, or the quantity has no meaning.
     """
+    simulated, fall = float(trajectory.time[-1] - trajectory.time[0]), fell_at(trajectory, bicycle, surface)
+    trajectory = until_fall(trajectory, bicycle, surface)
+    reference = None if reference is None else until_fall(reference, bicycle, surface)
     result = _errors(trajectory, reference)
     result |= _drifts(trajectory, reference, circular)
     result |= _energy(trajectory)
     result |= _constraints(trajectory)
-    simulated = float(trajectory.time[-1] - trajectory.time[0])
     result |= {
         "steps": trajectory.steps,
         "cpu_time": trajectory.cpu_time,
         "real_time_factor": simulated / trajectory.cpu_time if trajectory.cpu_time > 0 else None,
         "min_normal_force": least_normal_force(trajectory, surface),
-        "fell_at": fell_at(trajectory, bicycle, surface),
+        "fell_at": fall,
         "ended": trajectory.ended,
     }
     result["horizon"] = None if reference is None else horizon(trajectory, reference, growth_rate, size)
@@ -84,20 +86,6 @@ def orientation_errors(trajectory: Trajectory, reference: Trajectory) -> np.ndar
     # 2 asin(|a - +-b| / 2) resolves small angles, which the arc cosine of a product does not.
     chord = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
     return 4 * np.arcsin(np.minimum(chord / 2, 1.0))
-
-
-def fell_at(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> float | None:
-    """Time at which the rear frame's centre of mass is nearly on the ground [s], samples joined by lines; or None."""
-    centre, time = trajectory.body_position[:, 0], trajectory.time
-    height = centre[:, 2] - evaluate(surface, centre[:, 0], centre[:, 1])[:, 0] - _FALLEN_HEIGHT * bicycle.rear_frame_z
-    low = np.flatnonzero(height < 0)
-    if len(low) == 0:
-        return None
-    k = int(low[0])
-    if k == 0:
-        return float(time[0])
-    share = height[k - 1] / (height[k - 1] - height[k])
-    return float(time[k - 1] + share * (time[k] - time[k - 1]))
 
 
 def least_normal_force(trajectory: Trajectory, surface: Surface) -> float | None:

@@ -31,7 +31,7 @@ def remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]
     """Say what a reader must know before trusting an engine's row."""
     lines = []
     if metrics["fell_at"] is not None:
-        lines.append(f"{name} fell at {metrics['fell_at']:.2f} s")
+        lines.append(f"{name} fell at {metrics['fell_at']:.2f} s; its figures are those up to there")
     if metrics["min_normal_force"] is not None and metrics["min_normal_force"] < 0:
         pull = -metrics["min_normal_force"]
         lines.append(f"{name}: the ground pulls a wheel, by up to {pull:.3g} N; no contact could")

@@ -17,8 +17,9 @@ from engines.steady import steady_trajectory
 from reference.kinematics import REAR_ANGLE, YAW
 from reference.stability import growth_rate, linearise, sorted_eigenvalues
 from reports.drift import quantities
+from reports.fall import fell_at, until_fall
 from reports.limits import Scale, eigenvalue_limits, noise, order_limit, ride_limits
-from reports.metrics import fell_at, position_errors
+from reports.metrics import position_errors
 from reports.precision import match
 
 from .runner import measure_one
@@ -82,17 +83,14 @@ def sample(start: Start, engine: Engine, settings: Settings, watch: Callable[[fl
     if ride.ended is not None and fall is None:
         raise EngineError(ride.ended)
     scale, steps, whole = _scale(start), ride.steps, float(ride.time[-1])
-    if fall is not None:
-        standing = max(2, int(np.searchsorted(ride.time, fall)))
-        ride = ride.first(standing)
-        scale = replace(scale, duration=float(ride.time[-1]))
     exact = steady_trajectory(problem.bicycle, motion, problem.times)
     measured = measure_one(start, ride, exact)
-    errors = position_errors(ride, exact)
+    standing = until_fall(ride, problem.bicycle, problem.surface)
+    scale = replace(scale, duration=float(standing.time[-1]))
+    errors = position_errors(standing, exact)
     short = float(errors[min(int(np.searchsorted(problem.times, SHORT_HORIZON)), len(errors) - 1)])
     # As many as the part that is measured took.
-    measured |= {"fell_at": fall, "steps": steps * scale.duration / whole}
-    values = quantities(measured, short)
+    values = quantities(measured | {"steps": steps * scale.duration / whole}, short)
     limits: dict[str, float | None] = dict(
         ride_limits(scale, noise(scale, engine.step_noise(settings), steps, fall is not None))
     )

@@ -7,7 +7,7 @@ import signal
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -27,6 +27,7 @@ from engines.engine import (
     load_engine,
 )
 from engines.storage import write_trajectory
+from reports.fall import until_fall
 from reports.metrics import metrics
 from reports.summary import summary
 
@@ -242,11 +243,17 @@ def _record(
     from reports.recording import write_recording
 
     problem = plan.start.problem
+    shown = {name: _as_shown(plan, run) for name, run in trajectories.items()}
     facts = (plan.start.growth_rate, plan.scenario.simulation.duration)
     text = summary(plan.scenario.title, measured, failures, verdicts, *facts)
-    write_recording(
-        folder / "comparison.rrd", plan.scenario.title, problem.bicycle, problem.surface, dict(trajectories), text
-    )
+    write_recording(folder / "comparison.rrd", plan.scenario.title, problem.bicycle, problem.surface, shown, text)
+
+
+def _as_shown(plan: Plan, trajectory: Trajectory) -> Trajectory:
+    """The ride up to its fall, and one sample more than what is measured: there it lies."""
+    problem = plan.start.problem
+    shown = until_fall(trajectory, problem.bicycle, problem.surface, 1)
+    return shown if len(shown.time) == len(trajectory.time) else replace(shown, ended="the bicycle fell")
 
 
 def _new_folder(out: Path, name: str) -> Path:

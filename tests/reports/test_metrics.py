@@ -18,7 +18,8 @@ from reference.contact import observe
 from reference.families import find_motion
 from reference.kinematics import REAR_ANGLE, YAW
 from reference.surface import Paraboloid
-from reports.metrics import fell_at, horizon, least_normal_force, metrics, orientation_errors, position_errors
+from reports.fall import fell_at, until_fall
+from reports.metrics import horizon, least_normal_force, metrics, orientation_errors, position_errors
 
 BICYCLE = Bicycle()
 BOWL = Paraboloid(0.005)
@@ -204,7 +205,14 @@ def test_a_bicycle_falls_when_its_frame_is_down() -> None:
     sinking = TIMES > 1.5
     # At 1 m/s, through a tenth of 0.9 m between two samples.
     position[sinking, 0, 2] = (ground + 0.09 + 1.9963 - TIMES)[sinking]
-    assert fell_at(replace(EXACT, body_position=position), BICYCLE, BOWL) == pytest.approx(1.9963, abs=1e-14)
+    falling = replace(EXACT, body_position=position)
+    assert fell_at(falling, BICYCLE, BOWL) == pytest.approx(1.9963, abs=1e-14)
+    assert until_fall(falling, BICYCLE, BOWL).time[-1] == TIMES[199] == 1.99
+    assert until_fall(falling, BICYCLE, BOWL, beyond=1).time[-1] == TIMES[200]
+    # What comes after is no ride: nothing of it is measured.
+    after = replace(falling, qd=falling.qd + (TIMES > 1.9963)[:, None])
+    assert measure(after)["rear_rate_error"] == 0.0
+    assert measure(after)["fell_at"] == fell_at(falling, BICYCLE, BOWL)
     position[:, 0, 2] = ground + 0.089
     assert fell_at(replace(EXACT, body_position=position), BICYCLE, BOWL) == 0.0
     position[:, 0, 2] = ground + 0.091

@@ -57,9 +57,9 @@ def test_no_news_is_no_remark() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"fell_at": 2.5}, ["exudyn fell at 2.50 s"]),
+        ({"fell_at": 2.5}, ["exudyn fell at 2.50 s; its figures are those up to there"]),
         ({"min_normal_force": -12.34}, ["exudyn: the ground pulls a wheel, by up to 12.3 N; no contact could"]),
-        ({"fell_at": 0.0}, ["exudyn fell at 0.00 s"]),
+        ({"fell_at": 0.0}, ["exudyn fell at 0.00 s; its figures are those up to there"]),
         ({"ended": "Newton failed"}, ["exudyn ended early: Newton failed"]),
         ({"horizon": 7.25}, ["exudyn", "7.25 s", "instability"]),
         ({"contact_force_error_at": 0.0}, ["exudyn", "first sample"]),
