@@ -15,6 +15,7 @@ from .plots import CONSTRAINTS, ENERGY, ERROR, FORCES, LOG_ENERGY, RADIUS, STATE
 
 BACKGROUND = (17, 19, 24)
 NEWTONS_PER_METRE = 500.0
+_LEGEND_SHARE = 1.8  # of the height of another view: a legend of ten engines fits
 
 # Samples of each plot by its key, then by engine.
 Curves = Mapping[str, Mapping[str, np.ndarray]]
@@ -91,16 +92,19 @@ def _plot_view(plot: Plot, curves: Mapping[str, np.ndarray], legend: bool) -> rr
     )
 
 
-def _plot_tab(name: str, plots: Sequence[Plot], curves: Curves, columns: int) -> rrb.Grid | None:
+def _plot_tab(name: str, plots: Sequence[Plot], curves: Curves, columns: int) -> rrb.Container | None:
     """The views of the plots that have a curve; None if none has.
 
-    One legend a tab, in the first view with the most curves: it covers part of the curves.
+    One legend a tab, in the first view with the most curves: it covers part of the curves, and in a column of
+    views that one is the highest.
     """
     shown = [plot for plot in plots if curves.get(plot.key)]
     if not shown:
         return None
     keyed = max(shown, key=lambda plot: len(curves[plot.key]))
     views = [_plot_view(plot, curves[plot.key], plot is keyed) for plot in shown]
+    if columns == 1:
+        return rrb.Vertical(*views, row_shares=[_LEGEND_SHARE if plot is keyed else 1 for plot in shown], name=name)
     return rrb.Grid(*views, grid_columns=columns, name=name)
 
 
