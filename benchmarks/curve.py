@@ -14,12 +14,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from reference.anchors import ANCHORS, anchor
 from reference.atlas import SIZE, atlas, spacing
 from reference.bicycle import Bicycle
 from reference.circular import Steady
 from reference.continuation import follow
 from reference.curve import sample
-from reference.families import ANCHORS, anchor
 from reference.stability import linearise
 from reference.surface import Paraboloid, SurfaceOfRevolution
 
@@ -41,10 +41,11 @@ def fastest(work: Callable[[], object], rounds: int) -> float:
 def curve_table(alpha: float, family: int, rounds: int) -> Table:
     """Time the points of one family from its anchor to one end."""
     surface: SurfaceOfRevolution = Paraboloid(alpha)
-    equations, start, directions = anchor(BICYCLE, surface, family, ANCHORS[family][-1])
+    start = anchor(BICYCLE, surface, family, ANCHORS[family][-1])
+    equations = start.equations
 
     def followed() -> np.ndarray:
-        return np.array([point.unknowns for point in follow(equations, start, directions[0], LONGEST)])
+        return np.array([point.unknowns for point in follow(equations, start.unknowns, start.directions[0], LONGEST)])
 
     points = followed()
     title = f"family {family}, alpha = {alpha:g}: {len(points)} points"

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .anchors import ANCHORS, Anchor, anchor, next_anchor
 from .bicycle import Bicycle
 from .circular import Steady
 from .critical import CriticalPoint, reconnections, vanishing_between
 from .curve import Samples
-from .families import ANCHORS, FAMILIES, anchor, next_anchor, trace_from
+from .families import FAMILIES, trace_from
 from .sections import SectionEnd, sample_family, stable_sections
 from .surface import Paraboloid
 
@@ -170,16 +171,14 @@ def _curve(
 ) -> AtlasCurve:
     """One family at one alpha, its anchor carried from where ``anchors`` has it, which takes the new one."""
     rear_rate = ANCHORS[number][-1]
-    equations, start, directions = _anchor(bicycle, alpha, number, anchors.pop(rear_rate, None))
-    anchors[rear_rate] = alpha, start
-    family = trace_from(number, equations, start, directions, longest)
+    start = _anchor(bicycle, alpha, number, anchors.pop(rear_rate, None))
+    anchors[rear_rate] = alpha, start.unknowns
+    family = trace_from(start, longest)
     seen = sample_family(family)
     return AtlasCurve(alpha, number, family.ends, seen, stable_sections(family, seen.growth_rate))
 
 
-def _anchor(
-    bicycle: Bicycle, alpha: float, number: int, known: tuple[float, np.ndarray] | None
-) -> tuple[Steady, np.ndarray, list[np.ndarray]]:
+def _anchor(bicycle: Bicycle, alpha: float, number: int, known: tuple[float, np.ndarray] | None) -> Anchor:
     rear_rate = ANCHORS[number][-1]
     if known is not None:
         low, unknowns = known

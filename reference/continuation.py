@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from .circular import Steady
+from .circular import CONTACT, Condition, Steady, newton
 from .kernels import curve as kernel
 from .kernels.steady import UNKNOWNS
+from .surface import SurfaceOfRevolution
 
 FARTHEST = 1e3  # of D from the origin [m]: beyond, a large circle differs from its limit by round-off
 LARGEST_LEAN = 1.5
@@ -19,6 +21,10 @@ LARGEST_SIGMA = 100.0  # 200 rad/s: a curve can run off to infinite speed at fin
 LONGEST_STEP = 0.15
 _FIRST_STEP = 0.02
 _CHUNK = 32  # points that are followed at once
+# Of the radius where the ground ends. Towards the rim of a sphere derivatives of the height lose digits like
+# the inverse of the distance, and steps of the arc can only creep: within a thousandth a curve is at its end.
+_AT_THE_EDGE = 1e-3
+_FULFILLED = 1e-11  # by a condition: of order one, solved to round-off, some 1e-14, times the equations' condition
 
 
 @dataclass(frozen=True)
@@ -74,10 +80,28 @@ def follow(
     ------
     Point
         The start, then points along the curve, until it ends: with the first point of sigma < 0, beyond
-        the largest lean, circle or speed, or where the shortest steps no longer converge.
+        the largest lean, circle or speed, at the edge of the ground, or where the shortest steps no longer
+        converge.
     """
     direction = tangent(equations, start)
     first = Point(start, direction if direction @ towards > 0 else -direction)
+    for point in _steps(equations, first, longest, most):
+        yield point
+        if at_edge(equations.surface, point):
+            return
+
+
+def at_edge(surface: SurfaceOfRevolution, point: Point) -> bool:
+    """Whether a wheel stands where the ground ends."""
+    inner, outer = surface.extent
+    if (inner, outer) == (0.0, np.inf):  # no edge to look for
+        return False
+    contact = np.hypot(point.unknowns[CONTACT][[0, 3]], point.unknowns[CONTACT][[1, 4]])
+    return bool(contact.max() > (1 - _AT_THE_EDGE) * outer or contact.min() < (1 + _AT_THE_EDGE) * inner)
+
+
+def _steps(equations: Steady, first: Point, longest: float, most: int) -> Iterator[Point]:
+    """A point and those that follow, as if the ground had no edge."""
     yield first
     distance, ended, largest = min(_FIRST_STEP, longest), False, (LARGEST_LEAN, LARGEST_SIGMA, FARTHEST)
     while most > 0 and not ended:
@@ -89,33 +113,39 @@ def follow(
         first, most = points[-1] if points else first, most - len(points)
 
 
-def _stepped(equations: Steady, first: Point, distance: float) -> Point:
-    """Point of the curve at a distance along another's tangent.
-
-    Raises
-    ------
-    ValueError
-        If the step does not converge.
-    """
-    unknowns, along = np.empty((2, UNKNOWNS))
-    if not kernel.step(first.unknowns, first.tangent, distance, *equations.where, unknowns, along)[0]:
-        raise ValueError("no circular motion is found along the curve")
-    return Point(unknowns, along)
-
-
 def _arc(equations: Steady, first: Point, second: Point) -> tuple[Callable[[float], Point], float]:
-    """Points of the curve by their distance along the first one's tangent, and the second one's distance."""
+    """Points of the curve between two neighbours, by their distance along the first one's tangent, and its end.
+
+    Newton's method starts from the cubic through both: it knows where the curve bends, which a step from one of
+    them does not.
+    """
     covector = (metric(first.unknowns) * first.tangent)[kernel.CHOSEN]
-    along, change = first.tangent[kernel.CHOSEN], (second.unknowns - first.unknowns)[kernel.CHOSEN]
-    length = float(covector @ change / (covector @ along))
+    start, along, end, onward = (
+        row[kernel.CHOSEN] for row in (first.unknowns, first.tangent, second.unknowns, second.tangent)
+    )
+    length = float(covector @ (end - start) / (covector @ along))
+    onward = onward * (covector @ along) / (covector @ onward)
+    chord = end - start
+    left, right = length * along - chord, chord - length * onward
     points = {0.0: first, length: second}
 
     def at(distance: float) -> Point:
         if distance not in points:
-            points[distance] = _stepped(equations, first, distance)
+            share = distance / length
+            bend = share * (1 - share) * ((1 - share) * left + share * right)
+            points[distance] = _corrected(equations, start + share * chord + bend, covector)
         return points[distance]
 
     return at, length
+
+
+def _corrected(equations: Steady, guess: np.ndarray, covector: np.ndarray) -> Point:
+    """Point of the curve in the plane through a guess (9,) square to a covector (9,)."""
+    chosen, direction, (unknowns, along) = guess.copy(), np.empty(len(guess)), np.empty((2, UNKNOWNS))
+    if not kernel.correct(chosen, covector, *equations.where, direction)[0]:
+        raise ValueError("no circular motion is found along the curve")
+    kernel.unit(chosen, direction, *equations.where[1:], unknowns, along)
+    return Point(unknowns, along)
 
 
 def root_between(equations: Steady, first: Point, second: Point, function: Callable[[Point], float]) -> Point:
@@ -137,6 +167,47 @@ def root_between(equations: Steady, first: Point, second: Point, function: Calla
     at, length = _arc(equations, first, second)
     root: Any = brentq(lambda distance: function(at(distance)), 0.0, length, xtol=1e-15)
     return at(root)
+
+
+def crossings(
+    equations: Steady, points: Iterable[Point], condition: Callable[[np.ndarray], Condition]
+) -> Iterator[np.ndarray]:
+    """Solutions on a followed curve that fulfil a condition.
+
+    Between two neighbours there may be two, on either side of where the condition's value is extreme along
+    the curve: that point is solved for.
+
+    Parameters
+    ----------
+    equations : Steady
+    points : iterable of Point
+        In the order followed.
+    condition : callable
+        Maps unknowns to a `reference.circular.Condition` of order one.
+
+    Yields
+    ------
+    ndarray, shape (22,)
+        In the order met.
+    """
+
+    def slope(point: Point) -> float:
+        return float(condition(point.unknowns).gradient @ point.tangent)
+
+    last = None
+    for first, second in pairwise(points):
+        nodes = [first.unknowns, second.unknowns]
+        if slope(first) * slope(second) < 0:
+            nodes.insert(1, root_between(equations, first, second, slope).unknowns)
+        for a, b in pairwise(nodes):
+            fa, fb = condition(a).value, condition(b).value
+            if abs(fa) < _FULFILLED:
+                yield newton(equations, a, condition, most=30)[0]
+            elif fa * fb < 0 and abs(fb) >= _FULFILLED:
+                yield newton(equations, a + (b - a) * fa / (fa - fb), condition, most=30)[0]
+        last = second
+    if last is not None and abs(condition(last.unknowns).value) < _FULFILLED:
+        yield newton(equations, last.unknowns, condition, most=30)[0]
 
 
 def least_between(equations: Steady, first: Point, second: Point, function: Callable[[Point], float]) -> Point:

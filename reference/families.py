@@ -1,280 +1,29 @@
-"""Solution families: curves of circular motions, reached from the paper's named points.
+"""Solution families: curves of circular motions, followed from their anchors to both ends.
 
-Random starts land on spurious roots, and the families reconnect as a bowl deepens. So every family is
-a curve with an *anchor*: a point of the benchmark bicycle on the level plane, reached from a named
-one, carried by continuation to the wanted bicycle and surface; from there the curve is followed by
-pseudo-arclength. Where families have joined or exchanged parts, an anchor stays on its part: family 3
-has two, since its part of forward circles joins family 1 on steep bowls (paraboloids from alpha = 0.384).
-Where an anchor cannot be carried, as into a trough that has no ground for so small a circle, its family
-starts on the circle half-way between the edges of the ground.
-
-=======  =====================================  ============================================
-family   anchor                                 followed towards
-=======  =====================================  ============================================
-1        on the curve from A (static), at a     both ends: A and B on small curvature
-         rear rate of 15
-2        on the curve from D, away from its     both ends: E and, through the cusp D, C on
-         cusp, at a rear rate of 20             small curvature
-3        on the curve from G to F, at a rear    both ends; the steer falling, to F
-         rate of 20; and G, pivoting
-4        H = G                                  the steer growing, through the cusp I
-=======  =====================================  ============================================
+See `reference.anchors` for where they are got hold of. From there a curve is followed by pseudo-arclength.
+On steep bowls families join and leave parts behind: those are further curves, each under the number of the
+family that it was a part of.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache
-from itertools import pairwise
+from itertools import islice
 
 import numpy as np
 
+from .anchors import ANCHORS, Anchor, anchor, further_anchors
 from .bicycle import Bicycle
-from .circular import (
-    CONTACT,
-    FRONT_SPEED,
-    LEAN,
-    REAR_SPEED,
-    SIGMA,
-    STEER,
-    CircularMotion,
-    Condition,
-    Steady,
-    nearest_condition,
-    newton,
-    rear_rate_condition,
-    unknown_condition,
-)
-from .continuation import FARTHEST, LONGEST_STEP, Point, follow, root_between
-from .kernels import dynamics as kernel
-from .kernels.steady import UNKNOWNS
-from .kinematics import constants
-from .surface import Plane, SurfaceOfRevolution, is_level
+from .circular import FRONT_SPEED, LEAN, REAR_SPEED, SIGMA, CircularMotion, Steady, rear_rate_condition
+from .continuation import FARTHEST, LONGEST_STEP, Point, at_edge, crossings, follow, root_between
+from .surface import SurfaceOfRevolution
 
 FAMILIES = (1, 2, 3, 4)
 
-# (lean, steer) of A, D and G on the level plane, as printed (Xiong et al. 2020, section 3.2).
-_POINT_A, _POINT_D, _POINT_G = (0.0, 1.33973991149), (0.62, 2.78), (-0.01206, 1.6019)
-# Rear rates of each family's anchors; None is the pivoting motion. The last one's curve is the family's.
-ANCHORS: dict[int, tuple[float | None, ...]] = {1: (15.0,), 2: (20.0,), 3: (20.0, None), 4: (None,)}
-_LARGEST_MOVE = 0.05  # of an unknown of order one, in a step of carrying an anchor
-# Of the radius where the ground ends. Towards the rim of a sphere derivatives of the height lose digits like
-# the inverse of the distance, and steps of the arc can only creep: within a thousandth a curve is at its end.
-_AT_THE_EDGE = 1e-3
 _NEAR_ENOUGH = 0.2  # rad: a motion further from what was asked for is another one
-
-
-def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
-    """Guess of the 22 unknowns on the level plane from two angles alone.
-
-    At fixed lean and steer the bicycle can roll in exactly one circle: the null vector of the rolling
-    rows gives the directions of all speeds and the circle's centre. The speed and the forces then fit
-    the equations of motion best in the least-squares sense.
-
-    Parameters
-    ----------
-    bicycle : Bicycle
-    lean, steer : float
-        Angles [rad].
-
-    Returns
-    -------
-    ndarray, shape (22,)
-
-    Raises
-    ------
-    ValueError
-        If the wheels cannot both touch the plane at these angles.
-    """
-    surface, c = Plane(), constants(bicycle)
-    function, parameters = surface.function.real, surface.parameters
-    q, p = np.zeros(9), np.empty(6)
-    q[[2, 4, 6]] = bicycle.front_wheel_radius * np.cos(lean), lean, steer
-    kernel.guess_contacts(q, p, function, parameters, c)
-    if not kernel.settle(q, p, function, parameters, c):
-        raise ValueError(f"both wheels cannot touch the plane at lean = {lean!r}, steer = {steer!r}")
-    rows = np.empty((6, 9))
-    kernel.rolling(q, np.zeros(9), p, function, parameters, c, rows, np.empty(6), np.empty(6))
-    speeds = np.linalg.svd(rows[:, [0, 1, 2, 3, 7, 8]])[2][-1]
-    speeds = speeds / np.linalg.norm(speeds[3:])
-    centre = np.array([speeds[1], -speeds[0]]) / speeds[3]
-    u = np.zeros(UNKNOWNS)
-    u[:6] = *centre, q[2], lean, q[5], steer
-    u[6:9] = speeds[3:]
-    u[CONTACT] = p + np.array([*centre, 0, *centre, 0])
-    equations, linear = Steady(bicycle, surface), [SIGMA, *range(16, 22)]
-    u[linear] = np.linalg.lstsq(equations.jacobian(u)[:9, linear], -equations.residual(u)[:9], rcond=None)[0]
-    return u
-
-
-def _carry(
-    path: Callable[[float], Steady], u: np.ndarray, condition: Callable, what: str, step: float = 0.02
-) -> np.ndarray:
-    """Carry a solution along a path of equations, 0 to 1, at a fixed condition; steps as long as converge.
-
-    Newton's method may well converge to another branch: a step that moves an angle or a speed by much
-    more than a step should is taken again, shorter.
-    """
-    reached = 0.0
-    while reached < 1:
-        wanted = min(1.0, reached + step)
-        carried = _step_on(path(wanted), u, condition)
-        if carried is None:
-            step /= 2
-            if step < 1e-6:
-                raise ValueError(f"its anchor is lost {100 * reached:.4g} % of the way to {what}")
-            continue
-        (u, iterations), reached = carried, wanted
-        step *= 1.5 if iterations <= 5 else 1.0
-    if u[SIGMA] < 0:
-        raise ValueError(f"its anchor is no motion at {what}: the squared speed would be negative")
-    return u
-
-
-def _step_on(equations: Steady, u: np.ndarray, condition: Callable) -> tuple[np.ndarray, int] | None:
-    """Solution of neighbouring equations and the iterations it took; None where it fails or jumps."""
-    try:
-        new, iterations = newton(equations, u, condition, most=8)
-    except ValueError:
-        return None
-    moved = np.abs(new - u)[LEAN : SIGMA + 1] / (1 + np.abs(u[LEAN : SIGMA + 1]))
-    return (new, iterations) if moved.max() <= _LARGEST_MOVE else None
-
-
-def _between(bicycle: Bicycle, fraction: float) -> Bicycle:
-    """Bicycle between the benchmark and another; rigid bodies stay so, since their inertias are a convex set."""
-    one, other = asdict(Bicycle()), asdict(bicycle)
-    return Bicycle(**{name: (1 - fraction) * one[name] + fraction * other[name] for name in one})
-
-
-@cache
-def _on_the_plane(family: int, rear_rate: float | None) -> np.ndarray:
-    """The benchmark's anchor on the level plane, from the paper's named points."""
-    level = Steady(Bicycle(), Plane())
-    if rear_rate is None or family == 3:
-        start, _ = newton(level, start_on_plane(level.bicycle, *_POINT_G), unknown_condition(REAR_SPEED, 0.0), most=30)
-        towards = -np.eye(UNKNOWNS)[STEER]
-    elif family == 1:
-        start, _ = newton(level, start_on_plane(level.bicycle, *_POINT_A), unknown_condition(SIGMA, 0.0), most=30)
-        towards = np.eye(UNKNOWNS)[SIGMA]
-    else:
-        start, _ = newton(level, start_on_plane(level.bicycle, *_POINT_D), nearest_condition(), most=30)
-        towards = np.eye(UNKNOWNS)[LEAN]
-    return start if rear_rate is None else next(_crossings(level, follow(level, start, towards), rear_rate))
-
-
-def _anchored(rear_rate: float | None) -> Callable[[np.ndarray], Condition]:
-    return unknown_condition(REAR_SPEED, 0.0) if rear_rate is None else rear_rate_condition(rear_rate)
-
-
-def _directions(family: int, rear_rate: float | None) -> list[np.ndarray]:
-    steer = np.eye(UNKNOWNS)[STEER]
-    if rear_rate is None:
-        return [steer if family == 4 else -steer]
-    return [steer, -steer]
-
-
-def anchor(
-    bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float | None
-) -> tuple[Steady, np.ndarray, list[np.ndarray]]:
-    """Carry an anchor of a family to a bicycle and a surface.
-
-    Parameters
-    ----------
-    bicycle : Bicycle
-    surface : SurfaceOfRevolution
-    family : int
-        1 to 4.
-    rear_rate : float or None
-        One of the family's `ANCHORS`.
-
-    Returns
-    -------
-    equations : Steady
-    unknowns : ndarray, shape (22,)
-    directions : list of ndarray, shape (22,)
-        In which the family's curve runs from there.
-
-    Raises
-    ------
-    ValueError
-        If the anchor is lost on the way.
-    """
-    u, condition, directions = _on_the_plane(family, rear_rate), _anchored(rear_rate), _directions(family, rear_rate)
-    if bicycle != Bicycle():
-        u = _carry(lambda s: Steady(_between(bicycle, s), Plane()), u, condition, "this bicycle")
-    if not is_level(surface):
-        try:
-            u = _carry(lambda s: Steady(bicycle, surface.flattened(s)), u, condition, str(surface))
-        except ValueError as error:
-            if rear_rate is None:
-                u = _other_pivot(bicycle, surface)
-            else:
-                u = _on_middle_circle(bicycle, surface, u, directions, error)
-    return Steady(bicycle, surface), u, directions
-
-
-def next_anchor(
-    path: Callable[[float], Steady], family: int, rear_rate: float | None, unknowns: np.ndarray
-) -> tuple[Steady, np.ndarray, list[np.ndarray]]:
-    """Carry an anchor from neighbouring equations, the path at 0, to those at 1; arguments and results as of `anchor`.
-
-    Raises
-    ------
-    ValueError
-        If the anchor is lost on the way.
-    """
-    there = path(1.0)
-    u = _carry(path, unknowns, _anchored(rear_rate), str(there.surface), step=1.0)
-    return there, u, _directions(family, rear_rate)
-
-
-def _other_pivot(bicycle: Bicycle, surface: SurfaceOfRevolution) -> np.ndarray:
-    """The pivoting motion in which family 2 ends on steep bowls.
-
-    The one known from the plane comes to rest as a bowl deepens (the benchmark's on a paraboloid at
-    alpha = 0.42); another appears further on (at 0.46), first infinitely fast.
-    """
-    branch = trace(bicycle, surface, 2)
-    for end, point in zip(branch.ends, (branch.points[0], branch.points[-1]), strict=True):
-        if end == "pivot":
-            return point.unknowns
-    raise ValueError(f"there is no pivoting motion on {surface}")
-
-
-def _radius_condition(radius: float) -> Callable[[np.ndarray], Condition]:
-    """Condition of a given radius of D's circle, in units of its square."""
-
-    def condition(u: np.ndarray) -> Condition:
-        gradient = np.zeros(UNKNOWNS)
-        gradient[:2] = 2 * u[:2] / radius**2
-        return Condition(float(u[:2] @ u[:2]) / radius**2 - 1, gradient)
-
-    return condition
-
-
-def _on_middle_circle(
-    bicycle: Bicycle, surface: SurfaceOfRevolution, u: np.ndarray, directions: list[np.ndarray], lost: ValueError
-) -> np.ndarray:
-    """Carry a family from the plane on the circle half-way between the edges of the ground.
-
-    An anchor rides on a small circle: around a trough there is no ground for it. The ``lost`` one's error
-    is raised where the family has no such circle on the plane, or where it is lost on the way too.
-    """
-    radius, level = sum(surface.extent) / 2, Steady(bicycle, Plane())
-    if not np.isfinite(radius):
-        raise lost
-    condition = _radius_condition(radius)
-    for towards in directions:
-        for first, second in pairwise(follow(level, u, towards)):
-            if condition(first.unknowns).value * condition(second.unknowns).value < 0:
-                start, _ = newton(level, second.unknowns, condition, most=30)
-                try:
-                    return _carry(lambda s: Steady(bicycle, surface.flattened(s)), start, condition, str(surface))
-                except ValueError:
-                    raise lost from None
-    raise lost
 
 
 def rear_rate_slope(point: Point) -> float:
@@ -290,22 +39,6 @@ def front_rate_slope(point: Point) -> float:
 def _squared_rate_slope(point: Point, wheel: int) -> float:
     u, t = point.unknowns, point.tangent
     return float(t[SIGMA] * u[wheel] ** 2 + 2 * u[SIGMA] * u[wheel] * t[wheel])
-
-
-def _crossings(equations: Steady, points: Iterator[Point], rear_rate: float) -> Iterator[np.ndarray]:
-    """Solutions of a given rear rate on a followed curve, in the order met."""
-    condition = rear_rate_condition(rear_rate)
-    for first, second in pairwise(points):
-        nodes = [first.unknowns, second.unknowns]
-        if rear_rate_slope(first) * rear_rate_slope(second) < 0:
-            nodes.insert(1, root_between(equations, first, second, rear_rate_slope).unknowns)
-        for a, b in pairwise(nodes):
-            fa, fb = condition(a).value, condition(b).value
-            # An anchor may lie on the wanted rate itself, to round-off.
-            if abs(fa) < 1e-11:
-                yield newton(equations, a, condition, most=30)[0]
-            elif fa * fb < 0 and abs(fb) >= 1e-11:
-                yield newton(equations, a + (b - a) * fa / (fa - fb), condition, most=30)[0]
 
 
 @dataclass(frozen=True)
@@ -334,13 +67,6 @@ class Family:
         return _kind_of_end(surface, self.points[0]), _kind_of_end(surface, self.points[-1])
 
 
-def _at_edge(surface: SurfaceOfRevolution, point: Point) -> bool:
-    """Whether a wheel stands where the ground ends."""
-    inner, outer = surface.extent
-    contact = np.hypot(point.unknowns[CONTACT][[0, 3]], point.unknowns[CONTACT][[1, 4]])
-    return bool(contact.max() > (1 - _AT_THE_EDGE) * outer or contact.min() < (1 + _AT_THE_EDGE) * inner)
-
-
 def _kind_of_end(surface: SurfaceOfRevolution, point: Point) -> str:
     u = point.unknowns
     # Static and pivot are solved for: their unknown is zero to round-off.
@@ -348,7 +74,7 @@ def _kind_of_end(surface: SurfaceOfRevolution, point: Point) -> str:
         return "static"
     if abs(u[REAR_SPEED]) < 1e-12:
         return "pivot"
-    if _at_edge(surface, point):
+    if at_edge(surface, point):
         return "edge"
     if np.linalg.norm(u[:3]) > 0.3 * FARTHEST:
         return "large circle"
@@ -379,19 +105,66 @@ def trace(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, longest: 
     ValueError
         If the family's anchor cannot be reached on this surface.
     """
-    return trace_from(family, *anchor(bicycle, surface, family, ANCHORS[family][-1]), longest)
+    return trace_from(anchor(bicycle, surface, family, ANCHORS[family][-1]), longest)
 
 
-def trace_from(
-    family: int, equations: Steady, start: np.ndarray, directions: list[np.ndarray], longest: float = LONGEST_STEP
-) -> Family:
-    """Follow a family from an anchor to both ends, see `anchor` and `trace`."""
-    forward = _end_exactly(equations, list(_to_an_end(equations, follow(equations, start, directions[0], longest))))
-    if len(directions) == 1:
-        return Family(family, equations, _turning_alike(forward))
-    backward = _end_exactly(equations, list(_to_an_end(equations, follow(equations, start, directions[1], longest))))
-    turned = [Point(point.unknowns, -point.tangent) for point in reversed(backward[1:])]
-    return Family(family, equations, _turning_alike(turned + forward))
+def trace_from(start: Anchor, longest: float = LONGEST_STEP) -> Family:
+    """Follow a curve from an anchor to both ends, see `reference.anchors.anchor` and `trace`."""
+    halves = []
+    for towards in start.directions:
+        points = list(_to_an_end(follow(start.equations, start.unknowns, towards, longest)))
+        halves.append(_end_exactly(start.equations, points))
+    forward, *backward = halves
+    turned = [Point(point.unknowns, -point.tangent) for half in backward for point in reversed(half[1:])]
+    return Family(start.family, start.equations, _turning_alike(turned + forward))
+
+
+def trace_all(
+    bicycle: Bicycle, surface: SurfaceOfRevolution, longest: float = LONGEST_STEP
+) -> tuple[list[Family], dict[int, str]]:
+    """Follow every curve that holds a part of a family.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    surface : SurfaceOfRevolution
+    longest : float
+        Longest step of the arc.
+
+    Returns
+    -------
+    curves : list of Family
+        First the curve of each family's last anchor, by number; families that have joined have the same one.
+        Then further curves, each once, under the number of the family that it was a part of.
+    absent : dict
+        Number of a family that has no curve to the reason.
+    """
+    own, absent = [], {}
+    for number in FAMILIES:
+        try:
+            own.append(trace(bicycle, surface, number, longest))
+        except ValueError as error:
+            absent[number] = str(error)
+    curves = [*own, *_further(bicycle, surface, own, longest)]
+    return curves, {number: why for number, why in absent.items() if all(number != curve.number for curve in curves)}
+
+
+def _further(
+    bicycle: Bicycle, surface: SurfaceOfRevolution, followed: Sequence[Family], longest: float = LONGEST_STEP
+) -> list[Family]:
+    """Curves of anchors that none of the followed ones passes through."""
+    found: list[Family] = []
+    for start in further_anchors(bicycle, surface):
+        if not any(_passes(curve, start) for curve in (*followed, *found)):
+            # A step over a tip of the ground, which has no normal, passes no pivoting motion to end in.
+            with suppress(ValueError):
+                found.append(trace_from(start, longest))
+    return found
+
+
+def _passes(curve: Family, start: Anchor) -> bool:
+    """Whether a followed curve passes through an anchor: whether it is one of its solutions of the same condition."""
+    return any(start.met_by(u) for u in crossings(curve.equations, curve.points, start.condition))
 
 
 def _turning_alike(points: list[Point]) -> list[Point]:
@@ -408,21 +181,10 @@ def _turning_alike(points: list[Point]) -> list[Point]:
     return points
 
 
-def _on_ground(equations: Steady, points: Iterator[Point]) -> Iterator[Point]:
-    """Points up to and with the first at the edge of the ground."""
-    if equations.surface.extent == (0.0, np.inf):  # no edge to look for
-        yield from points
-        return
-    for point in points:
-        yield point
-        if _at_edge(equations.surface, point):
-            return
-
-
-def _to_an_end(equations: Steady, points: Iterator[Point]) -> Iterator[Point]:
-    """Points up to and with the first beyond the pivoting motion or at the edge, or to the end of the curve."""
+def _to_an_end(points: Iterable[Point]) -> Iterator[Point]:
+    """Points up to and with the first beyond the pivoting motion, or to the end of the curve."""
     start = 0.0
-    for point in _on_ground(equations, points):
+    for point in points:
         yield point
         speed = point.unknowns[REAR_SPEED]
         if start * speed < 0:
@@ -461,24 +223,47 @@ def motions(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_ra
     Raises
     ------
     ValueError
-        If none of the family's anchors can be reached on this surface.
+        If the family has no curve on this surface.
     """
+    return list(_met(bicycle, surface, family, rear_rate, lambda: trace_all(bicycle, surface)[0]))
+
+
+def _met(
+    bicycle: Bicycle,
+    surface: SurfaceOfRevolution,
+    family: int,
+    rear_rate: float,
+    everything: Callable[[], Sequence[Family]],
+) -> Iterator[CircularMotion]:
+    """The motions as they are met; ``everything``, all curves, is asked for after those of the family's anchors."""
     found: list[CircularMotion] = []
-    failures = []
+    anchors, failures = [], []
     for anchor_rate in ANCHORS[family]:
         try:
-            equations, start, directions = anchor(bicycle, surface, family, anchor_rate)
+            start = anchor(bicycle, surface, family, anchor_rate)
         except ValueError as error:
             failures.append(error)
             continue
-        for direction in directions:
-            for u in _crossings(equations, _to_an_end(equations, follow(equations, start, direction)), rear_rate):
-                motion = equations.motion(u)
-                if not any(np.hypot(motion.lean - m.lean, motion.steer - m.steer) < 1e-7 for m in found):
-                    found.append(motion)
-    if len(failures) == len(ANCHORS[family]):
+        anchors.append(start)
+        for towards in start.directions:
+            points = _to_an_end(follow(start.equations, start.unknowns, towards))
+            yield from _new(found, start.equations, points, rear_rate)
+    others = [c for c in everything() if c.number == family and not any(_passes(c, start) for start in anchors)]
+    for curve in others:
+        yield from _new(found, curve.equations, curve.points, rear_rate)
+    if not anchors and not others:
         raise failures[-1]
-    return found
+
+
+def _new(
+    found: list[CircularMotion], equations: Steady, points: Iterable[Point], rear_rate: float
+) -> Iterator[CircularMotion]:
+    """Motions of a rear rate along a curve that are not among those found, which takes them."""
+    for u in crossings(equations, points, rear_rate_condition(rear_rate)):
+        motion = equations.motion(u)
+        if not any(np.hypot(motion.lean - m.lean, motion.steer - m.steer) < 1e-7 for m in found):
+            found.append(motion)
+            yield motion
 
 
 def find_motion(
@@ -521,9 +306,11 @@ def find_motion(
     if near is not None and not np.all(np.isfinite(near)):
         raise ValueError(f"near is {near!r}; it must be two finite angles, lean and steer in rad")
     found, failures = [], []
+    everything = cache(lambda: trace_all(bicycle, surface)[0])
     for number in FAMILIES if family is None else (family,):
         try:
-            found += [(number, motion) for motion in motions(bicycle, surface, number, rear_rate)]
+            met = _met(bicycle, surface, number, rear_rate, everything)
+            found += [(number, motion) for motion in (islice(met, 1) if near is None else met)]
         except ValueError as error:
             failures.append(f"family {number}: {error}")
     wanted = f"rear rate {rear_rate!r} rad/s on {surface}"

@@ -124,13 +124,14 @@ def _figures(motion: CircularMotion) -> tuple[float, float, float, float]:
 def _named(family: Family, points: list[tuple[str, CircularMotion]]) -> Iterator[tuple[str, str, CircularMotion]]:
     """Give points the paper's letters, the others their kind and a number.
 
-    The cusps D and I exist while family 2 runs out to large circles (to C): then D is the least size of
-    the front rate on family 2, I the greatest on family 4, whose end is the wheel that runs backward.
+    The cusps D and I exist while family 2 runs out to large circles (to C), or to the edge of the ground on
+    its way there: then D is the least size of the front rate on family 2, I the greatest on family 4, whose end
+    is the wheel that runs backward.
     """
     letters = {"static": "A", "pivot": "H" if family.number == 4 else "G"}
     cusps = [motion for kind, motion in points if kind == "cusp" and abs(motion.lean) > SMALL_LEAN]
     special, ends = None, family.ends
-    if family.number == 2 and cusps and "large circle" in ends:
+    if family.number == 2 and cusps and ("large circle" in ends or "edge" in ends):
         special, letters["cusp"] = min(cusps, key=lambda motion: abs(motion.front_rate)), "D"
     if family.number == 4 and cusps and "fast front wheel" in ends:
         special, letters["cusp"] = max(cusps, key=lambda motion: abs(motion.front_rate)), "I"

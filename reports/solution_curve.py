@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -151,11 +151,12 @@ def _limits(family: Mapping[str, Any], speed: np.ndarray) -> tuple[NamedPoint, .
 
 
 def limits(drawn: Sequence[Curve]) -> list[NamedPoint]:
-    """What all curves tend to, each once."""
+    """What all curves tend to, each once; of circles that tend to one letter's angles the fastest bear it."""
     found: dict[tuple, NamedPoint] = {}
     for point in (limit for curve in drawn for limit in curve.limits):
         found.setdefault((point.name, round(point.speed, 6), round(point.lean, 6)), point)
-    return list(found.values())
+    fastest = {point.name: point for point in sorted(found.values(), key=lambda point: point.speed)}
+    return [point if fastest[point.name] is point else replace(point, name="") for point in found.values()]
 
 
 def named_points(families: Sequence[Mapping[str, Any]], front_radius: float) -> list[NamedPoint]:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from reference.bicycle import Bicycle
-from reference.circular import SIGMA, STEER, CircularMotion, Steady, newton, unknown_condition
+from reference.circular import CircularMotion
 from reference.contact import observe
-from reference.continuation import Point, follow, root_between
-from reference.families import ANCHORS, Family, anchor, trace
+from reference.families import trace
 from reference.simulate import simulate, simulate_modified_euler
 from reference.stability import independent, linearise
 from reference.surface import Paraboloid
@@ -39,14 +36,13 @@ from .paper.energy import motion_of_energy
 from .runner import Watch
 from .scenario import load_scenario
 from .start import Start, make_start
-from .survey import LONGEST_STEP, families_document, family_document
+from .survey import families_document
 
 ENDINGS = (".svg", ".png")
 ALPHAS = {"figure-2": 0.0, "figure-3": 1 / 200, "figure-4": 1 / 20, "figure-5": 1 / 5, "figure-7": 1.0}
 MARKS = {"figure-3": ("q1", "q2"), "figure-5": ("p1", "p2", "p3", "p4")}  # motions that the paper marks
 DISTURBED = {"+0.1 rad/s": "q2-plus", "−0.1 rad/s": "q2-minus"}
 DEPARTURE, SETTLING = 100.0, 60.0  # simulated from Q1 and about Q2 [s]
-_MERGED = 0.05  # rad: an anchor this near to a followed curve lies on it
 
 Drawn = tuple[Figure, str]
 
@@ -111,65 +107,10 @@ def _jobs() -> dict[str, Callable[[], Drawn]]:
 def _families(name: str) -> Drawn:
     alpha, marked = ALPHAS[name], {key.upper(): start_named(key) for key in MARKS.get(name, ())}
     marks = {key: _figures(_motion(start)) for key, start in marked.items()}
-    document = paper_document(alpha)
+    document = families_document(alpha)
     return solution_figure(document, Bicycle().front_wheel_radius, marks), families_caption(
         document, Bicycle().front_wheel_radius
     )
-
-
-def paper_document(alpha: float) -> dict[str, Any]:
-    """The document of `velodrome families`, with every curve that holds a part of the four families.
-
-    On steep bowls families join and leave parts behind; those are further curves, each under the number of
-    the family that it was a part of.
-    """
-    document = families_document(alpha)
-    bicycle, surface = Bicycle(), Paraboloid(alpha)
-    further = []
-    for number, rates in ANCHORS.items():
-        for rate in rates[:-1]:
-            equations, start, directions = anchor(bicycle, surface, number, rate)
-            motion = equations.motion(start)
-            if not _lies_on(document["families"], motion):
-                further.append(_curve(number, equations, start, directions[0]))
-    if not any("large circle" in f["ends"] and max(f["points"]["steer"]) > 3 for f in document["families"]):
-        further.append(_reversed_circles(alpha))
-    return {**document, "families": [*document["families"], *(family_document(curve) for curve in further)]}
-
-
-def _lies_on(families: Iterable[Mapping[str, Any]], motion: CircularMotion) -> bool:
-    for family in families:
-        points = family["points"]
-        if np.hypot(np.array(points["lean"]) - motion.lean, np.array(points["steer"]) - motion.steer).min() < _MERGED:
-            return True
-    return False
-
-
-def _curve(number: int, equations: Steady, start: np.ndarray, towards: np.ndarray) -> Family:
-    """The curve through a solution, both ways, a static equilibrium at its end solved for."""
-    halves = []
-    for direction in (towards, -towards):
-        points = list(follow(equations, start, direction, LONGEST_STEP))
-        if points[-1].unknowns[SIGMA] < 0:
-            points[-1] = root_between(equations, points[-2], points[-1], _squared_speed)
-        halves.append(points)
-    turned = [Point(point.unknowns, -point.tangent) for point in reversed(halves[1][1:])]
-    return Family(number, equations, turned + halves[0])
-
-
-def _squared_speed(point: Point) -> float:
-    return float(point.unknowns[SIGMA])
-
-
-def _reversed_circles(alpha: float) -> Family:
-    """Circles with the handlebar reversed, the large ones tending to C: of family 4 at alpha = 1/5, carried from it."""
-    bicycle, known = Bicycle(), trace(Bicycle(), Paraboloid(ALPHAS["figure-5"]), 4)
-    # Past the greatest lean, where no angle nor speed changes much with the bowl.
-    lean = [known.equations.motion(point.unknowns).lean for point in known.points]
-    u = known.points[(int(np.argmax(lean)) + len(lean)) // 2].unknowns
-    for step in np.linspace(ALPHAS["figure-5"], alpha, 41)[1:]:
-        u, _ = newton(Steady(bicycle, Paraboloid(float(step))), u, unknown_condition(STEER, float(u[STEER])))
-    return _curve(4, Steady(bicycle, Paraboloid(alpha)), u, np.eye(len(u))[STEER])
 
 
 def _configurations() -> Drawn:

@@ -10,7 +10,7 @@ import numpy as np
 
 from reference.bicycle import Bicycle
 from reference.critical import CriticalPoint, last_stable, reconnections
-from reference.families import FAMILIES, Family, trace
+from reference.families import FAMILIES, Family, trace_all
 from reference.sections import SectionEnd, modes, sample_family, stable_sections
 from reference.special import special_points
 from reference.surface import Surface
@@ -22,7 +22,7 @@ LONGEST_STEP = 0.05  # of the arc: some 100 to 300 points a family, no stable se
 
 
 def families_document(ground: Surface | float) -> dict[str, Any]:
-    """Follow all four families on a ground, with special points and stable sections.
+    """Follow every curve of the four families on a ground, with special points and stable sections.
 
     Parameters
     ----------
@@ -32,21 +32,22 @@ def families_document(ground: Surface | float) -> dict[str, Any]:
     Returns
     -------
     dict
-        The JSON document of `velodrome families`; ``absent`` says why a family has no curve there.
+        The JSON document of `velodrome families`: the families by number, then further curves under the number
+        of the family that each was a part of; ``absent`` says why a family has no curve there.
 
     Raises
     ------
     ScenarioError
         If it is none.
     """
-    bicycle, surface = Bicycle(), bowl(ground)
-    families, absent = [], {}
-    for number in FAMILIES:
-        try:
-            families.append(family_document(trace(bicycle, surface, number, LONGEST_STEP)))
-        except ValueError as error:
-            absent[str(number)] = str(error)
-    return {**named(surface), "families": families, "absent": absent}
+    surface = bowl(ground)
+    curves, absent = trace_all(Bicycle(), surface, LONGEST_STEP)
+    families = [family_document(curve) for curve in curves]
+    return {
+        **named(surface),
+        "families": families,
+        "absent": {str(number): reason for number, reason in absent.items()},
+    }
 
 
 def critical_document(watch: Callable[[str, float, float], None]) -> dict[str, Any]:

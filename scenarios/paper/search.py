@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reference.anchors import start_on_plane
 from reference.circular import (
     LEAN,
     PITCH,
@@ -19,7 +20,6 @@ from reference.circular import (
     unknown_condition,
 )
 from reference.continuation import follow
-from reference.families import start_on_plane
 from reference.kernels.steady import UNKNOWNS
 from reference.kinematics import body_positions
 from reference.surface import evaluate

@@ -3,14 +3,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reference.anchors import anchor, start_on_plane
 from reference.bicycle import Bicycle
 from reference.circular import (
     Steady,
     nearest_condition,
     newton,
 )
+from reference.continuation import follow
 from reference.dae import dynamics, residual
-from reference.families import anchor, find_motion, follow, motions, start_on_plane
+from reference.families import find_motion, motions
 from reference.surface import Paraboloid
 from tests.literature import published, rounds_to
 
@@ -50,8 +52,8 @@ def test_family_two_has_two_motions_at_q2_and_near_tells_them_apart() -> None:
 
 
 def test_point_g_is_the_printed_pivoting_motion() -> None:
-    equations, u, _ = anchor(BICYCLE, Paraboloid(0.0), 3, None)
-    motion, point = equations.motion(u), PRINTED["G"]
+    pivot = anchor(BICYCLE, Paraboloid(0.0), 3, None)
+    motion, point = pivot.equations.motion(pivot.unknowns), PRINTED["G"]
     assert abs(motion.rear_rate) < 1e-12
     assert rounds_to(motion.lean, point["lean"])
     assert rounds_to(motion.steer, point["steer"])

@@ -5,10 +5,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from reference.anchors import anchor, static_equilibria
 from reference.bicycle import Bicycle
-from reference.circular import REAR_SPEED
-from reference.continuation import root_between
-from reference.families import FAMILIES, Family, front_rate_slope, trace
+from reference.circular import LEAN, REAR_SPEED, SIGMA, STEER, Steady
+from reference.continuation import FARTHEST, LARGEST_LEAN, LARGEST_SIGMA, crossings, root_between
+from reference.families import FAMILIES, Family, find_motion, front_rate_slope, motions, trace, trace_all
+from reference.profile import SplineProfile
 from reference.sections import growth_along, modes, sample_family, stable_sections
 from reference.special import SpecialPoint, special_points
 from reference.surface import Paraboloid
@@ -22,6 +24,13 @@ ALPHAS = (0.0, 0.005, 0.011, 1 / 33, 0.05, 0.2, 0.5, 1.0)
 @cache
 def family(alpha: float, number: int, longest: float = 0.1) -> Family:
     return trace(BICYCLE, Paraboloid(alpha), number, longest)
+
+
+@cache
+def everything(alpha: float) -> list[Family]:
+    curves, absent = trace_all(BICYCLE, Paraboloid(alpha), 0.1)
+    assert not absent
+    return curves
 
 
 def special(alpha: float, number: int, name: str) -> SpecialPoint:
@@ -56,6 +65,141 @@ def test_every_point_of_every_family_is_a_motion(alpha: float, number: int) -> N
 )
 def test_families_reconnect_as_the_bowl_gets_steeper(alpha: float, number: int, ends: tuple[str, str]) -> None:
     assert family(alpha, number).ends == ends
+
+
+SHALLOW = [
+    (1, "large circle", "static"),
+    (2, "large circle", "flat"),
+    (3, "pivot", "flat"),
+    (4, "pivot", "fast front wheel"),
+]
+DEEPER = [  # families 2 and 4 have exchanged their far ends
+    (1, "large circle", "static"),
+    (2, "fast front wheel", "flat"),
+    (3, "pivot", "flat"),
+    (4, "pivot", "large circle"),
+]
+CURVES = {
+    **dict.fromkeys((0.0, 0.005, 0.011), SHALLOW),
+    **dict.fromkeys((1 / 33, 0.05, 0.2), DEEPER),
+    0.5: [
+        (1, "large circle", "flat"),  # from B to F: family 3 has no other forward part
+        (2, "pivot", "flat"),
+        (3, "pivot", "fast front wheel"),
+        (4, "pivot", "flat"),  # the same as family 2's
+        (4, "large circle", "large circle"),  # C, and slow circles
+        (1, "static", "large circle"),  # A, and slow circles
+    ],
+    1.0: [
+        (1, "large circle", "large circle"),  # B, and slow circles
+        (2, "pivot", "flat"),
+        (3, "pivot", "flat"),
+        (4, "pivot", "flat"),
+        (3, "flat", "static"),  # from F to A
+        (4, "large circle", "large circle"),
+    ],
+}
+
+
+@pytest.mark.parametrize("alpha", ALPHAS)
+def test_every_curve_is_followed_from_one_kind_of_end_to_another(alpha: float) -> None:
+    assert [(curve.number, *curve.ends) for curve in everything(alpha)] == CURVES[alpha]
+
+
+@pytest.mark.parametrize("alpha", ALPHAS)
+def test_no_curve_stops_in_nowhere(alpha: float) -> None:
+    """An end is solved for, or beyond what a curve is followed to: else the shortest steps had failed there."""
+    for curve in everything(alpha):
+        for kind, point in zip(curve.ends, (curve.points[0], curve.points[-1]), strict=True):
+            u = point.unknowns
+            reached = {
+                "static": abs(u[SIGMA]) < 1e-12,
+                "pivot": abs(u[REAR_SPEED]) < 1e-12,
+                "large circle": np.linalg.norm(u[:3]) > FARTHEST,
+                # A fast one may lie as flat only further on.
+                "flat": abs(u[LEAN]) > LARGEST_LEAN or u[SIGMA] > LARGEST_SIGMA,
+                "fast front wheel": u[SIGMA] > LARGEST_SIGMA,
+            }
+            assert reached[kind], (curve.number, kind, u[: SIGMA + 1])
+
+
+@pytest.mark.parametrize("alpha", [0.5, 1.0])
+def test_further_curves_share_no_motion_with_another(alpha: float) -> None:
+    curves = everything(alpha)
+    for i, further in enumerate(curves[len(FAMILIES) :], len(FAMILIES)):
+        middle = further.points[len(further.points) // 2].unknowns
+        for other in curves[:i]:
+            gaps = [np.abs(p.unknowns - middle)[[LEAN, STEER, SIGMA]].max() for p in other.points]
+            # Points lie 0.1 apart along the arc.
+            assert min(gaps) > 0.1, (further.number, other.number)
+
+
+def test_a_further_curve_is_found_through_the_anchor_that_lies_on_it() -> None:
+    """At alpha = 1 the rear rate of 20 on family 3 is on the curve from F to A, not on the one from G."""
+    start = anchor(BICYCLE, Paraboloid(1.0), 3, 20.0)
+    own, further = (curve for curve in everything(1.0) if curve.number == 3)
+    on_own, on_further = (
+        [u for u in crossings(curve.equations, curve.points, start.condition) if start.met_by(u)]
+        for curve in (own, further)
+    )
+    assert (len(on_own), len(on_further)) == (0, 1)
+
+
+@pytest.mark.parametrize(
+    ("alpha", "steers"),
+    # A alone; with those that have come in from the rim, the first with the handlebar reversed; with A gone.
+    [(0.0, [1.3397]), (0.2, [1.4722]), (0.36, [1.5469, 2.6782]), (0.45, [0.6629, 1.6544, 2.0174]), (0.5, [0.9848])],
+)
+def test_static_equilibria(alpha: float, steers: list[float]) -> None:
+    equations = Steady(BICYCLE, Paraboloid(alpha))
+    found = static_equilibria(equations)
+    assert [round(float(u[STEER]), 4) for u in found] == steers
+    for u in found:
+        motion = equations.motion(u)
+        # At rest the ground carries the weight alone.
+        assert motion.force[:, 2].sum() == pytest.approx(BICYCLE.mass * BICYCLE.gravity, rel=1e-12)
+        assert motion.residual < 1e-12
+
+
+def test_motions_of_further_curves_come_after_those_of_the_anchors() -> None:
+    steep = Paraboloid(1.0)
+    pivoting, reversed_circle = motions(BICYCLE, steep, 4, 20.0)
+    assert find_motion(BICYCLE, steep, 20.0, 4)[1].steer == pivoting.steer
+    number, near = find_motion(BICYCLE, steep, 20.0, near=(reversed_circle.lean + 0.01, reversed_circle.steer))
+    assert (number, near.steer) == (4, reversed_circle.steer)
+    # While that anchor lies on another family's curve, or on this one's own, there are no further motions.
+    assert motions(BICYCLE, Paraboloid(0.005), 2, 26.4)
+    assert not motions(BICYCLE, Paraboloid(0.005), 4, 26.4)
+
+
+def test_a_family_has_a_further_curve_where_its_own_is_gone() -> None:
+    """At alpha = 0.44 there is no pivoting motion, but circles that tend to C."""
+    curves, absent = trace_all(BICYCLE, Paraboloid(0.44))
+    assert list(absent) == [3]
+    assert [(c.number, *c.ends) for c in curves if c.number == 4] == [(4, "static", "large circle")]
+    (motion,) = motions(BICYCLE, Paraboloid(0.44), 4, 18.0)
+    assert motion.front_rate < 0
+
+
+def test_points_between_neighbours_are_found_where_steps_turn_much() -> None:
+    """A step turns by what the metric of its own start says: on this dish by more than it may, seen from behind."""
+    dish = SplineProfile((0.0, 3.225, 9.416, 10.602, 15.466), (0.0, 0.1241, 0.3899, 0.4296, 0.5094))
+    curve = trace(BICYCLE, dish, 1, 0.05)
+    finer = {point.name: point for point in special_points(trace(BICYCLE, dish, 1, 0.02))}
+    found = special_points(curve)
+    assert {point.name for point in found} == set(finer)
+    for point in found:
+        assert point.lean == pytest.approx(finer[point.name].lean, abs=1e-9)
+
+
+def test_the_cusp_d_is_named_where_the_ground_ends_before_the_circles_grow_large() -> None:
+    radii = np.arange(16.0)
+    dish = SplineProfile(radii.tolist(), (0.005 * radii**2).tolist())
+    curve = trace(BICYCLE, dish, 2, 0.1)
+    assert curve.ends == ("edge", "flat")
+    # Ground through the points of a paraboloid is that paraboloid.
+    named = next(point for point in special_points(curve) if point.name == "D")
+    assert named.front_rate == pytest.approx(special(0.005, 2, "D").front_rate, abs=1e-8)
 
 
 def test_named_points_round_to_the_print() -> None:

@@ -31,17 +31,17 @@ from scenarios.paper_figures import (
     SETTLING,
     circle_of_equal_energy,
     linearised_point,
-    paper_document,
     ride_from,
     start_named,
     write_figures,
 )
+from scenarios.survey import families_document
 from tests.literature import published
 
 RADIUS = 0.35  # of the front wheel [m]
 XIONG = published("xiong2020")
 
-document = cache(paper_document)
+document = cache(families_document)
 
 
 @cache

@@ -11,12 +11,16 @@ import pytest
 import tomli_w
 
 from engines.engine import REFERENCE, load_engine
+from reference.bicycle import Bicycle
 from reference.bowls import Cone, Sphere, Torus
+from reference.circular import SIGMA, Steady
+from reference.families import trace_all
 from reference.height_field import HeightField
 from reference.profile import PolynomialProfile, SplineProfile
 from reference.surface import Paraboloid, Plane, Surface
 from scenarios import present
 from scenarios.error import ScenarioError
+from scenarios.paper.search import distance, search
 from scenarios.scenario import load_scenario, validate
 from scenarios.start import make_start
 from scenarios.surfaces import bowl, describe, named, parse_surface
@@ -118,6 +122,38 @@ def test_a_sphere_has_all_four_families() -> None:
     ((section,),) = [family["stable_sections"] for family in document["families"] if family["stable_sections"]]
     low, high = section["rear_rate"]
     assert low < 15.0 < high, "the library's ride"
+
+
+def test_a_steep_bowls_document_has_further_curves_after_the_families() -> None:
+    document = families_document(0.5)
+    json.dumps(document, allow_nan=False)
+    assert document["absent"] == {}
+    assert [family["family"] for family in document["families"]] == [1, 2, 3, 4, 4, 1]
+    reversed_circles, slow = document["families"][4:]
+    assert reversed_circles["ends"] == ["large circle", "large circle"]
+    assert min(reversed_circles["points"]["steer"]) > np.pi / 2
+    assert slow["ends"] == ["static", "large circle"]
+    assert list(slow["special_points"]) == ["A"]
+    for family in document["families"]:
+        assert len({len(values) for values in family["points"].values()}) == 1
+
+
+FOLLOWED = (0.0, 0.005, 0.011, 1 / 33, 0.05, 0.2, 0.36, 0.39, 0.41, 0.44, 0.465, 0.48, 0.5, 0.7, 1.0)
+
+
+@pytest.mark.parametrize(
+    "alpha", [a if a == 0.5 else pytest.param(a, marks=pytest.mark.slow) for a in FOLLOWED], ids=lambda a: f"{a:.4g}"
+)
+def test_a_search_without_anchors_finds_no_curve_that_is_not_followed(alpha: float) -> None:
+    equations = Steady(Bicycle(), Paraboloid(alpha))
+    searched = [curve[curve[:, SIGMA] > 0] for curve in search(equations).curves]
+    curves, _ = trace_all(Bicycle(), Paraboloid(alpha), 0.1)
+    followed = [np.array([point.unknowns for point in curve.points]) for curve in curves]
+    for ones, others in ((searched, followed), (followed, searched)):
+        for one in ones:
+            # Both in steps of at most 0.1: a point is at most half of one from the other's. Beyond the ends none is.
+            gaps = [min(distance(other, u) for other in others) for u in one[2:-2:3]]
+            assert max(gaps) < 0.1
 
 
 def test_on_waves_disturbances_are_those_of_level_ground() -> None:

@@ -1,0 +1,404 @@
+"""Anchors of the solution families: where their curves are got hold of.
+
+Random starts land on spurious roots, and the families reconnect as a bowl deepens. So every family has
+*anchors*: points of the benchmark bicycle on the level plane, reached from a named one, carried by
+continuation to the wanted bicycle and surface. Where families have joined or exchanged parts, an anchor
+stays on its part: the last of a family is the one whose curve bears the family's number, the others hold on
+to parts that it may leave behind.
+
+=======  =====================================  ============================================
+family   anchors                                followed towards
+=======  =====================================  ============================================
+1        on the curve from A (static), at a     both ends: A and B on small curvature
+         rear rate of 15
+2        on the curve from D, away from its     both ends: E and, through the cusp D, C on
+         cusp, at a rear rate of 20             small curvature
+3        on the curve from G to F, at a rear    both ends; the steer falling, to F
+         rate of 20; and G, pivoting
+4        on the curve from D to C, on a         both ends; the steer growing, through the
+         circle of 6 m; and H = G, pivoting     cusp I
+=======  =====================================  ============================================
+
+The circles that tend to C are family 2's until the cusps D and I collide, family 4's from there (paraboloids
+from alpha = 0.017), and a curve of their own where the pivoting motion has left them (from 0.42). In a static
+equilibrium begins what no anchor reaches: curves of slow circles, of which steep paraboloids have some that the
+plane has not (with the handlebar reversed from alpha = 0.34, else from 0.40).
+
+Where an anchor cannot be carried, as into a trough that has no ground for so small a circle, another point of
+its curve is: the circle half-way between the edges of the ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from functools import cache
+
+import numpy as np
+
+from .bicycle import Bicycle
+from .circular import (
+    CONTACT,
+    LEAN,
+    PITCH,
+    REAR_SPEED,
+    SIGMA,
+    STEER,
+    Condition,
+    Steady,
+    nearest_condition,
+    newton,
+    rear_rate_condition,
+    unknown_condition,
+)
+from .continuation import LARGEST_LEAN, crossings, follow
+from .kernels import dynamics as kernel
+from .kernels.steady import UNKNOWNS
+from .kinematics import body_positions, constants
+from .surface import Plane, SurfaceOfRevolution, evaluate, is_level
+
+# (lean, steer) of A, D and G on the level plane, as printed (Xiong et al. 2020, section 3.2).
+_POINT_A, _POINT_D, _POINT_G = (0.0, 1.33973991149), (0.62, 2.78), (-0.01206, 1.6019)
+# Rear rates of each family's anchors; None is the pivoting motion. The last one's curve is the family's.
+ANCHORS: dict[int, tuple[float | None, ...]] = {1: (15.0,), 2: (20.0,), 3: (20.0, None), 4: (None,)}
+# Radius of D's circle on the way to C [m]: wider than at the cusps D and I, where families exchange their parts,
+# and of angles that change little with the bowl.
+_TOWARDS_C = 6.0
+# Starts that lead to static equilibria: with a bowl's depth their pitch falls to -0.8.
+_STEERS, _PITCHES = np.pi * (np.arange(8) + 0.5) / 8, (0.0, -0.3, -0.6)
+_LARGEST_MOVE = 0.05  # of an unknown of order one, in a step of carrying an anchor
+_SAME = 1e-6  # two solutions of one condition; round-off, 1e-14, splits them by its root where they meet
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """A solution that a curve is followed from.
+
+    Attributes
+    ----------
+    family : int
+    equations : Steady
+    unknowns : ndarray, shape (22,)
+    directions : tuple of ndarray, shape (22,)
+        One or two in which the curve runs from there.
+    condition : callable
+        What singles the solution out on its curve: maps unknowns to a `reference.circular.Condition`.
+    """
+
+    family: int
+    equations: Steady
+    unknowns: np.ndarray
+    directions: tuple[np.ndarray, ...]
+    condition: Callable[[np.ndarray], Condition]
+
+    def met_by(self, unknowns: np.ndarray) -> bool:
+        """Whether another solution is the anchor itself, its wheels running either way."""
+        change = np.abs(unknowns - self.unknowns) / (1 + np.abs(self.unknowns))
+        return bool(max(change[: STEER + 1].max(), change[SIGMA]) < _SAME)
+
+
+def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
+    """Guess of the 22 unknowns on the level plane from two angles alone.
+
+    At fixed lean and steer the bicycle can roll in exactly one circle: the null vector of the rolling
+    rows gives the directions of all speeds and the circle's centre. The speed and the forces then fit
+    the equations of motion best in the least-squares sense.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    lean, steer : float
+        Angles [rad].
+
+    Returns
+    -------
+    ndarray, shape (22,)
+
+    Raises
+    ------
+    ValueError
+        If the wheels cannot both touch the plane at these angles.
+    """
+    surface, c = Plane(), constants(bicycle)
+    function, parameters = surface.function.real, surface.parameters
+    q, p = np.zeros(9), np.empty(6)
+    q[[2, 4, 6]] = bicycle.front_wheel_radius * np.cos(lean), lean, steer
+    kernel.guess_contacts(q, p, function, parameters, c)
+    if not kernel.settle(q, p, function, parameters, c):
+        raise ValueError(f"both wheels cannot touch the plane at lean = {lean!r}, steer = {steer!r}")
+    rows = np.empty((6, 9))
+    kernel.rolling(q, np.zeros(9), p, function, parameters, c, rows, np.empty(6), np.empty(6))
+    speeds = np.linalg.svd(rows[:, [0, 1, 2, 3, 7, 8]])[2][-1]
+    speeds = speeds / np.linalg.norm(speeds[3:])
+    centre = np.array([speeds[1], -speeds[0]]) / speeds[3]
+    u = np.zeros(UNKNOWNS)
+    u[:6] = *centre, q[2], lean, q[5], steer
+    u[6:9] = speeds[3:]
+    u[CONTACT] = p + np.array([*centre, 0, *centre, 0])
+    equations, linear = Steady(bicycle, surface), [SIGMA, *range(16, 22)]
+    u[linear] = np.linalg.lstsq(equations.jacobian(u)[:9, linear], -equations.residual(u)[:9], rcond=None)[0]
+    return u
+
+
+def _carry(
+    path: Callable[[float], Steady], u: np.ndarray, condition: Callable, what: str, step: float = 0.02
+) -> np.ndarray:
+    """Carry a solution along a path of equations, 0 to 1, at a fixed condition; steps as long as converge.
+
+    Newton's method may well converge to another branch: a step that moves an angle or a speed by much
+    more than a step should is taken again, shorter.
+    """
+    reached = 0.0
+    while reached < 1:
+        wanted = min(1.0, reached + step)
+        carried = _step_on(path(wanted), u, condition)
+        if carried is None:
+            step /= 2
+            if step < 1e-6:
+                raise ValueError(f"its anchor is lost {100 * reached:.4g} % of the way to {what}")
+            continue
+        (u, iterations), reached = carried, wanted
+        step *= 1.5 if iterations <= 5 else 1.0
+    if u[SIGMA] < 0:
+        raise ValueError(f"its anchor is no motion at {what}: the squared speed would be negative")
+    return u
+
+
+def _step_on(equations: Steady, u: np.ndarray, condition: Callable) -> tuple[np.ndarray, int] | None:
+    """Solution of neighbouring equations and the iterations it took; None where it fails or jumps."""
+    try:
+        new, iterations = newton(equations, u, condition, most=8)
+    except ValueError:
+        return None
+    moved = np.abs(new - u)[LEAN : SIGMA + 1] / (1 + np.abs(u[LEAN : SIGMA + 1]))
+    return (new, iterations) if moved.max() <= _LARGEST_MOVE else None
+
+
+def _between(bicycle: Bicycle, fraction: float) -> Bicycle:
+    """Bicycle between the benchmark and another; rigid bodies stay so, since their inertias are a convex set."""
+    one, other = asdict(Bicycle()), asdict(bicycle)
+    return Bicycle(**{name: (1 - fraction) * one[name] + fraction * other[name] for name in one})
+
+
+@cache
+def _named_point(name: str) -> np.ndarray:
+    """A, D or G of the benchmark on the level plane."""
+    angles, condition = {
+        "A": (_POINT_A, unknown_condition(SIGMA, 0.0)),
+        "D": (_POINT_D, nearest_condition()),
+        "G": (_POINT_G, unknown_condition(REAR_SPEED, 0.0)),
+    }[name]
+    return newton(Steady(Bicycle(), Plane()), start_on_plane(Bicycle(), *angles), condition, most=30)[0]
+
+
+@cache
+def _on_the_plane(family: int, rear_rate: float | None) -> np.ndarray:
+    """The benchmark's anchor on the level plane, from the paper's named points."""
+    name, towards = {1: ("A", _unit(SIGMA)), 2: ("D", _unit(LEAN))}.get(family, ("G", -_unit(STEER)))
+    start = _named_point(name)
+    return start if rear_rate is None else _met_from(start, towards, _anchored(rear_rate))
+
+
+def _met_from(start: np.ndarray, towards: np.ndarray, condition: Callable[[np.ndarray], Condition]) -> np.ndarray:
+    """The first solution of a condition on the benchmark's curve on the plane."""
+    level = Steady(Bicycle(), Plane())
+    return next(crossings(level, follow(level, start, towards), condition))
+
+
+def _unit(index: int) -> np.ndarray:
+    return np.eye(UNKNOWNS)[index]
+
+
+def _anchored(rear_rate: float | None) -> Callable[[np.ndarray], Condition]:
+    return unknown_condition(REAR_SPEED, 0.0) if rear_rate is None else rear_rate_condition(rear_rate)
+
+
+def _directions(family: int, rear_rate: float | None) -> tuple[np.ndarray, ...]:
+    steer = _unit(STEER)
+    if rear_rate is None:
+        return (steer if family == 4 else -steer,)
+    return steer, -steer
+
+
+def anchor(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float | None) -> Anchor:
+    """Carry an anchor of a family to a bicycle and a surface.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    surface : SurfaceOfRevolution
+    family : int
+        1 to 4.
+    rear_rate : float or None
+        One of the family's `ANCHORS`.
+
+    Returns
+    -------
+    Anchor
+
+    Raises
+    ------
+    ValueError
+        If the anchor is lost on the way.
+    """
+    condition, directions = _anchored(rear_rate), _directions(family, rear_rate)
+    u = _to_bicycle(bicycle, _on_the_plane(family, rear_rate), condition)
+    if rear_rate is None:
+        try:
+            u = _to_surface(bicycle, surface, u, condition)
+        except ValueError:
+            u = _other_pivot(bicycle, surface)
+    else:
+        u, condition = _to_surface_or_middle(bicycle, surface, u, condition, directions)
+    return Anchor(family, Steady(bicycle, surface), u, directions, condition)
+
+
+def next_anchor(path: Callable[[float], Steady], family: int, rear_rate: float | None, unknowns: np.ndarray) -> Anchor:
+    """Carry an anchor from neighbouring equations, the path at 0, to those at 1; arguments as of `anchor`.
+
+    Raises
+    ------
+    ValueError
+        If the anchor is lost on the way.
+    """
+    there, condition = path(1.0), _anchored(rear_rate)
+    u = _carry(path, unknowns, condition, str(there.surface), step=1.0)
+    return Anchor(family, there, u, _directions(family, rear_rate), condition)
+
+
+def further_anchors(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Iterator[Anchor]:
+    """Anchors whose curves may be those of the families, or hold what the families have left behind.
+
+    First the anchors of which a family has more than one, then every static equilibrium: in one a curve begins
+    that ends in circles of growing radius, as family 1 does, whose number it bears.
+
+    Yields
+    ------
+    Anchor
+        Those that can be carried to the bicycle and the surface.
+    """
+    for family, rates in ANCHORS.items():
+        for rate in rates[:-1]:
+            with suppress(ValueError):
+                yield anchor(bicycle, surface, family, rate)
+    with suppress(ValueError):
+        yield _anchor_towards_c(bicycle, surface)
+    equations = Steady(bicycle, surface)
+    for u in static_equilibria(equations):
+        yield Anchor(1, equations, u, (_unit(SIGMA),), unknown_condition(SIGMA, 0.0))
+
+
+def _anchor_towards_c(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Anchor:
+    """The anchor on the circles that tend to C; a ValueError where it is lost."""
+    condition, directions = _radius_condition(_TOWARDS_C), (_unit(STEER), -_unit(STEER))
+    u = _to_bicycle(bicycle, _met_from(_named_point("D"), -_unit(LEAN), condition), condition)
+    u, condition = _to_surface_or_middle(bicycle, surface, u, condition, directions)
+    return Anchor(4, Steady(bicycle, surface), u, directions, condition)
+
+
+def static_equilibria(equations: Steady) -> list[np.ndarray]:
+    """Static equilibria of the bicycle upright on its wheels and steered to the left, from a grid of starts.
+
+    Parameters
+    ----------
+    equations : Steady
+
+    Returns
+    -------
+    list of ndarray, shape (22,)
+        By rising steer.
+    """
+    found: list[np.ndarray] = []
+    for steer in _STEERS:
+        for pitch in _PITCHES:
+            try:
+                start = start_on_plane(equations.bicycle, 0.0, float(steer))
+                start[[PITCH, SIGMA]] = pitch, 0.0
+                u, _ = newton(equations, start, unknown_condition(SIGMA, 0.0), most=25)
+            except ValueError:
+                continue
+            if _stands(equations, u) and not any(np.abs(u - other)[: STEER + 1].max() < _SAME for other in found):
+                found.append(u)
+    return sorted(found, key=lambda u: float(u[STEER]))
+
+
+def _stands(equations: Steady, unknowns: np.ndarray) -> bool:
+    """Whether a bicycle stands on its wheels, above the ground and steered to the left: one that is no root alone."""
+    if np.abs(unknowns[[LEAN, PITCH]]).max() > LARGEST_LEAN or not 0 < unknowns[STEER] < np.pi:
+        return False
+    q = np.zeros((1, 9))
+    q[0, :3], q[0, 4:7] = unknowns[:3], unknowns[3:6]
+    centres = body_positions(equations.bicycle, q)[0]
+    # The wheels touch the ground from below just as well.
+    return bool(np.all(centres[:, 2] > evaluate(equations.surface, centres[:, 0], centres[:, 1])[:, 0]))
+
+
+def _to_bicycle(bicycle: Bicycle, u: np.ndarray, condition: Callable[[np.ndarray], Condition]) -> np.ndarray:
+    """Carry the benchmark's solution on the plane to a bicycle."""
+    if bicycle == Bicycle():
+        return u
+    return _carry(lambda s: Steady(_between(bicycle, s), Plane()), u, condition, "this bicycle")
+
+
+def _to_surface(
+    bicycle: Bicycle, surface: SurfaceOfRevolution, u: np.ndarray, condition: Callable[[np.ndarray], Condition]
+) -> np.ndarray:
+    """Carry a bicycle's solution on the plane to a surface."""
+    if is_level(surface):
+        return u
+    return _carry(lambda s: Steady(bicycle, surface.flattened(s)), u, condition, str(surface))
+
+
+def _to_surface_or_middle(
+    bicycle: Bicycle,
+    surface: SurfaceOfRevolution,
+    u: np.ndarray,
+    condition: Callable[[np.ndarray], Condition],
+    directions: tuple[np.ndarray, ...],
+) -> tuple[np.ndarray, Callable[[np.ndarray], Condition]]:
+    """Carry a solution to a surface; where it is lost, another of its curve, half-way between the ground's edges.
+
+    An anchor rides on a small circle: around a trough there is no ground for it. The first error is raised where
+    the curve on the plane, followed in the ``directions``, has no such circle, or where it is lost on the way too.
+    """
+    try:
+        return _to_surface(bicycle, surface, u, condition), condition
+    except ValueError as error:
+        lost = error
+    radius, plane = sum(surface.extent) / 2, Steady(bicycle, Plane())
+    if not np.isfinite(radius):
+        raise lost
+    halfway = _radius_condition(radius)
+    for towards in directions:
+        for start in crossings(plane, follow(plane, u, towards), halfway):
+            try:
+                return _to_surface(bicycle, surface, start, halfway), halfway
+            except ValueError:
+                raise lost from None
+    raise lost
+
+
+def _other_pivot(bicycle: Bicycle, surface: SurfaceOfRevolution) -> np.ndarray:
+    """The pivoting motion in which family 2 ends on steep bowls.
+
+    The one known from the plane comes to rest as a bowl deepens (the benchmark's on a paraboloid at
+    alpha = 0.42); another appears further on (at 0.46), first infinitely fast.
+    """
+    branch = anchor(bicycle, surface, 2, ANCHORS[2][-1])
+    for towards in branch.directions:
+        points = follow(branch.equations, branch.unknowns, towards)
+        for u in crossings(branch.equations, points, _anchored(None)):
+            return u
+    raise ValueError(f"there is no pivoting motion on {surface}")
+
+
+def _radius_condition(radius: float) -> Callable[[np.ndarray], Condition]:
+    """Condition of a given radius of D's circle, in units of its square."""
+
+    def condition(u: np.ndarray) -> Condition:
+        gradient = np.zeros(UNKNOWNS)
+        gradient[:2] = 2 * u[:2] / radius**2
+        return Condition(float(u[:2] @ u[:2]) / radius**2 - 1, gradient)
+
+    return condition
