@@ -21,6 +21,7 @@ IMPEDANCES = (0.9, 0.95, 0.001, 0.5, 2.0)
 # MuJoCo moves a larger impedance here without a word.
 LARGEST_IMPEDANCE = 0.9999
 ROUND_OFF = 2.0**-52
+FORCE_NOISE = 0.01  # the largest share of round-off that a contact force may have
 
 
 class StepSettings(Settings):
@@ -83,6 +84,11 @@ class ContactSettings(StepSettings):
         """Rate b at which a contact row brings its velocity to zero, 2 / (largest impedance * time constant) [1/s]."""
         return 2 / (self.impedance[1] * self.contact_time)
 
+    @property
+    def line_search(self) -> int:
+        """Iterations that MuJoCo's contact solver may spend on one line search; 50 are its own default."""
+        return 50
+
     @model_validator(mode="after")
     def _contacts_are_resolved(self) -> Self:
         # MuJoCo would raise a smaller one without a word.
@@ -137,7 +143,7 @@ class ExactContactSettings(ContactSettings):
         default=1.0,
         gt=0,
         le=1e6,
-        description="how much harder friction is than the normal direction; above 10 the solver loses sticking wheels",
+        description="how much harder friction is than the normal direction; softness does as much for both",
     )
     softness: float = Field(
         default=1e-5,
@@ -150,14 +156,34 @@ class ExactContactSettings(ContactSettings):
     )
 
     @property
-    def noise(self) -> float:
-        """Relative error that a step may add beyond its method.
+    def condition(self) -> float:
+        """Condition of the solver's matrix M + J^T D J, by which round-off grows in a contact force."""
+        return max(self.impratio, 1.0) / ((1 - self.impedance[1]) * self.softness)
 
-        The solver's matrix M + J^T D J has a condition of about 1 / ((1 - impedance) softness), by which round-off
-        grows in an acceleration; a step makes a speed of it.
+    @property
+    def noise(self) -> float:
+        """Relative error that a step may add beyond its method: round-off in an acceleration, times the step."""
+        return max(self.tolerance, ROUND_OFF, ROUND_OFF * self.condition * self.step)
+
+    @property
+    def line_search(self) -> int:
+        """Iterations of a line search, more where friction is much harder than the normal direction.
+
+        Between sliding and sticking the cone's cost then bends within so short a stretch that 50 iterations can
+        end before its bottom. What is missing there, divided by the softness, is a force up to thousands of times too
+        large. 200 find what 500 find.
         """
-        condition = 1 / ((1 - self.impedance[1]) * self.softness)
-        return max(self.tolerance, ROUND_OFF, ROUND_OFF * condition * self.step)
+        return 200 if self.cone == "elliptic" and self.impratio > 10 else 50
+
+    @model_validator(mode="after")
+    def _forces_have_digits(self) -> Self:
+        if ROUND_OFF * self.condition > FORCE_NOISE:
+            least = ROUND_OFF * max(self.impratio, 1.0) / ((1 - self.impedance[1]) * FORCE_NOISE)
+            raise ValueError(
+                f"softness is {self.softness!r}; with impratio {self.impratio!r} it must be at least {least:.2g}, "
+                "or contact forces drown in round-off"
+            )
+        return self
 
 
 class MultiplierSettings(StepSettings):

@@ -190,6 +190,47 @@ def test_floor_moves_with_the_softness():
         np.testing.assert_allclose([values[0] / values[1], values[1] / values[2]], 10, rtol=0.02)
 
 
+def test_floor_moves_with_friction_and_with_the_contacts_rate():
+    """Slip = R F / b with R by impratio and b by the time constant; gap = R F / k with k by its square.
+
+    On a circle the slip turns with the bicycle at its yaw rate w while it follows at b: R F / sqrt(b^2 + w^2).
+    """
+    problem = motion("1/200")
+    base, hard, slow = (
+        run(exact_contact, problem, softness=1.0, **changed)
+        for changed in ({}, {"impratio": 10.0}, {"time_constant": 0.1})
+    )
+    sizes = [np.linalg.norm(np.asarray(ride.slip)[-1], axis=1) for ride in (base, hard, slow)]
+    depths = [np.asarray(ride.gap)[-1] for ride in (base, hard, slow)]
+    # Of slips of 60 and 6 µm/s RK4's own are 0.01 µm/s.
+    np.testing.assert_allclose(sizes[0] / sizes[1], 10, rtol=2e-3)
+    b, w = 2 / (0.9999 * 0.05), float(problem.qd[3])
+    np.testing.assert_allclose(sizes[2] / sizes[0], np.hypot(b, w) / np.hypot(b / 2, w), rtol=1e-3)
+    np.testing.assert_allclose(depths[2] / depths[0], 4, rtol=1e-3)
+
+
+def test_below_the_floor_no_step_helps():
+    """With MuJoCo's own softness from 2 to 1 ms nothing changes; a hundredth of it, and the floor is a hundredth."""
+    reference = exact(q2_plus, 5.0)
+    errors = {
+        (softness, step): position_error(run(exact_contact, q2_plus(5.0), softness=softness, step=step), reference)
+        for softness, step in ((1.0, 0.002), (1.0, 0.001), (1e-2, 0.001))
+    }
+    np.testing.assert_allclose(errors[1.0, 0.002], errors[1.0, 0.001], rtol=0.02)
+    np.testing.assert_allclose(errors[1.0, 0.001] / errors[1e-2, 0.001], 100, rtol=0.02)
+
+
+@pytest.mark.parametrize(("softness", "impratio"), [(1.0, 1e6), (1e-3, 300.0), (1e-5, 100.0), (1e-5, 1e3)])
+def test_hard_friction_gives_no_spikes(softness, impratio):
+    """Forces are the reference's but for the softness, 0.07 N of MuJoCo's own, and round-off by the condition."""
+    problem = replace(q2_plus(), times=every(0.01, 0.5))
+    reference = REFERENCE.simulate(problem, REFERENCE.settings(), lambda t: None)
+    settings = ExactContactSettings(softness=softness, impratio=impratio)
+    trajectory = exact_contact.ENGINE.simulate(problem, settings, lambda t: None)
+    error = np.abs(np.asarray(trajectory.contact_force) - np.asarray(reference.contact_force)).max()
+    assert error < 0.1 * softness + 1e3 * ROUND_OFF * settings.condition + 1e-4
+
+
 def test_exact_contact_repeats_bitwise_and_does_not_depend_on_output():
     for engine in (exact_contact, multipliers):
         problem = q2_plus(1.0)
@@ -348,6 +389,8 @@ def test_start_without_contact_is_refused_and_an_interrupt_leaves_nothing(engine
         ({"time_constant": 0.003}, "at least twice the step"),
         ({"friction": -1.0}, "friction"),
         ({"stiffness": 1.0}, "stiffness"),
+        ({"impratio": 1e6}, "with impratio 1000000.0 it must be at least 0.00022"),
+        ({"softness": 1e-9, "impratio": 100.0}, "forces drown in round-off"),
     ],
 )
 def test_settings_are_checked(settings, message):
