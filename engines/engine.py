@@ -78,6 +78,8 @@ class Trajectory:
         Process CPU time of the integration alone [s].
     ended : str or None
         Why the run ended before the problem's last time; None if it did not.
+    friction : float or None
+        Coefficient of friction that its contacts have in every direction; None where wheels are bound to roll.
     """
 
     engine: str
@@ -97,6 +99,7 @@ class Trajectory:
     steps: int
     cpu_time: float
     ended: str | None = None
+    friction: float | None = None
 
     def first(self, samples: int) -> Self:
         """The ride up to a number of samples; steps and CPU time stay those of the whole."""

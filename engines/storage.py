@@ -18,7 +18,7 @@ from .engine import Trajectory
 from .files import whole
 
 METADATA_KEY = b"velodrome"
-FACTS = ("engine", "version", "settings", "steps", "cpu_time", "ended")
+FACTS = ("engine", "version", "settings", "steps", "cpu_time", "ended", "friction")
 REQUIRED = ("time", "q", "qd", "body_position", "body_quaternion")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from engines.engine import Trajectory
@@ -28,6 +30,12 @@ def until_fall(trajectory: Trajectory, bicycle: Bicycle, surface: Surface, beyon
     """The ride up to its fall, and a number of samples ``beyond``; at least one sample, and all if it does not fall."""
     low = np.flatnonzero(_height(trajectory, bicycle, surface) < 0)
     return trajectory if len(low) == 0 else trajectory.first(max(1, int(low[0]) + beyond))
+
+
+def as_shown(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> Trajectory:
+    """The ride up to its fall and one sample more than what is measured: there it lies."""
+    shown = until_fall(trajectory, bicycle, surface, 1)
+    return shown if len(shown.time) == len(trajectory.time) else replace(shown, ended="the bicycle fell")
 
 
 def _height(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from engines.engine import Trajectory
-from engines.friction import normal_force
+from engines.friction import cone_is_left, normal_force, required_friction
 from reference.bicycle import Bicycle
 from reference.kinematics import REAR_ANGLE
 from reference.surface import Surface
@@ -54,6 +54,7 @@ def metrics(
     result |= _drifts(trajectory, reference, circular)
     result |= _energy(trajectory)
     result |= _constraints(trajectory)
+    result |= _friction(trajectory, trajectory if reference is None else reference, surface)
     result |= {
         "steps": trajectory.steps,
         "cpu_time": trajectory.cpu_time,
@@ -86,6 +87,17 @@ def orientation_errors(trajectory: Trajectory, reference: Trajectory) -> np.ndar
     # 2 asin(|a - +-b| / 2) resolves small angles, which the arc cosine of a product does not.
     chord = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
     return 4 * np.arcsin(np.minimum(chord / 2, 1.0))
+
+
+def _friction(trajectory: Trajectory, rolling: Trajectory, surface: Surface) -> dict[str, float | None]:
+    """Friction that rolling needs by the reference's forces, and from when on the engine has too little."""
+    result: dict[str, float | None] = dict.fromkeys(("required_friction", "friction", "friction_left_at"))
+    result["friction"] = trajectory.friction
+    if rolling.contact_force is not None and rolling.contact_point is not None:
+        result["required_friction"] = float(required_friction(rolling, surface).max())
+        if trajectory.friction is not None:
+            result["friction_left_at"] = cone_is_left(trajectory.friction, rolling, surface)
+    return result
 
 
 def least_normal_force(trajectory: Trajectory, surface: Surface) -> float | None:

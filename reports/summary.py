@@ -32,6 +32,13 @@ def remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]
     lines = []
     if metrics["fell_at"] is not None:
         lines.append(f"{name} fell at {metrics['fell_at']:.2f} s; its figures are those up to there")
+    if metrics["friction_left_at"] is not None:
+        needed, there = metrics["required_friction"], metrics["friction"]
+        most = "the ground to pull" if needed is None else f"a coefficient of friction of up to {needed:.3g}"
+        lines.append(
+            f"{name}: rolling needs {most}, its contacts have {there:.3g}: too little from "
+            f"{metrics['friction_left_at']:.2f} s on"
+        )
     if metrics["min_normal_force"] is not None and metrics["min_normal_force"] < 0:
         pull = -metrics["min_normal_force"]
         lines.append(f"{name}: the ground pulls a wheel, by up to {pull:.3g} N; no contact could")
@@ -53,6 +60,7 @@ def summary(
     verdicts: Sequence[Mapping[str, Any]],
     growth_rate: float,
     duration: float,
+    steady: bool = True,
 ) -> str:
     """Markdown summary of a run.
 
@@ -69,12 +77,14 @@ def summary(
         Of the motion's own disturbances [1/s].
     duration : float
         Of the run [s].
+    steady : bool
+        See `stability`.
 
     Returns
     -------
     str
     """
-    lines = [f"# {title}", "", _stability(growth_rate), ""]
+    lines = [f"# {title}", "", stability(growth_rate, steady), ""]
     # Engines as columns: they are fewer than quantities, and the recording's tab is narrow.
     lines += ["| | " + " | ".join(measured) + " |", "|---|" + "---:|" * len(measured)]
     for name, unit, metric, part in COLUMNS:
@@ -100,7 +110,19 @@ def verdict_line(verdict: Mapping[str, Any]) -> str:
     return f"{verdict['engine']}: {verdict['quantity']} {value}, limit {verdict['limit']:.3g}: {word}"
 
 
-def _stability(growth_rate: float) -> str:
+def stability(growth_rate: float, steady: bool = True) -> str:
+    """One sentence on a motion's disturbances.
+
+    Parameters
+    ----------
+    growth_rate : float
+        Of the motion [1/s]; of the same start on the level plane where it is not ``steady``.
+    steady : bool
+        Whether the ground lets it be: no motion is on ground without symmetry about the z axis.
+    """
+    if not steady:
+        fate = f"decay at {-growth_rate:.4g} 1/s" if growth_rate < 0 else f"grow like exp({growth_rate:.4g} t / s)"
+        return f"On this ground no motion is steady; on the level plane disturbances of this start would {fate}."
     if growth_rate < 0:
         return f"The motion is Lyapunov stable: its slowest disturbance decays at {-growth_rate:.4g} 1/s."
     return f"The motion is unstable: disturbances grow like exp({growth_rate:.4g} t / s)."

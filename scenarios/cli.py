@@ -19,7 +19,7 @@ from .error import ScenarioError
 if TYPE_CHECKING:
     from reference.surface import Surface
 
-    from .runner import Plan
+    from .run_folder import Plan
 
 app = typer.Typer(
     name="velodrome",
@@ -263,6 +263,25 @@ def precision_command(
     present.show_precision(Console(), document)
     for path in written:
         Console().print(f"written: {path}", markup=False, highlight=False, soft_wrap=True)
+
+
+@app.command("view")
+def view_command(
+    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],
+    web: Annotated[bool, typer.Option("--web", help="Serve the report page with the viewer in it.")] = False,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="Port for --web; any free one if not given.")
+    ] = None,
+) -> None:
+    """A run's recording in the native viewer, or its report page in the browser, for this machine only."""
+    from . import view
+
+    if web:
+        view.serve(run_folder, port or 0, lambda address: print(f"{address}\nCtrl-C ends it", flush=True))
+    elif port is not None:
+        raise ScenarioError("--port goes with --web")
+    else:
+        view.open_native(run_folder)
 
 
 @app.command("check")

@@ -15,7 +15,8 @@ from reports.drift import Verdict, judge, missing
 from .error import ScenarioError
 from .files import make_folder, write_json
 from .gate_sample import SHORT_HORIZON, sample
-from .runner import Watch, configure, library_versions
+from .run_folder import library_versions
+from .runner import Watch, configure
 from .scenario import library_names, load_scenario
 from .start import make_start
 

@@ -18,7 +18,8 @@ from reports.precision import Level, comparison_horizon, eigenvalue_document, en
 
 from .error import ScenarioError
 from .files import make_folder, write_json
-from .runner import Plan, Watch, library_versions, measure_one, plan_run
+from .run_folder import Plan, library_versions
+from .runner import Watch, measure_one, plan_run
 from .scenario import Scenario
 from .start import Start
 

@@ -31,7 +31,8 @@ from .surfaces import bowl, named
 if TYPE_CHECKING:
     from reports.drift import Verdict
 
-    from .runner import Outcome, Plan
+    from .run_folder import Plan
+    from .runner import Outcome
 
 # Of a terminal: from here on engines' names stand on one line.
 _WIDE, _NAME_WIDTH = 95, 14
@@ -106,12 +107,13 @@ def show_outcome(console: Console, plan: Plan, outcome: Outcome) -> None:
     for verdict in outcome.verdicts:
         style = "green" if verdict["holds"] else "red"
         console.print(verdict_line(verdict), style=style, markup=False, soft_wrap=True)
-    recording, viewer = outcome.folder / "comparison.rrd", Path(sys.executable).with_name("rerun")
-    if viewer.is_relative_to(Path.cwd()):
-        viewer = viewer.relative_to(Path.cwd())
+    command = Path(sys.executable).with_name("velodrome")
+    if command.is_relative_to(Path.cwd()):
+        command = command.relative_to(Path.cwd())
     console.print(f"run folder: {outcome.folder}", markup=False, highlight=False, soft_wrap=True)
-    if recording.exists():
-        console.print(f"recording:  {viewer} {recording}", markup=False, highlight=False, soft_wrap=True)
+    console.print(f"report:     {outcome.folder / 'report.html'}", markup=False, highlight=False, soft_wrap=True)
+    if (outcome.folder / "comparison.rrd").exists():
+        console.print(f"recording:  {command} view {outcome.folder}", markup=False, highlight=False, soft_wrap=True)
 
 
 def outcome_json(plan: Plan, outcome: Outcome) -> dict[str, Any]:

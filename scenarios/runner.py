@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import platform
 import signal
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,42 +24,17 @@ from engines.engine import (
     load_engine,
 )
 from engines.storage import write_trajectory
-from reports.fall import until_fall
 from reports.metrics import metrics
-from reports.summary import summary
 
 from .error import ScenarioError
 from .files import write_json, write_text
+from .run_folder import Plan, new_folder, record, write_manifest, write_page
 from .scenario import Scenario
 from .start import Start, make_start
 from .table import one_line, refuse_unknown
 
-LIBRARIES = ("velodrome", "numpy", "scipy", "numba", "exudyn", "mujoco", "rerun-sdk", "pyarrow")
-
 # (engine, simulated time reached, duration)
 Watch = Callable[[str, float, float], None]
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A run that has been checked: everything bad input could break is behind it.
-
-    Attributes
-    ----------
-    name : str
-    scenario : Scenario
-    start : Start
-    engines : dict
-        Name to (engine, its settings), the reference first.
-    left_out : dict
-        Engines that were not asked for by name and are not made for this problem, with the reason.
-    """
-
-    name: str
-    scenario: Scenario
-    start: Start
-    engines: dict[str, tuple[Engine, Settings]]
-    left_out: dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -160,12 +132,12 @@ def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None]) -> Out
     -------
     Outcome
     """
-    folder = _new_folder(out, plan.name)
+    folder = new_folder(out, plan.name)
     write_text(folder / "scenario.toml", tomli_w.dumps(plan.scenario.model_dump(exclude_none=True)))
     trajectories: dict[str, Trajectory] = {}
     failures: dict[str, str] = {}
     interrupted = False
-    _write_manifest(folder, plan, trajectories, failures, complete=False)
+    write_manifest(folder, plan, trajectories, failures)
     problem, duration = plan.start.problem, plan.scenario.simulation.duration
     try:
         for name, (engine, settings) in plan.engines.items():
@@ -177,7 +149,7 @@ def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None]) -> Out
             else:
                 write_trajectory(trajectory, folder / f"{name}.parquet")
                 trajectories[name] = trajectory
-            _write_manifest(folder, plan, trajectories, failures, complete=False)
+            write_manifest(folder, plan, trajectories, failures)
     except KeyboardInterrupt:
         interrupted = True
         note("interrupted: finished engines are kept")
@@ -185,8 +157,9 @@ def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None]) -> Out
         measured = measure(plan, trajectories)
         verdicts = judge(plan, measured)
         write_json(folder / "metrics.json", measured)
-        _record(folder, plan, trajectories, measured, failures, verdicts)
-        _write_manifest(folder, plan, trajectories, failures, complete=not interrupted)
+        record(folder, plan, trajectories, measured, failures, verdicts)
+        found = write_manifest(folder, plan, trajectories, failures, verdicts, complete=not interrupted)
+        write_page(folder, plan, trajectories, measured, found)
     return Outcome(folder, measured, failures, verdicts, interrupted)
 
 
@@ -227,91 +200,6 @@ def judge(plan: Plan, measured: Mapping[str, Mapping[str, Any]]) -> list[dict[st
             {"engine": name, "quantity": "energy_variation", "value": value, "limit": limit, "holds": holds}
         )
     return verdicts
-
-
-def _record(
-    folder: Path,
-    plan: Plan,
-    trajectories: Mapping[str, Trajectory],
-    measured: Mapping[str, Mapping[str, Any]],
-    failures: Mapping[str, str],
-    verdicts: Sequence[Mapping[str, Any]],
-) -> None:
-    if not trajectories:
-        return
-    # rerun takes a second to load; only a run needs it.
-    from reports.recording import write_recording
-
-    problem = plan.start.problem
-    shown = {name: _as_shown(plan, run) for name, run in trajectories.items()}
-    facts = (plan.start.growth_rate, plan.scenario.simulation.duration)
-    text = summary(plan.scenario.title, measured, failures, verdicts, *facts)
-    write_recording(folder / "comparison.rrd", plan.scenario.title, problem.bicycle, problem.surface, shown, text)
-
-
-def _as_shown(plan: Plan, trajectory: Trajectory) -> Trajectory:
-    """The ride up to its fall, and one sample more than what is measured: there it lies."""
-    problem = plan.start.problem
-    shown = until_fall(trajectory, problem.bicycle, problem.surface, 1)
-    return shown if len(shown.time) == len(trajectory.time) else replace(shown, ended="the bicycle fell")
-
-
-def _new_folder(out: Path, name: str) -> Path:
-    """Make a fresh folder named after the scenario and the time; an older run is never touched."""
-    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S")
-    for attempt in range(1, 1000):
-        folder = out / (f"{name}-{stamp}" if attempt == 1 else f"{name}-{stamp}-{attempt}")
-        try:
-            folder.mkdir(parents=True)
-        except FileExistsError:
-            continue
-        except OSError as error:
-            raise ScenarioError(f"{out}: the run folder cannot be made: {error.strerror}") from error
-        return folder
-    raise ScenarioError(f"{out}: too many runs of {name} in one second")
-
-
-def _write_manifest(
-    folder: Path, plan: Plan, trajectories: Mapping[str, Trajectory], failures: Mapping[str, str], complete: bool
-) -> None:
-    start = plan.start
-    engines: dict[str, Any] = {}
-    for name, (engine, settings) in plan.engines.items():
-        entry: dict[str, Any] = {"version": engine.version, "settings": settings.model_dump()}
-        if name in trajectories:
-            done = trajectories[name]
-            entry |= {"cpu_time": done.cpu_time, "steps": done.steps, "ended": done.ended}
-        if name in failures:
-            entry["failed"] = failures[name]
-        engines[name] = entry
-    manifest = {
-        "scenario": plan.name,
-        "title": plan.scenario.title,
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "complete": complete,
-        "engines": engines,
-        "left_out": plan.left_out,
-        "libraries": library_versions(),
-        "platform": {"system": platform.platform(), "machine": platform.machine(), "python": platform.python_version()},
-        "start": {
-            "family": start.family,
-            "growth_rate": start.growth_rate,
-            "q": start.problem.q.tolist(),
-            "qd": start.problem.qd.tolist(),
-        },
-    }
-    write_json(folder / "manifest.json", manifest)
-
-
-def library_versions() -> dict[str, str]:
-    """Versions of the libraries that results depend on, of those installed."""
-    found = {}
-    for library in LIBRARIES:
-        try:
-            found[library] = version(library)
-        except PackageNotFoundError:
-            continue
-    return found
 
 
 @contextmanager

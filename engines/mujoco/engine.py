@@ -124,4 +124,5 @@ class MujocoEngine(Generic[S]):
             steps=steps,
             cpu_time=cpu_time,
             ended=ended,
+            friction=settings.least_friction,
         )

@@ -37,6 +37,11 @@ class StepSettings(Settings):
         """Relative error that a step may add beyond its method."""
         return ROUND_OFF
 
+    @property
+    def least_friction(self) -> float | None:
+        """Coefficient of friction that there is in every direction; None where wheels are bound to roll."""
+        return None
+
 
 class ContactSettings(StepSettings):
     """How MuJoCo softens its contacts and solves for their forces."""
@@ -73,6 +78,11 @@ class ContactSettings(StepSettings):
     def noise(self) -> float:
         """Relative error that a step may add beyond its method: what the contact solver leaves unconverged."""
         return max(self.tolerance, ROUND_OFF)
+
+    @property
+    def least_friction(self) -> float:
+        """Coefficient of friction that there is in every direction: half-way between a pyramid's edges it is less."""
+        return self.friction / (2**0.5 if self.cone == "pyramidal" else 1)
 
     @property
     def contact_time(self) -> float:

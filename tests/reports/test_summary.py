@@ -17,6 +17,9 @@ MEASURED: dict[str, Any] = {
     "energy_drift": 6.2e-8,
     "max_slip": 3.1e-12,
     "cpu_time": 0.24,
+    "required_friction": 0.7,
+    "friction": None,
+    "friction_left_at": None,
     "min_normal_force": 300.0,
     "fell_at": None,
     "ended": None,
@@ -59,6 +62,13 @@ def test_no_news_is_no_remark() -> None:
     [
         ({"fell_at": 2.5}, ["exudyn fell at 2.50 s; its figures are those up to there"]),
         ({"min_normal_force": -12.34}, ["exudyn: the ground pulls a wheel, by up to 12.3 N; no contact could"]),
+        (
+            {"friction": 0.5, "friction_left_at": 1.234},
+            [
+                "exudyn: rolling needs a coefficient of friction of up to 0.7, its contacts have 0.5: "
+                "too little from 1.23 s on"
+            ],
+        ),
         ({"fell_at": 0.0}, ["exudyn fell at 0.00 s; its figures are those up to there"]),
         ({"ended": "Newton failed"}, ["exudyn ended early: Newton failed"]),
         ({"horizon": 7.25}, ["exudyn", "7.25 s", "instability"]),

@@ -163,7 +163,13 @@ def test_run_shows_a_table_and_where_things_are(velodrome, tmp_path: Path) -> No
     result = velodrome("run", "q2", *SHORT)
     assert (result.status, result.stderr) == (0, "")
     (folder,) = (tmp_path / "out").iterdir()
-    for words in ("q2: Q2, a stable circular motion", "mujoco-native", f"out/{folder.name}", "comparison.rrd"):
+    for words in (
+        "q2: Q2, a stable circular motion",
+        "mujoco-native",
+        f"out/{folder.name}",
+        "velodrome view",
+        "report.html",
+    ):
         assert words in result.stdout
 
 
@@ -388,7 +394,7 @@ def test_a_real_interrupt_ends_a_real_run_in_order(tmp_path: Path) -> None:
     (entry,) = json.loads(stdout)["runs"]
     assert entry["complete"] is False
     assert list(entry["engines"]) == ["reference"]
-    files = {"scenario.toml", "manifest.json", "metrics.json", "comparison.rrd", "reference.parquet"}
+    files = {"scenario.toml", "manifest.json", "metrics.json", "comparison.rrd", "report.html", "reference.parquet"}
     assert {path.name for path in Path(entry["folder"]).iterdir()} == files
 
 

@@ -16,7 +16,8 @@ from altered import Altered, raising
 from engines.engine import REFERENCE, EngineError, Trajectory
 from engines.storage import read_trajectory
 from scenarios.error import ScenarioError
-from scenarios.runner import LIBRARIES, Outcome, Plan, plan_run, run
+from scenarios.run_folder import LIBRARIES, Plan
+from scenarios.runner import Outcome, plan_run, run
 from scenarios.scenario import load_scenario
 
 NATIVE = "mujoco-native"
@@ -24,7 +25,18 @@ METRICS = {
     *("position_error", "orientation_error", "rear_rate_error", "contact_force_error", "contact_force_error_at"),
     *("radius_drift_rate", "phase_drift_rate", "rear_rate_drift_rate"),
     *("energy_drift", "energy_drift_rate", "energy_variation", "max_gap", "max_slip", "mean_slip"),
-    *("steps", "cpu_time", "real_time_factor", "min_normal_force", "fell_at", "ended", "horizon"),
+    *(
+        "required_friction",
+        "friction",
+        "friction_left_at",
+        "steps",
+        "cpu_time",
+        "real_time_factor",
+        "min_normal_force",
+        "fell_at",
+        "ended",
+        "horizon",
+    ),
 }
 
 
@@ -61,7 +73,7 @@ def names(folder: Path) -> set[str]:
 
 def test_a_run_folder_has_all_its_files(tmp_path: Path) -> None:
     outcome, notes = ridden(plain(), tmp_path)
-    files = {"scenario.toml", "manifest.json", "metrics.json", "comparison.rrd"}
+    files = {"scenario.toml", "manifest.json", "metrics.json", "report.html", "comparison.rrd"}
     assert names(outcome.folder) == files | {"reference.parquet", "mujoco-native.parquet"}
     assert outcome.folder.parent == tmp_path
     assert notes == []
@@ -110,7 +122,7 @@ def test_an_older_run_is_never_touched(tmp_path: Path) -> None:
     what = plain()
     folders = [ridden(what, tmp_path)[0].folder for _ in range(3)]
     assert len(set(folders)) == 3
-    assert all(len(names(folder)) == 6 for folder in folders)
+    assert all(len(names(folder)) == 7 for folder in folders)
 
 
 @pytest.mark.parametrize(
@@ -147,7 +159,7 @@ def test_when_all_break_the_folder_says_why(tmp_path: Path) -> None:
     broken = with_engine(plain(), REFERENCE, raising(EngineError("one")))
     outcome, _ = ridden(with_engine(broken, NATIVE, raising(EngineError("two"))), tmp_path)
     assert outcome.failures == {REFERENCE: "one", NATIVE: "two"}
-    assert names(outcome.folder) == {"scenario.toml", "manifest.json", "metrics.json"}
+    assert names(outcome.folder) == {"scenario.toml", "manifest.json", "metrics.json", "report.html"}
     assert read(outcome, "metrics.json") == {}
 
 
@@ -156,7 +168,7 @@ def test_ctrl_c_keeps_the_finished_engines_whole(tmp_path: Path) -> None:
     assert outcome.interrupted
     assert notes == ["interrupted: finished engines are kept"]
     assert names(outcome.folder) == {
-        *("scenario.toml", "manifest.json", "metrics.json", "comparison.rrd", "reference.parquet")
+        *("scenario.toml", "manifest.json", "metrics.json", "report.html", "comparison.rrd", "reference.parquet")
     }
     assert len(read_trajectory(outcome.folder / "reference.parquet").time) == 11
     assert set(read(outcome, "metrics.json")) == {REFERENCE}
@@ -169,7 +181,7 @@ def test_ctrl_c_keeps_the_finished_engines_whole(tmp_path: Path) -> None:
 def test_ctrl_c_in_the_first_engine_leaves_a_folder_that_says_so(tmp_path: Path) -> None:
     outcome, _ = ridden(with_engine(plain(), REFERENCE, raising(KeyboardInterrupt())), tmp_path)
     assert outcome.interrupted
-    assert names(outcome.folder) == {"scenario.toml", "manifest.json", "metrics.json"}
+    assert names(outcome.folder) == {"scenario.toml", "manifest.json", "metrics.json", "report.html"}
     assert not read(outcome, "manifest.json")["complete"]
 
 

@@ -1,0 +1,132 @@
+"""The page as a whole: data in, one HTML document out."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
+from markupsafe import Markup
+
+from engines.engine import Trajectory
+from reference.surface import Surface, SurfaceOfRevolution
+
+from ..palette import colours
+from ..plots import Ride
+from ..summary import COLUMNS, cell, remarks, stability, verdict_line
+from . import curves, plan, trust, words
+from .ink import css, dashes, on_paper
+
+_PARTS = files("reports.page")
+
+
+def page(
+    manifest: Mapping[str, Any],
+    scenario: Mapping[str, Any],
+    measured: Mapping[str, Mapping[str, Any]],
+    verdicts: Sequence[Mapping[str, Any]],
+    trajectories: Mapping[str, Trajectory],
+    surface: Surface,
+) -> str:
+    """Write the report of a run.
+
+    Parameters
+    ----------
+    manifest : mapping
+        As in ``manifest.json``.
+    scenario : mapping
+        As in ``scenario.toml``.
+    measured : mapping
+        Metrics by engine name, as in ``metrics.json``.
+    verdicts : sequence of mapping
+        As `scenarios.runner.judge` gives them.
+    trajectories : mapping of str to Trajectory
+        By engine name, in the order of display; may be empty.
+    surface : Surface
+
+    Returns
+    -------
+    str
+        An HTML document with everything in it: style, script, data. Whatever comes from the run is escaped.
+    """
+    names, script = list(trajectories), _text("page.js")
+    ride = Ride(surface, trajectories)
+    groups = curves.drawn(ride, scenario["motion"].get("kind") != "upright") if names else []
+    seen = plan.plan(ride, names) if names else None
+    steady = isinstance(surface, SurfaceOfRevolution)
+    duration, rate = scenario["simulation"]["duration"], manifest["start"]["growth_rate"]
+    return _template().render(
+        _results(measured, rate, duration),
+        manifest=manifest,
+        facts=words.facts(manifest, scenario),
+        stability=stability(rate, steady),
+        engines=_inks(names),
+        failures={name: entry["failed"] for name, entry in manifest["engines"].items() if "failed" in entry},
+        left_out=manifest.get("left_out", {}),
+        verdicts=[{"holds": verdict["holds"], "line": verdict_line(verdict)} for verdict in verdicts],
+        criterion=scenario.get("criterion") is not None,
+        steady=steady,
+        duration=duration,
+        groups=groups,
+        has_plan=seen is not None,
+        most=curves.MOST,
+        data={
+            "duration": max((float(run.time[-1]) for run in trajectories.values()), default=duration),
+            "engines": names,
+            "panels": [curves.panel_data(shown, names, measured) for _, group in groups for shown in group],
+            "plan": seen,
+        },
+        style=Markup(_text("page.css")),
+        script=Markup(script),
+        script_hash=_hash(script),
+    )
+
+
+def _results(measured: Mapping[str, Mapping[str, Any]], growth_rate: float, duration: float) -> dict[str, Any]:
+    """What the template says of the metrics."""
+    return {
+        "columns": COLUMNS,
+        "meanings": trust.MEANINGS,
+        "horizon_meaning": trust.HORIZON,
+        "rows": {name: _row(values) for name, values in measured.items()},
+        "trust": {name: trust.trust(name, values, growth_rate, duration) for name, values in measured.items()},
+        "remarks": [line for name, values in measured.items() for line in remarks(name, values, duration)],
+    }
+
+
+def _template() -> Template:
+    # Strict: a name that the template misspells is an error, not a gap.
+    environment = Environment(
+        autoescape=True, loader=FunctionLoader(_text), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
+    environment.filters["setting"] = words.setting
+    return environment.get_template("page.html")
+
+
+def _text(name: str) -> str:
+    return (_PARTS / name).read_text(encoding="utf-8")
+
+
+def _hash(script: str) -> str:
+    """Name of a script in a content security policy: with it a browser runs this one and no other."""
+    return "sha256-" + base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+
+
+def _inks(names: list[str]) -> list[dict[str, str]]:
+    """How each engine is drawn."""
+    paint, dash = colours(names), dashes(names)
+    return [
+        {"name": name, "screen": css(paint[name]), "paper": css(on_paper(name, paint[name])), "dash": dash[name]}
+        for name in names
+    ]
+
+
+def _row(values: Mapping[str, Any]) -> list[str]:
+    horizon = values.get("horizon")
+    return [cell(values, metric, part) for _, _, metric, part in COLUMNS] + [
+        "–" if horizon is None else f"{horizon:.3g}"
+    ]

@@ -1,0 +1,43 @@
+"""The palette's colours on paper: the same hues, dark enough to be seen on white."""
+
+from __future__ import annotations
+
+from engines.engine import REFERENCE
+
+from ..palette import Colour
+
+# WCAG 2.2, success criterion 1.4.11: what a reader must tell apart stands out from its ground by 3 to 1.
+CONTRAST = 3.0
+REFERENCE_ON_PAPER: Colour = (58, 64, 72)  # near black as the other is near white
+# Beside the colour, a line is told by its dashes [pixels]: none for the reference, which is drawn wide, and
+# for the first engine, which lies on it.
+DASHES = ("", "8 4", "2 3", "12 3 2 3", "5 2", "12 4 2 4 2 4", "1 2", "16 5")
+
+
+def luminance(colour: Colour) -> float:
+    """Relative luminance of an sRGB colour, 0 to 1 (WCAG 2.2)."""
+    shares = [c / 255 for c in colour]
+    red, green, blue = (s / 12.92 if s <= 0.04045 else ((s + 0.055) / 1.055) ** 2.4 for s in shares)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def on_paper(name: str, colour: Colour) -> Colour:
+    """The colour of an engine on white: darkened, hue and saturation kept, until it stands out."""
+    if name == REFERENCE:
+        return REFERENCE_ON_PAPER
+    for share in range(100, 0, -1):
+        red, green, blue = (c * share // 100 for c in colour)
+        if 1.05 / (luminance((red, green, blue)) + 0.05) >= CONTRAST:
+            return red, green, blue
+    return (0, 0, 0)
+
+
+def css(colour: Colour) -> str:
+    """A colour as CSS writes it."""
+    return "#{:02x}{:02x}{:02x}".format(*colour)
+
+
+def dashes(names: list[str]) -> dict[str, str]:
+    """Dash pattern of each engine's line, as SVG writes it; the reference's is solid."""
+    others = [name for name in names if name != REFERENCE]
+    return dict.fromkeys(names, "") | {name: DASHES[k % len(DASHES)] for k, name in enumerate(others)}

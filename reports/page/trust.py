@@ -1,0 +1,80 @@
+"""What the figures mean, and how far to trust them in this run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from engines.engine import REFERENCE
+
+# One a column of `reports.summary.COLUMNS`.
+MEANINGS = {
+    "position_error": "Largest distance of the point D, on the steering axis, from where the reference has it at the "
+    "same time.",
+    "orientation_error": "Largest angle between the rear frame and the reference's.",
+    "contact_force_error": "Largest difference of a contact force from the reference's, relative to the largest force "
+    "that the reference needs.",
+    "radius_drift_rate": "Slope of the distance from the bowl's axis, less the reference's: does the circle widen or "
+    "shrink of itself?",
+    "energy_drift": "Largest change of the total energy, relative to the start's. Nothing here dissipates.",
+    "max_slip": "Largest speed of a wheel's material at its contact point: zero for a wheel that rolls.",
+    "cpu_time": "Process time of the integration alone; it says as much of the machine as of the engine.",
+}
+HORIZON = (
+    "Time up to which the comparison means anything: until then the motion's own instability has not grown the "
+    "engine's first error to the size of the motion."
+)
+
+
+def trust(name: str, values: Mapping[str, Any], growth_rate: float, duration: float) -> str:
+    """How far to trust an engine's row.
+
+    Parameters
+    ----------
+    name : str
+    values : mapping
+        The engine's metrics.
+    growth_rate : float
+        Of the motion's own disturbances [1/s].
+    duration : float
+        Of the run [s].
+
+    Returns
+    -------
+    str
+        Sentences.
+    """
+    if name == REFERENCE:
+        return _reference(values)
+    if values["position_error"] is None:
+        return "There is no reference in this run: nothing is known of its error, only what it keeps and loses itself."
+    if growth_rate <= 0:
+        return "The motion amplifies no error: what is seen is the engine's own, over the whole run."
+    horizon = values["horizon"]
+    if horizon is None:
+        return "It agrees with the reference to the last digit: there is no error that could grow."
+    if horizon < duration:
+        return (
+            f"Up to {horizon:.2f} s the error is the engine's, grown at the motion's rate of {growth_rate:.3g} 1/s. "
+            "Beyond that it says nothing of the engine: any difference would have grown as large."
+        )
+    return (
+        f"The error is the engine's, grown at the motion's rate of {growth_rate:.3g} 1/s; it would mean something up "
+        f"to {horizon:.2f} s, longer than the run."
+    )
+
+
+def _reference(values: Mapping[str, Any]) -> str:
+    kept = [
+        f"{words} {values[metric]:.2g}{unit}"
+        for words, metric, unit in (
+            ("its energy changes by at most", "energy_drift", " of itself"),
+            ("its gaps stay below", "max_gap", " m"),
+            ("its slip stays below", "max_slip", " m/s"),
+        )
+        if values.get(metric) is not None
+    ]
+    return (
+        "The measure of the others, integrated to round-off. What it can be held to: " + ", ".join(kept) + ". "
+        "Errors of others near these sizes are its own as much as theirs."
+    )

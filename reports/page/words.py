@@ -1,0 +1,97 @@
+"""What ran, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Any
+
+_LONGEST = 80  # letters for a field with a list of numbers
+_UNITS = {
+    "x": "m",
+    "y": "m",
+    "lean": "rad",
+    "steer": "rad",
+    "lean_rate": "rad/s",
+    "steer_rate": "rad/s",
+    "rear_rate": "rad/s",
+}
+
+
+def facts(manifest: Mapping[str, Any], scenario: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Terms and what they are in this run.
+
+    Parameters
+    ----------
+    manifest : mapping
+        As in ``manifest.json``.
+    scenario : mapping
+        As in ``scenario.toml``.
+
+    Returns
+    -------
+    list of (str, str)
+    """
+    simulation, start = scenario["simulation"], manifest["start"]
+    rows = [
+        ("Scenario", str(manifest["scenario"])),
+        ("Ground", ground(scenario["surface"])),
+        ("Motion", motion(scenario["motion"])),
+    ]
+    if start["family"] is not None:
+        rows.append(("Family", f"{start['family']} of the circular motions"))
+    return [
+        *rows,
+        ("Disturbed by", disturbance(scenario.get("perturbation", {}))),
+        ("Growth rate", f"{start['growth_rate']:.4g} 1/s"),
+        ("Duration", f"{simulation['duration']:g} s, {simulation['output_rate']:g} samples a second"),
+        ("Bicycle", bicycle(scenario.get("bicycle", {}))),
+        ("Run on", f"{datetime.fromisoformat(manifest['created']):%Y-%m-%d, %H:%M:%S %Z}"),
+        ("State", "complete" if manifest["complete"] else "interrupted: the engines that had finished are shown"),
+    ]
+
+
+def ground(surface: Mapping[str, Any]) -> str:
+    """A surface in words."""
+    if surface["kind"] == "plane":
+        return "level plane"
+    if surface["kind"] == "paraboloid":
+        return f"bowl z = α (x² + y²), α = {surface['alpha']:g} 1/m"
+    fields = (f"{name} {_short(value)}" for name, value in surface.items() if name != "kind" and value is not None)
+    return ", ".join([str(surface["kind"]), *fields])
+
+
+def motion(table: Mapping[str, Any]) -> str:
+    """A motion to start from in words."""
+    if table.get("kind") == "upright":
+        return f"straight and upright, {table['speed']:g} m/s"
+    return f"circle with the rear wheel at {table['rear_rate']:g} rad/s"
+
+
+def disturbance(table: Mapping[str, float]) -> str:
+    """What was added to the motion's start, in words."""
+    added = (f"{name.replace('_', ' ')} {value:+g} {_UNITS[name]}" for name, value in table.items() if value != 0)
+    return ", ".join(added) or "nothing"
+
+
+def bicycle(changes: Mapping[str, float]) -> str:
+    """The bicycle in words."""
+    name = "benchmark bicycle (Meijaard et al. 2007)"
+    changed = ", ".join(f"{key.replace('_', ' ')} {value:g}" for key, value in changes.items())
+    return f"{name} with {changed}" if changed else name
+
+
+def setting(value: Any) -> str:
+    """A setting's value as the scenario file writes it."""
+    if value is None:
+        return "not set"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list | tuple):
+        return ", ".join(setting(item) for item in value)
+    return f"{value!r}" if isinstance(value, float) else str(value)
+
+
+def _short(value: Any) -> str:
+    text = str(value)
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"

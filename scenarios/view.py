@@ -1,0 +1,145 @@
+"""A stored run, looked at: in the native viewer, or as its page with the viewer in it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from engines.storage import read_trajectory
+from reports.fall import as_shown
+
+from .error import ScenarioError
+from .files import write_text
+from .page_server import LOOPBACK, PageServer
+from .replay import ReplayError, rerun, viewer_files
+from .scenario import load_scenario
+
+RECORDING, REPORT = "comparison.rrd", "report.html"
+
+
+def open_native(folder: Path) -> None:
+    """Open a run's recording in the native viewer; returns when its window is closed.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder has no recording, or the viewer cannot run here.
+    """
+    command = native_command(_part(folder, RECORDING))
+    try:
+        status = subprocess.call(command)
+    except OSError as error:
+        raise ScenarioError(f"the viewer {command[0]} cannot be started: {error.strerror}") from error
+    if status != 0:
+        raise ScenarioError(f"the viewer ended with status {status}; without a display, use --web")
+
+
+def native_command(recording: Path) -> list[str]:
+    """How the native viewer is started; it listens for data as well, on this machine only."""
+    return [rerun(), "--bind", LOOPBACK, "--port", "auto", str(recording)]
+
+
+def serve(folder: Path, port: int, ready: Callable[[str], None]) -> None:
+    """Serve a run's page with the viewer in it, to this machine only, until interrupted.
+
+    Parameters
+    ----------
+    folder : Path
+        A run folder; its page is written if it has none.
+    port : int
+        To listen on; 0 for any free one.
+    ready : callable
+        Called with the page's address once it is served.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder is no run folder, the port is taken, or the viewer's files cannot be had.
+    """
+    with page_server(folder, port) as server:
+        ready(server.address)
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            return
+
+
+def page_server(folder: Path, port: int) -> PageServer:
+    """The server of `serve`, listening but not yet answering."""
+    _part(folder, RECORDING)
+    if not (folder / REPORT).is_file():
+        text = stored_page(folder)
+        try:
+            write_text(folder / REPORT, text)
+        except OSError as error:
+            raise ScenarioError(f"{folder / REPORT}: cannot be written: {error.strerror}") from error
+    try:
+        viewer = viewer_files()
+    except ReplayError as error:
+        raise ScenarioError(str(error)) from error
+    # What is in the folder now and nothing above it: an address is looked up, never joined to a path.
+    files = {path.name: path for path in folder.iterdir() if path.is_file() and not path.name.startswith(".")}
+    try:
+        return PageServer(port, files, viewer)
+    except OSError as error:
+        raise ScenarioError(f"--port {port}: cannot listen on it: {error.strerror}; 0 takes a free one") from error
+
+
+def stored_page(folder: Path) -> str:
+    """The page of a stored run, from its files.
+
+    Parameters
+    ----------
+    folder : Path
+        A run folder.
+
+    Returns
+    -------
+    str
+        As `reports.page.page` gives it.
+
+    Raises
+    ------
+    ScenarioError
+        If it is no run folder: which file is missing or cannot be read.
+    """
+    from jinja2 import TemplateError
+
+    from reports.page import page
+
+    manifest, measured = _document(folder, "manifest.json"), _document(folder, "metrics.json")
+    _, scenario = load_scenario(str(_part(folder, "scenario.toml")))
+    try:
+        where = scenario.make_bicycle(), scenario.surface.make()
+        runs = {name: as_shown(read_trajectory(_part(folder, f"{name}.parquet")), *where) for name in measured}
+        verdicts = manifest.get("verdicts", [])
+        return page(manifest, scenario.model_dump(), measured, verdicts, runs, where[1])
+    except (KeyError, TypeError, AttributeError, TemplateError) as error:
+        raise ScenarioError(f"{folder}: not the files of one run: {type(error).__name__}: {error}") from error
+    except ValueError as error:
+        raise ScenarioError(str(error)) from error
+
+
+def _document(folder: Path, name: str) -> Mapping[str, Any]:
+    path = _part(folder, name)
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise ScenarioError(f"{path}: not a JSON document: {error}") from error
+    if not isinstance(document, dict):
+        raise ScenarioError(f"{path}: not a JSON object")
+    return document
+
+
+def _part(folder: Path, name: str) -> Path:
+    """A file of a run folder, which must be there."""
+    if not folder.is_dir():
+        raise ScenarioError(f"{folder}: no such folder; velodrome run writes one and says where")
+    if not (folder / name).is_file():
+        raise ScenarioError(f"{folder}: not the folder of a finished run: it has no {name}")
+    return folder / name
