@@ -100,8 +100,8 @@ def show_outcome(console: Console, plan: Plan, outcome: Outcome) -> None:
     for name, values in outcome.metrics.items():
         for line in remarks(name, values, duration):
             console.print(line, style="yellow", markup=False, soft_wrap=True)
-    for reason in plan.left_out.values():
-        console.print(f"left out: {reason}", style="dim", markup=False, highlight=False, soft_wrap=True)
+    for name, reason in plan.left_out.items():
+        console.print(f"{name} left out: {reason}", style="dim", markup=False, highlight=False, soft_wrap=True)
     for name, reason in outcome.failures.items():
         console.print(f"{name} did not run: {reason}", style="red", markup=False, soft_wrap=True)
     for verdict in outcome.verdicts:

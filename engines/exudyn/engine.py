@@ -55,7 +55,7 @@ class ExudynEngine:
     def check(self, problem: Problem, settings: SolverSettings) -> None:
         """Refuse output times that the step does not meet, and ground; see `engines.engine.Engine`."""
         if self.level_only and not is_level(problem.surface):
-            raise UnsuitableProblem(f"{self.name} rolls on the level plane only; exudyn rides on any surface")
+            raise UnsuitableProblem("it rolls on the level plane only; exudyn rides on any surface")
         steps_per_output(problem.times, settings.step)
 
     def step_noise(self, settings: SolverSettings) -> float:

@@ -120,7 +120,7 @@ def test_runs_are_bitwise_identical(engine, surface):
 
 
 def test_builtin_refuses_a_bowl():
-    with pytest.raises(ValueError, match=r"^exudyn-builtin rolls on the level plane only[^\n]*$"):
+    with pytest.raises(ValueError, match=r"^it rolls on the level plane only[^\n]*$"):
         BUILTIN.check(task(BOWL), BUILTIN.settings())
     BUILTIN.check(task(LEVEL), BUILTIN.settings())
 

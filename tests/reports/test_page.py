@@ -238,7 +238,7 @@ def test_what_went_wrong_is_said():
     assert f"✗ {verdict_line(verdicts[0])}" in said
     assert f"✓ {verdict_line(verdicts[1])}" in said
     assert "✗ broken did not run: no luck" in said
-    assert "– left out: rolls on a plane only" in said
+    assert "– flat left out: rolls on a plane only" in said
     assert any("interrupted" in found for _, found in parsed.all("dd"))
 
 

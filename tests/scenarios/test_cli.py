@@ -352,9 +352,7 @@ def test_an_engine_that_is_not_made_for_a_ground_is_left_out_or_refused(velodrom
     everything = ("--duration", "0.1", "--out", "out")
     found = velodrome("run", "q2", *everything, "--json").json()["runs"][0]
     assert "exudyn-builtin" not in found["engines"]
-    assert found["left_out"] == {
-        "exudyn-builtin": "exudyn-builtin rolls on the level plane only; exudyn rides on any surface"
-    }
+    assert found["left_out"] == {"exudyn-builtin": "it rolls on the level plane only; exudyn rides on any surface"}
     assert found["failures"] == {}
     result = velodrome("run", "q2", *everything, "--engine", "exudyn-builtin")
     assert (result.status, "rolls on the level plane only" in result.stderr) == (2, True)
