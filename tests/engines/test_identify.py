@@ -26,11 +26,16 @@ MOTIONS: dict[str, tuple[float, float, int, tuple[float, float] | None]] = {
     "p3": (0.2, 20.0, 3, None),
     "p4": (0.2, 4.0, 4, None),
 }
+# Along family 2 in the bowl of Q2, through its stable section (15.28 to 19.31 rad/s) and beyond both ends.
+ALONG = {
+    f"family 2 at {rate:g}": (0.005, rate, 2, near)
+    for rate, near in ((15.0, (0.62, 2.77)), (16.0, (0.66, 2.79)), (19.0, (0.77, 2.86)), (22.0, (0.87, 2.91)))
+}
 
 
 @cache
 def motion(name: str) -> tuple[Problem, Linearisation]:
-    alpha, rear_rate, family, near = MOTIONS[name]
+    alpha, rear_rate, family, near = (MOTIONS | ALONG)[name]
     surface = Paraboloid(alpha)
     state = find_motion(BICYCLE, surface, rear_rate, family, near)[1].state()
     return Problem(BICYCLE, surface, *state, np.zeros(1)), linearise(BICYCLE, surface, *state)
@@ -66,7 +71,7 @@ def test_exudyn_has_the_eigenvalues_of_q2() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", MOTIONS)
+@pytest.mark.parametrize("name", MOTIONS | ALONG)
 def test_exudyn_has_the_eigenvalues_of_all_points(name: str) -> None:
     engine = load_engine("exudyn")
     worst, found = error(name, "exudyn", engine.settings.model_validate({"step": 0.002}))
