@@ -1,0 +1,1 @@
+"""symbrim's equations of the Whipple bicycle as an engine of Velodrome."""
