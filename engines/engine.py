@@ -196,6 +196,9 @@ class Engine(Protocol):
         ...
 
 
+_MEMBERS = ("name", "version", "gives", "settings", "check", "step_noise", "simulate")
+
+
 class EngineError(RuntimeError):
     """An engine could not run a problem at all."""
 
@@ -219,9 +222,25 @@ def load_engine(name: str) -> Engine:
     Raises
     ------
     ValueError
-        If no engine of that name is installed.
+        If no engine of that name is installed, or what is announced under it is no engine.
     """
     points = _announced()
     if name not in points:
         raise ValueError(f"engine {name!r} is not installed; there are {', '.join(engine_names())}")
-    return points[name].load()
+    where = f"engine {name!r}, announced as {points[name].value},"
+    try:
+        engine = points[name].load()
+    except Exception as error:  # another package's code may break in any way
+        raise ValueError(f"{where} cannot be loaded: {type(error).__name__}: {error}") from error
+    for member in _MEMBERS:
+        if not hasattr(engine, member):
+            raise ValueError(f"{where} is no engine: it has no {member}")
+    if engine.name != name:
+        raise ValueError(f"{where} calls itself {engine.name!r}; both names must be the same")
+    return engine
+
+
+def packages() -> dict[str, str]:
+    """Versions of the packages that announce engines, by name."""
+    found = (point.dist for point in _announced().values())
+    return {dist.name: dist.version for dist in found if dist is not None}

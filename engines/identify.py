@@ -22,6 +22,7 @@ from reference.dae import consistent_state
 from reference.kinematics import PITCH, YAW
 from reference.stability import independent, sorted_eigenvalues
 
+from .admission import ride
 from .convergence import extrapolate, observed_orders
 from .engine import Engine, EngineError, Problem, Settings
 
@@ -140,7 +141,7 @@ def _ride(
     state = consistent_state(problem.bicycle, problem.surface, position, v[2], v[3], rates, yaw, guess)
     disturbed = Problem(problem.bicycle, problem.surface, *state, 0.5 * interval * np.arange(4))
     engine.check(disturbed, settings)
-    trajectory = engine.simulate(disturbed, settings, lambda _: None)
+    trajectory = ride(engine, disturbed, settings, lambda _: None)
     if len(trajectory.time) < 4:
         raise EngineError(f"{engine.name} did not ride through {1.5 * interval:g} s: {trajectory.ended}")
     return independent(trajectory.q[[1, 3]], trajectory.qd[[1, 3]])

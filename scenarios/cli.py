@@ -50,6 +50,7 @@ def list_command(as_json: Json = False) -> None:
     """Scenarios of the library and installed engines."""
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     from engines.engine import engine_names, load_engine
 
@@ -61,8 +62,11 @@ def list_command(as_json: Json = False) -> None:
         scenarios.append({"name": name, "title": scenario.title, "tags": list(scenario.tags)})
     engines = []
     for name in engine_names():
-        engine = load_engine(name)
-        engines.append({"name": name, "version": engine.version, "gives": list(engine.gives)})
+        try:
+            engine = load_engine(name)
+            engines.append({"name": name, "version": engine.version, "gives": list(engine.gives)})
+        except ValueError as error:
+            engines.append({"name": name, "version": None, "gives": [], "error": " ".join(str(error).split())})
     if as_json:
         _print_json({"scenarios": scenarios, "engines": engines})
         return
@@ -74,7 +78,8 @@ def list_command(as_json: Json = False) -> None:
     console.print()
     table = Table("engine", "version", "gives, beside coordinates and poses", box=None, pad_edge=False)
     for entry in engines:
-        table.add_row(entry["name"], entry["version"], ", ".join(entry["gives"]))
+        given = Text(entry["error"], "red") if "error" in entry else ", ".join(entry["gives"])
+        table.add_row(entry["name"], entry["version"] or "–", given)
     console.print(table)
 
 
@@ -330,7 +335,7 @@ def check_command(
         rows = [{"scenario": name} | verdict.as_json() for name, verdict in verdicts]
         _print_json({"passes": passes, "updated": written, "verdicts": rows})
     else:
-        present.show_verdicts(console, verdicts)
+        present.show_verdicts(console, verdicts, renewed=update)
         for path in written:
             console.print(f"baseline written: {path}", soft_wrap=True)
     if not passes:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from engines.admission import ride
 from engines.convergence import observed_orders
 from engines.engine import Engine, EngineError, Problem, Settings
 from engines.identify import DISTURBANCES, STENCIL_WEIGHT, interval_of, jacobian_at
@@ -78,14 +79,14 @@ def sample(start: Start, engine: Engine, settings: Settings, watch: Callable[[fl
     if motion is None:
         raise ValueError("only a circular motion can be gated: its exact solution is known")
     engine.check(problem, settings)
-    ride = engine.simulate(problem, settings, watch)
-    fall = fell_at(ride, problem.bicycle, problem.surface)
-    if ride.ended is not None and fall is None:
-        raise EngineError(ride.ended)
-    scale, steps, whole = _scale(start), ride.steps, float(ride.time[-1])
+    trajectory = ride(engine, problem, settings, watch)
+    fall = fell_at(trajectory, problem.bicycle, problem.surface)
+    if trajectory.ended is not None and fall is None:
+        raise EngineError(trajectory.ended)
+    scale, steps, whole = _scale(start), trajectory.steps, float(trajectory.time[-1])
     exact = steady_trajectory(problem.bicycle, motion, problem.times)
-    measured = measure_one(start, ride, exact)
-    standing = until_fall(ride, problem.bicycle, problem.surface)
+    measured = measure_one(start, trajectory, exact)
+    standing = until_fall(trajectory, problem.bicycle, problem.surface)
     scale = replace(scale, duration=float(standing.time[-1]))
     errors = position_errors(standing, exact)
     short = float(errors[min(int(np.searchsorted(problem.times, SHORT_HORIZON)), len(errors) - 1)])
@@ -124,11 +125,11 @@ def _order(start: Start, engine: Engine, settings: Settings) -> Found:
     short = replace(start.problem, times=ORDER_INTERVAL * np.arange(round(SHORT_HORIZON / ORDER_INTERVAL) + 1))
     try:
         ladder = [settings.refined(factor) for factor in FACTORS]
-        rides = [engine.simulate(short, refined, lambda _: None) for refined in ladder]
+        rides = [ride(engine, short, refined, lambda _: None) for refined in ladder]
     except ValueError:  # settings without a step, or of a step at the end of its range or beside the interval
         return {"observed_order": (None, None)}
-    samples = min(len(ride.time) for ride in rides)
-    paths = [ride.q[:samples, :3] for ride in rides]
+    samples = min(len(one.time) for one in rides)
+    paths = [one.q[:samples, :3] for one in rides]
     first, second = (float(np.abs(b - a).max()) for a, b in pairwise(paths))
     scale = replace(_scale(start), duration=float(short.times[-1]))
     # The finest ride has the most steps.

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from engines.admission import ride
 from engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory
 from engines.identify import LEVELS as IDENTIFY_LEVELS
 from engines.identify import Identified, identify
@@ -76,7 +77,7 @@ def precision(
     problem = _sampled(plan, ladders)
     engine, settings = plan.engines[REFERENCE]
     watch(REFERENCE, 0.0, _duration(problem))
-    reference = engine.simulate(problem, settings, lambda t: watch(REFERENCE, t, _duration(problem)))
+    reference = ride(engine, problem, settings, lambda t: watch(REFERENCE, t, _duration(problem)))
     if reference.ended is not None:
         raise ScenarioError(f"{name}: the reference ends at {reference.time[-1]:.6g} s: {reference.ended}")
     studies = {}
@@ -84,9 +85,7 @@ def precision(
     undisturbed = replace(plan.start.problem, q=q, qd=qd)
     for engine_name, (engine, settings) in plan.engines.items():
         runs = list(_runs(engine, ladders[engine_name], plan.start, problem, reference, watch))
-        # As far as the reference can be refined it is the yardstick.
-        coarsest = settings.refined(2.0 ** (IDENTIFY_LEVELS - 1)) if engine_name == REFERENCE else settings
-        identified = _identified(engine, coarsest, undisturbed, watch) if eigenvalues else None
+        identified = _identified(engine, _refinable(settings), undisturbed, watch) if eigenvalues else None
         found = [run for run in runs if isinstance(run, Level)]
         studies[engine_name] = Study(found, [run for run in runs if not isinstance(run, Level)], identified)
     return _document(name, plan.start, problem, reference, undisturbed, studies)
@@ -105,6 +104,17 @@ def _ladder(settings: Settings, factors: list[float]) -> list[Settings]:
         except ValueError:
             continue  # beyond what the engine allows: fewer levels
     return found
+
+
+def _refinable(settings: Settings) -> Settings:
+    """These settings, or as much coarser as it takes for them to be halved as often as eigenvalues need."""
+    for factor in (2.0**coarser for coarser in range(IDENTIFY_LEVELS)):
+        try:
+            settings.refined(factor * 0.5 ** (IDENTIFY_LEVELS - 1))
+            return settings.refined(factor)
+        except ValueError:
+            continue
+    return settings
 
 
 def _sampled(plan: Plan, ladders: Mapping[str, list[Settings]]) -> Problem:
@@ -135,7 +145,7 @@ def _runs(
     for settings in ladder:
         step = getattr(settings, "step", None)
         try:
-            trajectory = engine.simulate(problem, settings, lambda t: watch(engine.name, t, _duration(problem)))
+            trajectory = ride(engine, problem, settings, lambda t: watch(engine.name, t, _duration(problem)))
         except (EngineError, ValueError, ArithmeticError) as error:
             yield {"step": step, "reason": " ".join(str(error).split())}
             continue

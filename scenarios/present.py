@@ -317,8 +317,11 @@ def _precision_lines(entry: Mapping[str, Any]) -> Iterator[str]:
 STATUS_STYLES = {"holds": "green", "better": "cyan", "changed": "red", "worse": "red", "missing": "red"}
 
 
-def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]]) -> None:
-    """Print the gate's verdicts: a line an engine, then everything that does not hold in plain lines."""
+def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed: bool = False) -> None:
+    """Print the gate's verdicts: a line an engine, then everything that does not hold in plain lines.
+
+    Of baselines that are ``renewed`` at once there is nothing to pass or fail.
+    """
     for name, group in groupby(verdicts, key=lambda item: item[0]):
         console.print(name, style="bold", markup=False)
         table = Table("engine", box=None, pad_edge=False)
@@ -331,6 +334,8 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]]) -> None
         if verdict.status != "holds":
             line = f"{name}: {verdict.engine}: {verdict.quantity}: {verdict.status}: {verdict.reason}"
             console.print(line, style=STATUS_STYLES[verdict.status], markup=False, highlight=False, soft_wrap=True)
+    if renewed:
+        return
     passes = all(verdict.passes for _, verdict in verdicts)
     console.print("the gate holds" if passes else "the gate fails", style="bold green" if passes else "bold red")
 

@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from engines.engine import Engine, Settings, Trajectory
+from engines.engine import Engine, Settings, Trajectory, packages
 from reference.surface import SurfaceOfRevolution
 from reports.fall import as_shown
 from reports.summary import summary
@@ -114,8 +114,8 @@ def write_manifest(
 
 
 def library_versions() -> dict[str, str]:
-    """Versions of the libraries that results depend on, of those installed."""
-    found = {}
+    """Versions of the libraries that results depend on, of those installed, and of the engines' packages."""
+    found = packages()
     for library in LIBRARIES:
         try:
             found[library] = version(library)

@@ -13,6 +13,7 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
+from engines.admission import ride
 from engines.engine import (
     REFERENCE,
     Engine,
@@ -100,9 +101,12 @@ def configure(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
     Raises
     ------
     ScenarioError
-        If a setting is unknown or out of range.
+        If it is no engine, or a setting is unknown or out of range.
     """
-    engine = load_engine(name)
+    try:
+        engine = load_engine(name)
+    except ValueError as error:
+        raise ScenarioError(" ".join(str(error).split())) from error
     try:
         refuse_unknown(values, engine.settings.model_fields)
         return engine, engine.settings.model_validate(dict(values), strict=True)
@@ -142,7 +146,7 @@ def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None]) -> Out
     try:
         for name, (engine, settings) in plan.engines.items():
             try:
-                trajectory = engine.simulate(problem, settings, lambda t, name=name: watch(name, t, duration))
+                trajectory = ride(engine, problem, settings, lambda t, name=name: watch(name, t, duration))
             except Exception as error:  # whatever an engine raises must not cost the others' results
                 failures[name] = _reason(error)
                 note(f"{name}: {failures[name]}")

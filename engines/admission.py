@@ -1,0 +1,97 @@
+"""What an engine gives is looked at before anything is made of it: an engine may come from anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from .engine import Engine, EngineError, Problem, Progress, Trajectory
+
+# Shapes of what is sampled, but for the number of samples; the first five must be given.
+SHAPES: dict[str, tuple[int, ...]] = {
+    "time": (),
+    "q": (9,),
+    "qd": (9,),
+    "body_position": (4, 3),
+    "body_quaternion": (4, 4),
+    "contact_point": (2, 3),
+    "contact_force": (2, 3),
+    "gap": (2,),
+    "slip": (2, 2),
+    "kinetic_energy": (),
+    "potential_energy": (),
+}
+REQUIRED = tuple(SHAPES)[:5]
+
+
+def ride(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
+    """Run a problem in an engine and look at what it gives.
+
+    A state that is not finite ends the ride before it.
+
+    Parameters
+    ----------
+    engine : Engine
+    problem : Problem
+    settings : Settings
+    progress : callable
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    EngineError
+        If the engine gives no trajectory, or one that is none of this problem: what is wrong with it.
+    Exception
+        Whatever the engine raises.
+    """
+    trajectory = engine.simulate(problem, settings, progress)
+    if not isinstance(trajectory, Trajectory):
+        raise EngineError(f"it gave a {type(trajectory).__name__}, not a Trajectory")
+    for wrong in _faults(engine, problem, trajectory):
+        raise EngineError(wrong)
+    finite = np.all([np.isfinite(_rows(getattr(trajectory, name))).all(axis=1) for name in REQUIRED], axis=0)
+    if finite.all():
+        return trajectory
+    bad = int(np.argmin(finite))
+    if bad == 0:
+        raise EngineError("its first state is not finite")
+    ended = f"its state is not finite at {trajectory.time[bad]:.6g} s"
+    return replace(trajectory.first(bad), ended=trajectory.ended or ended)
+
+
+def _rows(values: np.ndarray) -> np.ndarray:
+    return values.reshape(len(values), -1)
+
+
+def _faults(engine: Engine, problem: Problem, trajectory: Trajectory) -> Iterator[str]:
+    """What makes it no trajectory of the problem, in words."""
+    if trajectory.engine != engine.name:
+        yield f"its trajectory says that it is of {trajectory.engine!r}"
+    samples = np.size(trajectory.time)
+    for name, shape in SHAPES.items():
+        value = getattr(trajectory, name)
+        if value is None:
+            if name in REQUIRED:
+                yield f"its {name} is missing"
+            continue
+        if name not in (*REQUIRED, *engine.gives):
+            yield f"it gives {name}, which it does not list in gives"
+        if not isinstance(value, np.ndarray) or value.dtype.kind != "f":
+            yield f"its {name} is no array of floats"
+        elif value.shape != (samples, *shape):
+            yield f"its {name} has shape {value.shape}; it must be {(samples, *shape)}"
+    if samples == 0:
+        yield "its trajectory has no sample"
+    if samples > len(problem.times) or not np.array_equal(trajectory.time, problem.times[:samples]):
+        yield "its times are not the problem's, from the first on"
+    if samples < len(problem.times) and trajectory.ended is None:
+        yield f"it ends at {trajectory.time[-1]:.6g} s and does not say why"
+    for name in ("steps", "cpu_time"):
+        if not np.isfinite(getattr(trajectory, name)):
+            yield f"its {name} is {getattr(trajectory, name)!r}"
