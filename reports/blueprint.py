@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import rerun as rr
 import rerun.blueprint as rrb
 
 from engines.engine import REFERENCE
 
 from .ground import Ground
-from .plots import CONSTRAINTS, ENERGY, ERROR, FORCES, LOG_ENERGY, RADIUS, STATES, Plot
+from .plots import CHANGE, CONSTRAINTS, ENERGY, ERROR, FORCES, LOG_ENERGY, RADIUS, STATES, Plot
 
 BACKGROUND = (17, 19, 24)
 NEWTONS_PER_METRE = 500.0
@@ -21,13 +22,18 @@ _LEGEND_SHARE = 1.8  # of the height of another view: a legend of ten engines fi
 Curves = Mapping[str, Mapping[str, np.ndarray]]
 
 
+def world(engine: str) -> str:
+    """Path of the entity under which everything of an engine in space is."""
+    return rr.new_entity_path(["world", engine])
+
+
 def _trails(engines: Sequence[str], seconds: float | None) -> dict[Any, rrb.VisibleTimeRanges]:
     """Show the trails up to the cursor, all of them or the last seconds."""
     start = (
         rrb.TimeRangeBoundary.infinite() if seconds is None else rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds)
     )
     visible = rrb.VisibleTimeRanges(timeline="time", start=start, end=rrb.TimeRangeBoundary.cursor_relative())
-    return {f"/world/{engine}/trail/{part}": visible for engine in engines for part in ("rear", "front", "D")}
+    return {f"{world(engine)}/trail/{part}": visible for engine in engines for part in ("rear", "front", "D")}
 
 
 def overview(engines: Sequence[str], ground: Ground) -> rrb.Spatial3DView:
@@ -39,7 +45,7 @@ def overview(engines: Sequence[str], ground: Ground) -> rrb.Spatial3DView:
         target = np.array([-0.05 * size, -0.20 * size, bottom + 0.3 * depth])
         position = np.array([-0.45 * size, -1.62 * size, bottom + 0.90 * size + 2 * depth])
     else:
-        origin, target = f"/world/{engines[0]}/chase", np.array([0.4, 0.0, 0.2])
+        origin, target = f"{world(engines[0])}/chase", np.array([0.4, 0.0, 0.2])
         position = np.array([-2.4, -4.0, 2.2])
     eye = rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=position, look_target=target, eye_up=(0, 0, 1))
     return rrb.Spatial3DView(
@@ -62,9 +68,9 @@ def chase(engine: str, engines: Sequence[str]) -> rrb.Spatial3DView:
     )
     return rrb.Spatial3DView(
         name=f"Chase {engine}",
-        origin=f"/world/{engine}/chase",
-        contents=["+ /world/ground/**", *(f"+ /world/{name}/**" for name in shown)],
-        overrides={**_trails(shown, 2.0), **{f"/world/{name}/chase/name": hidden for name in shown}},
+        origin=f"{world(engine)}/chase",
+        contents=["+ /world/ground/**", *(f"+ {world(name)}/**" for name in shown)],
+        overrides={**_trails(shown, 2.0), **{f"{world(name)}/chase/name": hidden for name in shown}},
         background=BACKGROUND,
         line_grid=False,
         eye_controls=eye,
@@ -108,7 +114,7 @@ def _plot_tab(name: str, plots: Sequence[Plot], curves: Curves, columns: int) ->
     return rrb.Grid(*views, grid_columns=columns, name=name)
 
 
-def blueprint(engines: Sequence[str], ground: Ground, curves: Curves) -> rrb.Blueprint:
+def blueprint(engines: Sequence[str], ground: Ground, curves: Curves, modes: Sequence[Plot] = ()) -> rrb.Blueprint:
     """Layout of a recording: the ride left, curves and summary right, paused at the start.
 
     Parameters
@@ -119,11 +125,15 @@ def blueprint(engines: Sequence[str], ground: Ground, curves: Curves) -> rrb.Blu
         What is drawn of the surface.
     curves : mapping
         Samples by plot key and engine; a plot without any gets no view.
+    modes : sequence of Plot
+        Of the modes' amplitudes.
     """
+    where = RADIUS if ground.disc else STATES[1]
     tabs = (
-        _plot_tab("Comparison", (ERROR, LOG_ENERGY, STATES[0], RADIUS if ground.disc else STATES[1]), curves, 1),
+        _plot_tab("Comparison", (CHANGE, ERROR, LOG_ENERGY, STATES[0], where), curves, 1),
         _plot_tab("States", STATES, curves, 2),
         _plot_tab("Forces", FORCES, curves, 2),
+        _plot_tab("Modes", modes, curves, 1),
         _plot_tab("Constraints & energy", (*CONSTRAINTS, LOG_ENERGY, ENERGY), curves, 2),
         rrb.TextDocumentView(name="Summary", origin="/summary"),
     )

@@ -27,6 +27,9 @@ PALETTE: tuple[Colour, ...] = (
 )
 
 
+_SALT = "816:"  # of those tried the first by which the suite's own engines get different slots
+
+
 def colours(names: Iterable[str]) -> dict[str, Colour]:
     """Assign a colour to each engine name.
 
@@ -51,7 +54,7 @@ def colours(names: Iterable[str]) -> dict[str, Colour]:
             continue
         if len(taken) == len(PALETTE):
             taken.clear()  # more engines than hues: start a second round
-        slot = zlib.crc32(name.encode()) % len(PALETTE)
+        slot = zlib.crc32(f"{_SALT}{name}".encode()) % len(PALETTE)
         while slot in taken:
             slot = (slot + 1) % len(PALETTE)
         taken.add(slot)

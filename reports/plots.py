@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from engines.engine import REFERENCE, Trajectory
 from engines.friction import normal_force, required_friction
 from reference.kinematics import FRONT_ANGLE, LEAN, REAR_ANGLE, STEER, WHEELS, YAW
 from reference.surface import Surface
+
+from .limits import START_ERROR
+from .modes import Mode, Modes
 
 # Sizes below this are round-off of quantities of order one: they have no logarithm worth a point.
 SMALLEST_SIZE = 1e-16
@@ -27,10 +30,17 @@ class Ride:
     surface : Surface
     trajectories : mapping of str to Trajectory
         By engine name, in the order of display.
+    before : mapping of str to str
+        Where two runs are shown together: from the name of a trajectory to that of the earlier one that it is
+        held against.
+    modes : Modes or None
+        Of the motion that all started from.
     """
 
     surface: Surface
     trajectories: Mapping[str, Trajectory]
+    before: Mapping[str, str] = field(default_factory=dict)
+    modes: Modes | None = None
 
     @property
     def reference(self) -> Trajectory | None:
@@ -39,6 +49,7 @@ class Ride:
 
 
 Values = Callable[[Ride, Trajectory], np.ndarray | None]
+Curve = tuple[np.ndarray, np.ndarray]  # times [s] and values
 
 
 @dataclass(frozen=True)
@@ -57,12 +68,15 @@ class Plot:
     span : float
         Least height of the axis, so that round-off of a constant does not fill the view; 0 leaves
         the axis to the viewer.
+    expected : callable, optional
+        ride to the curve that theory expects, or None.
     """
 
     key: str
     title: str
     values: Values
     span: float = 0.0
+    expected: Callable[[Ride], Curve | None] = lambda _: None
 
 
 def nanoseconds(time: np.ndarray) -> np.ndarray:
@@ -81,12 +95,21 @@ def log_size(values: np.ndarray) -> np.ndarray:
 
 def position_error(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
     """Distance of D from the reference's [m], shape (n,), NaN at times the reference lacks."""
-    reference = ride.reference
-    if reference is None or trajectory is reference:
+    return _distance(trajectory, ride.reference)
+
+
+def position_change(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
+    """Distance of D from the earlier run's [m], shape (n,), NaN at times that run lacks."""
+    name = next((name for name, run in ride.trajectories.items() if run is trajectory), None)
+    return _distance(trajectory, ride.trajectories.get(ride.before.get(name or "", "")))
+
+
+def _distance(trajectory: Trajectory, other: Trajectory | None) -> np.ndarray | None:
+    if other is None or trajectory is other:
         return None
-    _, ours, theirs = np.intersect1d(nanoseconds(trajectory.time), nanoseconds(reference.time), return_indices=True)
+    _, ours, theirs = np.intersect1d(nanoseconds(trajectory.time), nanoseconds(other.time), return_indices=True)
     out = np.full(len(trajectory.time), np.nan)
-    out[ours] = np.linalg.norm(trajectory.q[ours, :3] - reference.q[theirs, :3], axis=1)
+    out[ours] = np.linalg.norm(trajectory.q[ours, :3] - other.q[theirs, :3], axis=1)
     return out
 
 
@@ -134,6 +157,7 @@ def _slip(_: Ride, trajectory: Trajectory) -> np.ndarray | None:
 
 
 ERROR = Plot("log_position_error", "log10 distance of D from the reference [m]", _log(position_error))
+CHANGE = Plot("log_position_change", "log10 distance of D from the earlier run [m]", _log(position_change))
 RADIUS = Plot("radius", "distance of D from the z axis [m]", lambda _, run: np.hypot(run.q[:, 0], run.q[:, 1]), 0.05)
 ENERGY = Plot("energy_change", "relative energy change [-]", energy_change, 1e-6)
 LOG_ENERGY = Plot("log_energy_change", "log10 relative energy change [-]", _log(energy_change))
@@ -160,4 +184,26 @@ CONSTRAINTS = (
     *(Plot(f"{w}_log_gap", f"log10 {w} gap [m]", _column(_log(_gap), k)) for k, w in enumerate(WHEELS)),
     *(Plot(f"{w}_log_slip", f"log10 {w} slip [m/s]", _column(_log(_slip), k)) for k, w in enumerate(WHEELS)),
 )
-PLOTS = (ERROR, RADIUS, LOG_ENERGY, ENERGY, *STATES, *FORCES, *CONSTRAINTS)
+PLOTS = (ERROR, CHANGE, RADIUS, LOG_ENERGY, ENERGY, *STATES, *FORCES, *CONSTRAINTS)
+
+
+def mode_plots(modes: Modes | None) -> tuple[Plot, ...]:
+    """A plot a mode: its amplitude, and how it would grow or decay by the linear law."""
+    return () if modes is None else tuple(_mode_plot(modes, k, mode) for k, mode in enumerate(modes.modes))
+
+
+def _mode_plot(modes: Modes, k: int, mode: Mode) -> Plot:
+    def values(_: Ride, trajectory: Trajectory) -> np.ndarray:
+        return log_size(modes.amplitude(mode, trajectory))
+
+    def expected(ride: Ride) -> Curve | None:
+        run = ride.reference or next(iter(ride.trajectories.values()))
+        begin = float(modes.amplitude(mode, run)[0])
+        if begin < START_ERROR:
+            return None  # not excited but by round-off
+        law = np.log10(begin) + mode.eigenvalue.real * run.time / np.log(10)
+        kept = law <= 0  # the law is that of small angles: far below 1
+        return run.time[kept], law[kept]
+
+    what = "rear rate" if mode.unit == "rad/s" else "angle"
+    return Plot(f"mode_{k}", f"{mode.title}: log10 {what} [{mode.unit}]", values, expected=expected)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -16,10 +16,11 @@ from reference.kinematics import WHEELS, YAW
 from reference.surface import Surface, unit_normals
 
 from .bicycle_shape import Mesh, body_meshes
-from .blueprint import NEWTONS_PER_METRE, blueprint
+from .blueprint import NEWTONS_PER_METRE, blueprint, world
 from .ground import LINE_LIFT, Ground, ground_of_ride
+from .modes import modes_of
 from .palette import Colour, colours
-from .plots import PLOTS, Ride, nanoseconds
+from .plots import PLOTS, Curve, Plot, Ride, mode_plots, nanoseconds
 
 APPLICATION = "velodrome"
 TRAIL_PIECES = 400  # the viewer queries a trail piece by piece: more would make playing stutter
@@ -30,6 +31,7 @@ INFLATION = 0.0015  # each bicycle is drawn this much fatter than the one before
 TRAIL_WIDTHS = (3.6, 2.2, 1.2, 0.8)  # trails on top of one another show as stripes [points on the screen]
 # The viewer draws curves in the order of their paths: the reference first and wide, the others on it.
 REFERENCE_CURVE, CURVE = 3.4, 2.0
+EXPECTED, EXPECTED_CURVE, EXPECTED_COLOUR = "linear law", 1.0, (150, 155, 165)
 ARROW_RADIUS = 0.009
 
 
@@ -59,7 +61,7 @@ class _Clock:
         ]
 
 
-def _bright(colour: Colour) -> Colour:
+def bright(colour: Colour) -> Colour:
     """Half way to white, to stand out from a bicycle of the same colour."""
     red, green, blue = ((c + 255) // 2 for c in colour)
     return red, green, blue
@@ -136,7 +138,7 @@ def _send_contacts(
         _send_trail(stream, f"{root}/trail/{wheel}", above, run, clock)
         if run.contact_force is not None:
             vector = run.contact_force[:, k] / NEWTONS_PER_METRE
-            arrow = rr.Arrows3D.from_fields(radii=ARROW_RADIUS, colors=_bright(colour))
+            arrow = rr.Arrows3D.from_fields(radii=ARROW_RADIUS, colors=bright(colour))
             stream.log(f"{root}/force/{wheel}", arrow, static=True)
             stream.send_columns(f"{root}/force/{wheel}", index, rr.Arrows3D.columns(origins=point, vectors=vector))
 
@@ -156,16 +158,24 @@ def _send_name(
         stream.send_columns(f"{root}/ended", clock.columns(run.time[-1:]), columns)
 
 
-def _curves(ride: Ride) -> dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]:
+def _curves(ride: Ride, plots: Iterable[Plot]) -> dict[str, dict[str, Curve]]:
     """Finite samples of every plot: key -> engine -> (times, values); what is absent has no entry."""
-    curves: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = {}
-    for plot in PLOTS:
+    curves: dict[str, dict[str, Curve]] = {}
+    for plot in plots:
+        found: dict[str, Curve] = {}
         for name, run in ride.trajectories.items():
             values = plot.values(ride, run)
             if values is None or not np.isfinite(values).any():
                 continue
             kept = np.isfinite(values)
-            curves.setdefault(plot.key, {})[name] = (run.time[kept], values[kept])
+            found[name] = run.time[kept], values[kept]
+        law = plot.expected(ride)
+        if law is not None and found:
+            # What decays below all that is measured would only stretch the axis.
+            kept = law[1] >= min(values.min() for _, values in found.values())
+            found |= {EXPECTED: (law[0][kept], law[1][kept])} if kept.any() else {}
+        if found:
+            curves[plot.key] = found
     return curves
 
 
@@ -176,6 +186,10 @@ def write_recording(
     surface: Surface,
     trajectories: Mapping[str, Trajectory],
     summary: str,
+    *,
+    undisturbed: tuple[np.ndarray, np.ndarray] | None = None,
+    before: Mapping[str, str] | None = None,
+    paint: Mapping[str, Colour] | None = None,
 ) -> None:
     """Write a recording with its layout, whole or not at all.
 
@@ -192,27 +206,37 @@ def write_recording(
         None are left out of the recording.
     summary : str
         Markdown for the summary tab.
+    undisturbed : tuple of ndarray, shapes (9,), optional
+        Coordinates and rates of the steady motion that the rides started from, on a surface of revolution or a
+        plane: its modes get a tab.
+    before : mapping of str to str, optional
+        Where two runs are shown together: from a trajectory to the earlier one that it is held against.
+    paint : mapping, optional
+        Colours by name; those of `palette.colours` if not given.
 
     Raises
     ------
     ValueError
-        If there is no trajectory, or one has no sample.
+        If there is no trajectory, one has no sample, or the motion cannot be linearised.
     """
     if not trajectories or any(len(run.time) == 0 for run in trajectories.values()):
         raise ValueError("a recording needs at least one trajectory, and each at least one sample")
+    modes = None if undisturbed is None else modes_of(bicycle, surface, *undisturbed)
+    ride = Ride(surface, trajectories, before or {}, modes)
     with whole(path) as partial, _strict():
-        _write(partial, title, bicycle, Ride(surface, trajectories), summary)
+        _write(partial, title, bicycle, ride, summary, paint or colours(trajectories))
 
 
-def _write(path: Path, title: str, bicycle: Bicycle, ride: Ride, summary: str) -> None:
+def _write(path: Path, title: str, bicycle: Bicycle, ride: Ride, summary: str, paint: Mapping[str, Colour]) -> None:
     """Write the whole recording to a path."""
-    curves = _curves(ride)
+    own = mode_plots(ride.modes)
+    curves = _curves(ride, (*PLOTS, *own))
     places = np.concatenate([run.q[:, :2] for run in ride.trajectories.values()])
     ground = ground_of_ride(ride.surface, places[np.isfinite(places).all(axis=1)])
     layout = blueprint(
-        tuple(ride.trajectories), ground, {key: {e: v for e, (_, v) in by.items()} for key, by in curves.items()}
+        tuple(ride.trajectories), ground, {key: {e: v for e, (_, v) in by.items()} for key, by in curves.items()}, own
     )
-    clock, paint, meshes = _Clock(ride.trajectories), colours(ride.trajectories), body_meshes(bicycle)
+    clock, meshes = _Clock(ride.trajectories), body_meshes(bicycle)
     stream = rr.RecordingStream(APPLICATION)
     try:
         stream.save(path, default_blueprint=layout)
@@ -221,17 +245,29 @@ def _write(path: Path, title: str, bicycle: Bicycle, ride: Ride, summary: str) -
         stream.log("/summary", rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
         _log_ground(stream, ground)
         for place, (name, run) in enumerate(ride.trajectories.items()):
-            root = f"/world/{name}"
+            root = world(name)
             for body in BODIES:
                 _log_mesh(stream, f"{root}/{body}/shape", meshes[body].inflated(place * INFLATION), paint[name])
             _send_bodies(stream, root, run, clock)
             _send_contacts(stream, root, run, ride.surface, paint[name], place, clock)
             _send_name(stream, root, name, place, run, paint[name], clock)
         for key, by_engine in curves.items():
-            for name, (time, values) in by_engine.items():
-                entity = f"/plots/{key}/{name}" if name == REFERENCE else f"/plots/{key}/tested/{name}"
-                width = REFERENCE_CURVE if name == REFERENCE else CURVE
-                stream.log(entity, rr.SeriesLines(names=name, colors=paint[name], widths=width), static=True)
-                stream.send_columns(entity, clock.columns(time), rr.Scalars.columns(scalars=values))
+            for name, curve in by_engine.items():
+                _send_curve(stream, key, name, curve, paint, clock)
     finally:
         stream.disconnect()
+
+
+def _send_curve(
+    stream: rr.RecordingStream, key: str, name: str, curve: Curve, paint: Mapping[str, Colour], clock: _Clock
+) -> None:
+    """One engine's curve of a plot, or the one that theory expects."""
+    if name == EXPECTED:
+        entity, colour, width = [key, "expected"], EXPECTED_COLOUR, EXPECTED_CURVE
+    elif name == REFERENCE:
+        entity, colour, width = [key, name], paint[name], REFERENCE_CURVE
+    else:
+        entity, colour, width = [key, "tested", name], paint[name], CURVE
+    path = rr.new_entity_path(["plots", *entity])
+    stream.log(path, rr.SeriesLines(names=name, colors=colour, widths=width), static=True)
+    stream.send_columns(path, clock.columns(curve[0]), rr.Scalars.columns(scalars=curve[1]))

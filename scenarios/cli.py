@@ -270,6 +270,33 @@ def precision_command(
         Console().print(f"written: {path}", markup=False, highlight=False, soft_wrap=True)
 
 
+@app.command("diff")
+def diff_command(
+    before: Annotated[Path, typer.Argument(metavar="RUN", help="The earlier run's folder.")],
+    after: Annotated[Path, typer.Argument(metavar="RUN", help="The later run's folder.")],
+    engine: Annotated[list[str] | None, typer.Option(help="Compare only this engine, beside the reference.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for diff.json, diff.md and the recording diff.rrd.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Two stored runs of one scenario against each other: what moved by more than round-off."""
+    from rich.console import Console
+
+    from .diff import diff, read_pair, write_diff
+    from .present_diff import show_diff
+
+    pair = read_pair(before, after, engine)
+    found = diff(pair)
+    written = [] if out is None else write_diff(pair, found, out)
+    if as_json:
+        _print_json(found)
+    else:
+        show_diff(Console(), found)
+        for path in written:
+            Console().print(f"written: {path}", markup=False, highlight=False, soft_wrap=True)
+    if not found["same"]:
+        raise typer.Exit(1)
+
+
 @app.command("view")
 def view_command(
     run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],

@@ -143,7 +143,9 @@ def record(
     steady = isinstance(problem.surface, SurfaceOfRevolution)
     facts = (plan.start.growth_rate, plan.scenario.simulation.duration, steady)
     text = summary(plan.scenario.title, measured, failures, verdicts, *facts)
-    write_recording(folder / "comparison.rrd", plan.scenario.title, problem.bicycle, problem.surface, shown, text)
+    where = (plan.scenario.title, problem.bicycle, problem.surface)
+    undisturbed = plan.start.undisturbed if steady else None
+    write_recording(folder / "comparison.rrd", *where, shown, text, undisturbed=undisturbed)
 
 
 def write_page(

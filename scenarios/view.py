@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from engines.storage import read_trajectory
 from reports.fall import as_shown
@@ -16,6 +14,7 @@ from .files import write_text
 from .page_server import LOOPBACK, PageServer
 from .replay import ReplayError, rerun, viewer_files
 from .scenario import load_scenario
+from .stored import document, part
 
 RECORDING, REPORT = "comparison.rrd", "report.html"
 
@@ -28,7 +27,7 @@ def open_native(folder: Path) -> None:
     ScenarioError
         If the folder has no recording, or the viewer cannot run here.
     """
-    command = native_command(_part(folder, RECORDING))
+    command = native_command(part(folder, RECORDING))
     try:
         status = subprocess.call(command)
     except OSError as error:
@@ -69,7 +68,7 @@ def serve(folder: Path, port: int, ready: Callable[[str], None]) -> None:
 
 def page_server(folder: Path, port: int) -> PageServer:
     """The server of `serve`, listening but not yet answering."""
-    _part(folder, RECORDING)
+    part(folder, RECORDING)
     if not (folder / REPORT).is_file():
         text = stored_page(folder)
         try:
@@ -110,36 +109,14 @@ def stored_page(folder: Path) -> str:
 
     from reports.page import page
 
-    manifest, measured = _document(folder, "manifest.json"), _document(folder, "metrics.json")
-    _, scenario = load_scenario(str(_part(folder, "scenario.toml")))
+    manifest, measured = document(folder, "manifest.json"), document(folder, "metrics.json")
+    _, scenario = load_scenario(str(part(folder, "scenario.toml")))
     try:
         where = scenario.make_bicycle(), scenario.surface.make()
-        runs = {name: as_shown(read_trajectory(_part(folder, f"{name}.parquet")), *where) for name in measured}
+        runs = {name: as_shown(read_trajectory(part(folder, f"{name}.parquet")), *where) for name in measured}
         verdicts = manifest.get("verdicts", [])
         return page(manifest, scenario.model_dump(), measured, verdicts, runs, where[1])
     except (KeyError, TypeError, AttributeError, TemplateError) as error:
         raise ScenarioError(f"{folder}: not the files of one run: {type(error).__name__}: {error}") from error
     except ValueError as error:
         raise ScenarioError(str(error)) from error
-
-
-def _document(folder: Path, name: str) -> Mapping[str, Any]:
-    path = _part(folder, name)
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise ScenarioError(f"{path}: not a JSON document: {error}") from error
-    if not isinstance(document, dict):
-        raise ScenarioError(f"{path}: not a JSON object")
-    return document
-
-
-def _part(folder: Path, name: str) -> Path:
-    """A file of a run folder, which must be there."""
-    if not folder.is_dir():
-        raise ScenarioError(f"{folder}: no such folder; velodrome run writes one and says where")
-    if not (folder / name).is_file():
-        raise ScenarioError(f"{folder}: not the folder of a finished run: it has no {name}")
-    return folder / name

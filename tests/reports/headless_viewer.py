@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from PIL import Image
 from rerun.experimental import ViewerClient
 
@@ -81,6 +82,19 @@ def open_tabs(client: ViewerClient, tabs: Sequence[str]) -> None:
             if container.get("container_kind") == "Tabs" and names.get(child) in tabs:
                 container["active_tab"] = child
     client.set_blueprint(parts, of="recording")
+
+
+def switch(client: ViewerClient, view: str, entity: str, visible: bool) -> None:
+    """Show an entity and all below it in the view of this name, or do not."""
+    parts = client.get_blueprint().blueprint
+    [path] = [f"/{path}" for path, name in _names(parts).items() if name == view]
+    parts[f"{path}/ViewContents/overrides{entity}/visualizers"] = {"EntityBehavior": {"visible": visible}}
+    client.set_blueprint(parts, of="recording")
+
+
+def pixels(client: ViewerClient, seconds: float) -> np.ndarray:
+    """The window at a time, shape (rows, columns, 3)."""
+    return np.asarray(Image.open(io.BytesIO(picture(client, seconds))).convert("RGB")).astype(int)
 
 
 def picture(client: ViewerClient, seconds: float) -> bytes:

@@ -118,10 +118,13 @@ def test_an_earlier_fall_is_worse_and_one_that_is_new_too(
 def test_a_lower_order_is_worse() -> None:
     entry = ENTRY | {"quantities": {"observed_order": 2.0}}
     found = {}
-    for value in (1.0, 1.995, 4.0):
+    for value in (1.0, 1.995, 1.9, 4.0):
         (verdict,) = judge("exudyn", {"observed_order": value}, entry, {"observed_order": 0.01}, SETTINGS, "1.1")
         found[value] = verdict.status
-    assert found == {1.0: "worse", 1.995: "holds", 4.0: "better"}
+    # 1.9 is an order of two as well, of another version; of the same it is a fault.
+    assert found == {1.0: "worse", 1.995: "holds", 1.9: "holds", 4.0: "better"}
+    (verdict,) = judge("exudyn", {"observed_order": 1.9}, entry, {"observed_order": 0.01}, SETTINGS, "1.0")
+    assert verdict.status == "worse"
 
 
 def test_another_number_of_steps_is_neither_worse_nor_better() -> None:

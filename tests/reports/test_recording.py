@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,24 +10,25 @@ import numpy as np
 import pyarrow as pa
 import pytest
 import rerun as rr
-from PIL import Image
 from rerun.chunk import RrdReader
 
-from engines.engine import REFERENCE, Trajectory
+from engines.engine import REFERENCE, Problem, Trajectory, engine_names, load_engine
 from reference.bicycle import BODIES, Bicycle
 from reference.contact import observe
 from reference.dae import consistent_state, dynamics
+from reference.families import find_motion
 from reference.kinematics import LEAN, STEER, WHEELS, YAW, body_positions, quaternions, rotations
 from reference.surface import Paraboloid, Plane, evaluate
 from reports import bicycle_shape, ground, recording
 from reports.palette import PALETTE, REFERENCE_COLOUR, colours
-from reports.plots import FORCES, PLOTS, SMALLEST_SIZE, log_size, nanoseconds
+from reports.plots import CHANGE, ERROR, FORCES, PLOTS, SMALLEST_SIZE, log_size, nanoseconds
 from reports.recording import write_recording
 
 BICYCLE = Bicycle()
 BOWL = Paraboloid(0.005)
 SUMMARY = "# A ride\n\n| engine | error |\n|---|---|\n| one | 1e-4 |\n"
 SAMPLES = 201
+SCENE = 1100  # columns of the window that show the ride
 EPSILON = float(np.finfo(np.float32).eps)  # what space is stored in
 
 
@@ -245,7 +245,9 @@ def test_every_plot_has_every_engine_that_can_fill_it(content: Content, runs: di
     found = content.entities()
     always = {"log_position_error", "radius", "lean", "steer", "lean_rate", "yaw_rate", "rear_rate", "front_rate"}
     for plot in PLOTS:
-        assert (f"/plots/{plot.key}/{REFERENCE}" in found) == (plot.key != "log_position_error")
+        if plot is CHANGE:
+            continue  # of two runs only
+        assert (f"/plots/{plot.key}/{REFERENCE}" in found) == (plot is not ERROR)
         for name in runs:
             if name != REFERENCE:
                 assert (f"/plots/{plot.key}/tested/{name}" in found) == (name != "bare" or plot.key in always), plot.key
@@ -351,13 +353,60 @@ def test_picture_shows_every_engine(rrd: Path, runs: dict[str, Trajectory]) -> N
     with viewer.viewer(rrd) as client:
         views = {view.name for view in client.get_state().views}
         assert {f"Chase {name}" for name in runs} | {"lean [rad]", "Summary"} <= views
-        pixels = np.asarray(Image.open(io.BytesIO(viewer.picture(client, 1.5))).convert("RGB")).astype(int)
+        seen = viewer.pixels(client, 1.5)
         assert viewer.complaints(client) == []
-    scene, plots = pixels[:, :1100], pixels[:, 1160:]
+    scene, plots = seen[:, :SCENE], seen[:, 1160:]
     for name, colour in colours(runs).items():
         # Curves are drawn unlit in the very colour; tubes are shaded, so the ride shows darker tones of it.
         assert (np.abs(plots - colour).max(-1) < 24).sum() > 100, name
-        unit = np.asarray(colour) / np.linalg.norm(colour)
-        length = np.linalg.norm(scene, axis=-1)
-        alike = (scene @ unit > 0.995 * length) & (length > 120)
-        assert alike.sum() > 400, name
+        assert alike(scene, colour).sum() > 400, name
+
+
+def alike(pixels: np.ndarray, colour: tuple[int, int, int], least: float = 120.0) -> np.ndarray:
+    """Whether pixels (..., 3) have the hue of a colour, and are not dark."""
+    unit = np.asarray(colour) / np.linalg.norm(colour)
+    length = np.linalg.norm(pixels, axis=-1)
+    return (pixels @ unit > 0.995 * length) & (length > least)
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
+    """Half a second on a circle of the level plane, where every installed engine can ride."""
+    surface = Plane()
+    _, motion = find_motion(BICYCLE, surface, 18.0, 2, (0.74, 2.84))
+    problem = Problem(BICYCLE, surface, *motion.state(), np.arange(26) * 0.02)
+    found = {}
+    for name in engine_names():
+        engine = load_engine(name)
+        found[name] = engine.simulate(problem, engine.settings(), lambda _: None)
+    path = tmp_path_factory.mktemp("real") / "comparison.rrd"
+    write_recording(path, "A circle", BICYCLE, surface, found, SUMMARY, undisturbed=motion.state())
+    return path, list(found)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(viewer.missing() is not None, reason=str(viewer.missing()))
+def test_every_engine_of_a_real_run_can_be_seen_and_switched_off(real: tuple[Path, list[str]]) -> None:
+    path, names = real
+    assert len(names) >= 8
+    with viewer.viewer(path) as client:
+        for name in names:
+            view = f"Chase {name}"
+            viewer.open_tabs(client, [view])
+            shown = viewer.pixels(client, 0.3)
+            viewer.switch(client, view, f"/world/{name}", visible=False)
+            hidden = viewer.pixels(client, 0.3)
+            # Where nothing changes stand the ground and the window; what is drawn of the engine covers the rest.
+            changed = np.abs(shown - hidden).max(-1) > 24
+            changed[:, SCENE:] = False
+            # The ground's grey has the reference's hue, but is darker.
+            least = 1.2 * float(np.linalg.norm(recording.GROUND_HIGH)) if name == REFERENCE else 120.0
+            mine = [alike(window[changed], colours(names)[name], least).sum() for window in (shown, hidden)]
+            assert mine[0] > 2000, name
+            assert mine[1] < 0.01 * mine[0], name
+        viewer.open_tabs(client, ["Overview (arrows: contact force, 1 m = 500 N)", "Modes"])
+        viewer.pixels(client, 0.3)
+        assert {"castering", "capsize", "weave", "family"} <= {
+            view.name.split()[0] for view in client.get_state().views
+        }
+        assert viewer.complaints(client) == []
