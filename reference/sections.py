@@ -1,4 +1,4 @@
-"""Stability along a family: eigenvalues, their modes, and the Lyapunov-stable sections."""
+"""Stability along a family: eigenvalues and the Lyapunov-stable sections."""
 
 from __future__ import annotations
 
@@ -6,15 +6,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from .circular import CircularMotion, Steady
 from .continuation import Point, least_between, root_between
 from .curve import Samples, sample
 from .families import Family
 from .stability import Linearisation, free_eigenvalues, linearise
-
-MODES = ("family", "castering", "capsize", "weave", "orbital")
 
 
 @dataclass(frozen=True)
@@ -123,45 +120,3 @@ def _end(equations: Steady, point: Point, cause: str | None = None) -> SectionEn
     critical = complex(critical.real, abs(critical.imag))
     # Two zeros that meet split by the root of round-off, 1e-7; the slowest pair that crosses turns at 1/s.
     return SectionEnd(cause or ("hopf" if critical.imag > 1e-3 else "energy"), motion, critical)
-
-
-def modes(family: Family) -> np.ndarray:
-    """Eigenvalues along a family with their modes, followed by continuity.
-
-    The first point's are named by what they are on the plane: the zero of the family, the orbital pair
-    near +-i times the yaw rate, the fast real castering root, and of the rest the complex pair weave, the
-    real root capsize. From there each point's other six are matched with its neighbour's as a whole.
-
-    Parameters
-    ----------
-    family : Family
-
-    Returns
-    -------
-    ndarray, shape (n, 7), complex
-        Columns family, castering, capsize, weave (2), orbital (2).
-    """
-    seen = sample_family(family)
-    rows = [_named(seen.eigenvalues[0], float(seen.yaw_rate[0]))]
-    for eigenvalues in seen.eigenvalues[1:]:
-        # Where a root passes zero, continuity cannot tell it from the family's own zero.
-        zero = np.abs(eigenvalues).argmin()
-        rest = np.delete(eigenvalues, zero)
-        cost = np.abs(rows[-1][1:, None] - rest[None, :])
-        rows.append(np.append(eigenvalues[zero], rest[linear_sum_assignment(cost)[1]]))
-    return np.array(rows)
-
-
-def _named(eigenvalues: np.ndarray, yaw_rate: float) -> np.ndarray:
-    rest = list(eigenvalues)
-
-    def take(target: complex) -> complex:
-        nearest = min(rest, key=lambda value: abs(value - target))
-        rest.remove(nearest)
-        return nearest
-
-    zero = take(0)
-    orbital = [take(complex(0, yaw_rate)), take(complex(0, -yaw_rate))]
-    castering = take(min(value.real for value in rest))
-    capsize = take(min((value for value in rest), key=lambda value: (abs(value.imag), -value.real)))
-    return np.array([zero, castering, capsize, *sorted(rest, key=lambda value: value.imag), *orbital])

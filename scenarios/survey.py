@@ -11,7 +11,8 @@ import numpy as np
 from reference.bicycle import Bicycle
 from reference.critical import CriticalPoint, last_stable, reconnections
 from reference.families import FAMILIES, Family, trace_all
-from reference.sections import SectionEnd, modes, sample_family, stable_sections
+from reference.modes import MODES, modes
+from reference.sections import SectionEnd, sample_family, stable_sections
 from reference.special import special_points
 from reference.surface import Surface
 
@@ -45,6 +46,7 @@ def families_document(ground: Surface | float) -> dict[str, Any]:
     families = [family_document(curve) for curve in curves]
     return {
         **named(surface),
+        "modes": list(MODES),  # what the columns of eigenvalues are
         "families": families,
         "absent": {str(number): reason for number, reason in absent.items()},
     }

@@ -10,8 +10,9 @@ from reference.bicycle import Bicycle
 from reference.circular import LEAN, REAR_SPEED, SIGMA, STEER, Steady
 from reference.continuation import FARTHEST, LARGEST_LEAN, LARGEST_SIGMA, crossings, root_between
 from reference.families import FAMILIES, Family, find_motion, front_rate_slope, motions, trace, trace_all
+from reference.modes import modes
 from reference.profile import SplineProfile
-from reference.sections import growth_along, modes, sample_family, stable_sections
+from reference.sections import growth_along, sample_family, stable_sections
 from reference.special import SpecialPoint, special_points
 from reference.surface import Paraboloid
 from tests.literature import published, rounds_to
@@ -316,6 +317,32 @@ def test_modes_are_followed_by_continuity() -> None:
     # The first column is the zero of the family; conditioning leaves 1e-6 next to a double zero.
     assert np.abs(rows[:, 0]).max() < 1e-4
     assert growth_along(curve.equations, curve.points[0]) > 0
+
+
+@pytest.mark.parametrize("alpha", [0.0, 0.005, 0.2])
+@pytest.mark.parametrize("number", [1, 2, 3, 4])
+def test_no_pair_is_torn_apart(alpha: float, number: int) -> None:
+    rows = modes(family(alpha, number, 0.05))
+    for start in (1, 3, 5):
+        first, second = rows[:, start], rows[:, start + 1]
+        real = (np.imag(first) == 0) & (np.imag(second) == 0)
+        assert np.all(real | (np.abs(first - np.conj(second)) <= 1e-8 * (1 + np.abs(first))))
+
+
+def test_modes_have_the_names_that_they_have_on_the_plane() -> None:
+    for number in (1, 2, 3, 4):
+        curve = family(0.0, number, 0.05)
+        rows, yaw_rate = modes(curve), sample_family(curve).yaw_rate
+        # The circle's centre is free. The eigenvalues of a nearly double pair are known to the root of round-off.
+        distance = np.abs(rows[:, 5:] - 1j * yaw_rate[:, None] * [[1, -1]]).min(axis=1)
+        assert np.median(distance) < 1e-9
+    # Q2: in the bowl the centre is held, and its pair turns a little faster than the yaw.
+    curve = family(0.005, 2, 0.05)
+    angles = np.array([point.unknowns[[LEAN, STEER]] for point in curve.points])
+    named = modes(curve)[np.linalg.norm(angles - (0.7374, 2.837), axis=1).argmin()]
+    # Points are 0.05 of arc apart, along which the fastest eigenvalue moves by 1.
+    assert np.abs(named[1:4] - [-12.28, -0.43, -0.14 - 6.71j]).max() < 1
+    assert np.abs(np.imag(named[5:])).max() == pytest.approx(2.35, abs=0.1)
 
 
 def test_a_family_stops_at_the_pivot() -> None:
