@@ -1,0 +1,1 @@
+"""The commands of `velodrome`; each imports what it needs, and none of them waits for the others'."""

@@ -1,0 +1,63 @@
+"""The drift gate: `check`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..error import ScenarioError
+from .options import Json, print_json
+
+
+def check_command(
+    scenario: Annotated[
+        list[str] | None, typer.Argument(help="Library names or paths to TOML files; all gated ones if none is named.")
+    ] = None,
+    engine: Annotated[list[str] | None, typer.Option(help="Judge only this engine.")] = None,
+    baselines: Annotated[Path | None, typer.Option(help="Folder of the baselines instead of the suite's own.")] = None,
+    update: Annotated[bool, typer.Option("--update", help="Write this run's values as the new baselines.")] = False,
+    reason: Annotated[str | None, typer.Option(help="Why, for the new baselines; what moved if not given.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write the verdicts as JUnit XML.")] = None,
+    markdown: Annotated[Path | None, typer.Option(help="Write the verdicts as Markdown, worst first.")] = None,
+    as_json: Json = False,
+) -> None:
+    """The drift gate: run the gated scenarios and hold them against the committed baselines."""
+    from rich.console import Console
+
+    from engines.engine import engine_names
+    from reports.verdicts import junit_xml, markdown_page
+
+    from .. import gate, present
+    from ..files import write_text
+
+    if reason is not None and not update:
+        raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
+    console = Console(stderr=as_json)
+    with present.Progress() as progress:
+        verdicts, fresh = gate.check(progress.watch, scenario, engine, baselines)
+    for path, page in ((junit, junit_xml), (markdown, markdown_page)):
+        if path is not None:
+            write_text(path, page(verdicts))
+    written = []
+    if update:
+        # An engine that is not installed any more leaves the baselines; one that broke must not.
+        absent = [
+            verdict
+            for _, verdict in verdicts
+            if verdict.engine in engine_names() and verdict.quantity == "run" and verdict.reason.startswith("did not")
+        ]
+        if absent:
+            raise ScenarioError(f"no baseline written: {absent[0].engine} {absent[0].reason}")
+        written = [str(path) for path in gate.update(fresh, verdicts, reason, baselines)]
+    passes = update or all(verdict.passes for _, verdict in verdicts)
+    if as_json:
+        rows = [{"scenario": name} | verdict.as_json() for name, verdict in verdicts]
+        print_json({"passes": passes, "updated": written, "verdicts": rows})
+    else:
+        present.show_verdicts(console, verdicts, renewed=update)
+        for path in written:
+            console.print(f"baseline written: {path}", soft_wrap=True)
+    if not passes:
+        raise typer.Exit(1)

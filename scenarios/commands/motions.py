@@ -1,0 +1,92 @@
+"""Circular motions: `circular`, `families`, `critical`, `atlas`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import STARTING, Alpha, Ground, Json, angles_of, ground_of, print_json
+
+
+def circular_command(
+    rear_rate: Annotated[float, typer.Option(max=1e4, help="Rear-wheel rate [rad/s].")],
+    alpha: Alpha = None,
+    surface: Ground = None,
+    family: Annotated[int | None, typer.Option(help="Solution family, 1 to 4.")] = None,
+    near: Annotated[str | None, typer.Option(metavar="LEAN,STEER", help="Angles it is near to [rad].")] = None,
+    as_json: Json = False,
+) -> None:
+    """One circular motion: its 21 constants, contact forces, eigenvalues, verdict on stability."""
+    from rich.console import Console
+
+    from .. import present
+
+    angles, ground = angles_of(near), ground_of(alpha, surface)
+    with present.working(STARTING):
+        found = present.circular(ground, rear_rate, family, angles)
+    if as_json:
+        print_json(found)
+    else:
+        present.show_circular(Console(), found)
+
+
+def families_command(
+    alpha: Alpha = None,
+    surface: Ground = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for families.json and the figure families.png.")] = None,
+    as_json: Json = False,
+) -> None:
+    """The four solution families by continuation: special points, stable sections."""
+    from rich.console import Console
+
+    from .. import present
+    from ..survey import families_document, write_families
+
+    ground = ground_of(alpha, surface)
+    with present.working(STARTING):
+        document = families_document(ground)
+    if out is not None:
+        write_families(document, out)
+    if as_json:
+        print_json(document)
+    else:
+        present.show_families(Console(), document)
+
+
+def critical_command(as_json: Json = False) -> None:
+    """The critical α: cusps collide, families merge, their last stable sections vanish."""
+    from rich.console import Console
+
+    from .. import present
+    from ..survey import critical_document
+
+    with present.Progress() as progress:
+        document = critical_document(progress.watch)
+    if as_json:
+        print_json(document)
+    else:
+        present.show_critical(Console(), document)
+
+
+def atlas_command(
+    out: Annotated[
+        Path, typer.Option(help="Folder for atlas.parquet (some 60 MB), boundaries.json and the figures.")
+    ] = Path("atlas"),
+    size: Annotated[int, typer.Option(help="Number of motions, roughly.")] = 400_000,
+    largest: Annotated[float, typer.Option(help="Largest alpha [1/m], at most 1.")] = 1.0,
+    as_json: Json = False,
+) -> None:
+    """Stability of all circular motions over alpha and rear rate: data, boundaries, figures (half a minute)."""
+    from rich.console import Console
+
+    from .. import present
+    from ..atlas import make_atlas
+
+    with present.Progress() as progress:
+        document = make_atlas(out, size, largest, lambda done: progress.watch("atlas", done, 1.0))
+    if as_json:
+        print_json(document)
+    else:
+        present.show_atlas(Console(), document, out)

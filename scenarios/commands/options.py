@@ -1,0 +1,77 @@
+"""Options that commands share, and what their texts mean."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..error import ScenarioError
+
+if TYPE_CHECKING:
+    from reference.surface import Surface
+
+STARTING = "computing the motion (the first time on a machine, kernels are compiled: half a minute)"
+
+Alpha = Annotated[
+    float | None, typer.Option("--alpha", help="Shape of the bowl z = alpha (x² + y²) [1/m]; 0 is the plane.")
+]
+Ground = Annotated[
+    str | None,
+    typer.Option("--surface", metavar="KIND:KEY=VALUE,...", help="Another bowl instead, e.g. sphere:radius=20."),
+]
+Changes = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a field, e.g. simulation.duration=5.")
+]
+Duration = Annotated[float | None, typer.Option(help="Simulated time [s].")]
+Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else.")]
+
+
+def changed(change: list[str] | None, duration: float | None) -> dict[str, Any]:
+    """Fields that --set and --duration override."""
+    changes = dict(_assignment(text) for text in change or [])
+    if duration is not None:
+        changes["simulation.duration"] = duration
+    return changes
+
+
+def _assignment(text: str) -> tuple[str, Any]:
+    """Split KEY=VALUE; the value is TOML, or a plain word."""
+    key, equals, value = text.partition("=")
+    key = key.strip()
+    if not equals or not key or not all(key.split(".")):
+        raise ScenarioError(f"--set {text}: must be KEY=VALUE, e.g. simulation.duration=5")
+    try:
+        return key, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key, value
+
+
+def angles_of(text: str | None) -> tuple[float, float] | None:
+    """Lean and steer that ``--near`` gives [rad]."""
+    if text is None:
+        return None
+    try:
+        lean, steer = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ScenarioError(f"--near {text}: must be two angles LEAN,STEER in rad, e.g. 0.74,2.84") from None
+    return lean, steer
+
+
+def ground_of(alpha: float | None, surface: str | None) -> Surface | float:
+    """What a motion rides on: one of --alpha and --surface."""
+    if (alpha is None) == (surface is None):
+        raise ScenarioError("give the bowl by one of --alpha and --surface, e.g. --alpha 0.005")
+    if surface is None:
+        assert alpha is not None
+        return alpha
+    from ..surfaces import parse_surface
+
+    return parse_surface(surface)
+
+
+def print_json(data: Any) -> None:
+    """Print one JSON document, and nothing else."""
+    print(json.dumps(data, indent=1, allow_nan=False))

@@ -1,0 +1,111 @@
+"""What there is, and the main job: `list` and `run`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..error import ScenarioError
+from .options import STARTING, Changes, Duration, Json, changed, print_json
+
+if TYPE_CHECKING:
+    from ..run_folder import Plan
+
+
+def list_command(as_json: Json = False) -> None:
+    """Scenarios of the library and installed engines."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from engines.engine import engine_names, load_engine
+
+    from ..scenario import library_names, load_scenario
+
+    scenarios = []
+    for name in library_names():
+        _, scenario = load_scenario(name)
+        scenarios.append({"name": name, "title": scenario.title, "tags": list(scenario.tags)})
+    engines = []
+    for name in engine_names():
+        try:
+            engine = load_engine(name)
+            engines.append({"name": name, "version": engine.version, "gives": list(engine.gives)})
+        except ValueError as error:
+            engines.append({"name": name, "version": None, "gives": [], "error": " ".join(str(error).split())})
+    if as_json:
+        print_json({"scenarios": scenarios, "engines": engines})
+        return
+    table = Table("scenario", "title", "tags", box=None, pad_edge=False)
+    for entry in scenarios:
+        table.add_row(entry["name"], entry["title"], ", ".join(entry["tags"]))
+    console = Console()
+    console.print(table)
+    console.print()
+    table = Table("engine", "version", "gives, beside coordinates and poses", box=None, pad_edge=False)
+    for entry in engines:
+        given = Text(entry["error"], "red") if "error" in entry else ", ".join(entry["gives"])
+        table.add_row(entry["name"], entry["version"] or "–", given)
+    console.print(table)
+
+
+def run_command(
+    scenario: Annotated[list[str] | None, typer.Argument(help="Library names or paths to TOML files.")] = None,
+    engine: Annotated[list[str] | None, typer.Option(help="Run only this engine, beside the reference.")] = None,
+    tag: Annotated[str | None, typer.Option(help="Run all library scenarios with this tag.")] = None,
+    change: Changes = None,
+    duration: Duration = None,
+    out: Annotated[Path, typer.Option(help="Folder for the run folders.")] = Path("runs"),
+    as_json: Json = False,
+) -> None:
+    """Run scenarios in every engine from the same computed start and compare with the reference."""
+    from rich.console import Console
+
+    from .. import present
+    from ..runner import run
+
+    sources = [*(scenario or []), *(_tagged(tag) if tag is not None else [])]
+    if not sources:
+        raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
+    changes = changed(change, duration)
+    with present.working(STARTING):
+        plans = [_plan(source, changes, engine) for source in dict.fromkeys(sources)]
+    console = Console(stderr=as_json)
+    outcomes = []
+    for plan in plans:
+        with present.Progress() as progress:
+            outcome = run(plan, out, progress.watch, progress.note)
+        outcomes.append((plan, outcome))
+        present.show_outcome(console, plan, outcome)
+        if outcome.interrupted:
+            break
+    if as_json:
+        print_json({"runs": [present.outcome_json(plan, outcome) for plan, outcome in outcomes]})
+    if any(outcome.interrupted for _, outcome in outcomes):
+        raise typer.Exit(130)
+    if any(outcome.failures or not all(v["holds"] for v in outcome.verdicts) for _, outcome in outcomes):
+        raise typer.Exit(1)
+
+
+def _plan(source: str, changes: dict[str, Any], wanted: list[str] | None) -> Plan:
+    from ..runner import plan_run
+    from ..scenario import load_scenario
+
+    name, scenario = load_scenario(source, changes)
+    try:
+        return plan_run(name, scenario, wanted)
+    except ScenarioError as error:
+        raise ScenarioError(f"{source}: {error}") from error
+
+
+def _tagged(tag: str) -> list[str]:
+    from ..scenario import library_names, load_scenario
+
+    tags = {name: load_scenario(name)[1].tags for name in library_names()}
+    names = [name for name in tags if tag in tags[name]]
+    if not names:
+        known = ", ".join(sorted({word for words in tags.values() for word in words}))
+        raise ScenarioError(f"--tag {tag}: no scenario has it; there are {known}")
+    return names

@@ -1,0 +1,55 @@
+"""Stored runs: `diff` and `view`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..error import ScenarioError
+from .options import Json, print_json
+
+
+def diff_command(
+    before: Annotated[Path, typer.Argument(metavar="RUN", help="The earlier run's folder.")],
+    after: Annotated[Path, typer.Argument(metavar="RUN", help="The later run's folder.")],
+    engine: Annotated[list[str] | None, typer.Option(help="Compare only this engine, beside the reference.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for diff.json, diff.md and the recording diff.rrd.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Two stored runs of one scenario against each other: what moved by more than round-off."""
+    from rich.console import Console
+
+    from ..diff import diff, read_pair, write_diff
+    from ..present_diff import show_diff
+
+    pair = read_pair(before, after, engine)
+    found = diff(pair)
+    written = [] if out is None else write_diff(pair, found, out)
+    if as_json:
+        print_json(found)
+    else:
+        show_diff(Console(), found)
+        for path in written:
+            Console().print(f"written: {path}", markup=False, highlight=False, soft_wrap=True)
+    if not found["same"]:
+        raise typer.Exit(1)
+
+
+def view_command(
+    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],
+    web: Annotated[bool, typer.Option("--web", help="Serve the report page with the viewer in it.")] = False,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="Port for --web; any free one if not given.")
+    ] = None,
+) -> None:
+    """A run's recording in the native viewer, or its report page in the browser, for this machine only."""
+    from .. import view
+
+    if web:
+        view.serve(run_folder, port or 0, lambda address: print(f"{address}\nCtrl-C ends it", flush=True))
+    elif port is not None:
+        raise ScenarioError("--port goes with --web")
+    else:
+        view.open_native(run_folder)

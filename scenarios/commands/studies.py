@@ -1,0 +1,70 @@
+"""What takes its time: `paper` and `precision`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import Changes, Duration, Json, changed, print_json
+
+
+def paper_command(
+    out: Annotated[Path | None, typer.Option(help="Folder for the figures, tables and ledger.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Every figure and printed number of Xiong et al. (2020), computed and held against the print."""
+    from rich.console import Console
+
+    from reports.paper.ledger import document
+    from reports.paper.table import show_ledger
+
+    from .. import present
+    from ..paper import ledger
+    from ..paper_figures import write_paper
+
+    with present.Progress() as progress:
+        lines = ledger(lambda part, done, parts: progress.watch(part, done, parts))
+        written = [] if out is None else write_paper(out, lines, progress.watch)
+    found = document(lines)
+    if as_json:
+        print_json(found)
+    else:
+        show_ledger(Console(), lines)
+        for path in written:
+            Console().print(f"written: {path}", markup=False, highlight=False, soft_wrap=True)
+    if not found["holds"]:
+        raise typer.Exit(1)
+
+
+def precision_command(
+    scenario: Annotated[str, typer.Argument(help="Library name or path to a TOML file.")],
+    engine: Annotated[list[str] | None, typer.Option(help="Study only this engine, beside the reference.")] = None,
+    change: Changes = None,
+    duration: Duration = None,
+    levels: Annotated[
+        int, typer.Option(min=2, max=12, help="Steps: four times the scenario's, then halved each time.")
+    ] = 5,
+    eigenvalues: Annotated[bool, typer.Option(help="Measure each engine's own eigenvalues too.")] = True,
+    out: Annotated[Path | None, typer.Option(help="Folder for the document and its figure.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Work-precision: error and CPU time over step sizes, observed order, limit, the engine's own eigenvalues."""
+    from rich.console import Console
+
+    from .. import present
+    from ..precision import precision, write_precision
+    from ..scenario import load_scenario
+
+    changes = changed(change, duration)
+    name, loaded = load_scenario(scenario, changes)
+    with present.Progress() as progress:
+        document = precision(name, loaded, engine, levels, eigenvalues, progress.watch)
+    written = [] if out is None else write_precision(document, out)
+    if as_json:
+        print_json(document)
+        return
+    present.show_precision(Console(), document)
+    for path in written:
+        Console().print(f"written: {path}", markup=False, highlight=False, soft_wrap=True)
