@@ -6,6 +6,7 @@ An engine is any object that satisfies `Engine` and is announced under the entry
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from importlib.metadata import EntryPoint, entry_points
@@ -207,8 +208,13 @@ class UnsuitableProblem(ValueError):
     """A problem of a kind that an engine is not made for, such as a ground that it does not know."""
 
 
+# Files are called after engines, and a name may come from any package.
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
+
+
 def _announced() -> dict[str, EntryPoint]:
-    return {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP)}
+    """Entry points by name; one whose name could lead a file elsewhere is no engine."""
+    return {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP) if _NAME.fullmatch(point.name)}
 
 
 def engine_names() -> list[str]:

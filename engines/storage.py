@@ -1,15 +1,21 @@
-"""Trajectories as Parquet files: one column a quantity, units with the columns, the rest in the schema."""
+"""Trajectories as Parquet files: one column a quantity, units with the columns, the rest in the schema.
+
+A file carries a digest of everything in it. Parquet has checksums of its own, but of the data pages only: a bit
+that turns over in a column's name or in the metadata would pass them.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from reference.bicycle import BODIES
 from reference.kinematics import COORDINATES, WHEELS
@@ -17,9 +23,25 @@ from reference.kinematics import COORDINATES, WHEELS
 from .engine import Trajectory
 from .files import whole
 
-METADATA_KEY = b"velodrome"
-FACTS = ("engine", "version", "settings", "steps", "cpu_time", "ended", "friction")
+METADATA_KEY, DIGEST_KEY = b"velodrome", b"velodrome-sha256"
 REQUIRED = ("time", "q", "qd", "body_position", "body_quaternion")
+
+
+class _Facts(BaseModel):
+    """What the schema says of a trajectory beside its columns."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+
+    engine: str
+    version: str
+    settings: dict[str, Any]
+    steps: Annotated[int, Field(ge=0)]
+    cpu_time: Annotated[float, Field(ge=0)]
+    ended: str | None
+    friction: Annotated[float, Field(ge=0)] | None
+
+
+FACTS = tuple(_Facts.model_fields)
 
 
 def _coordinate_columns() -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
@@ -52,6 +74,7 @@ SHAPES = {
     "body_quaternion": (4, 4),
 }
 VECTORS = ("time", "kinetic_energy", "potential_energy")
+_LONGEST_REASON = 300  # letters of what a reader of damaged files says
 
 
 def write_trajectory(trajectory: Trajectory, path: Path) -> None:
@@ -86,9 +109,23 @@ def write_columns(
         metadata = None if unit is None else {b"unit": unit.encode()}
         arrays.append(pa.array(np.ascontiguousarray(values)))
         fields.append(pa.field(name, arrays[-1].type, nullable=False, metadata=metadata))
-    schema = pa.schema(fields, metadata={METADATA_KEY: json.dumps(facts).encode()})
+    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata={METADATA_KEY: json.dumps(facts).encode()}))
+    sealed = {**(table.schema.metadata or {}), DIGEST_KEY: digest(table)}
     with whole(path) as partial:
-        pq.write_table(pa.Table.from_arrays(arrays, schema=schema), partial, **options)
+        pq.write_table(table.replace_schema_metadata(sealed), partial, **options)
+
+
+def digest(table: pa.Table) -> bytes:
+    """SHA-256 of a table of numbers without nulls, in hexadecimal digits: names, types, units, values and facts."""
+    found = hashlib.sha256((table.schema.metadata or {}).get(METADATA_KEY, b""))
+    for field, column in zip(table.schema, table.columns, strict=True):
+        unit = (field.metadata or {}).get(b"unit", b"")
+        # Lengths first, so that nothing can move from one part into the next.
+        heading = [field.name.encode(), str(field.type).encode(), unit]
+        found.update(repr([len(table), *(len(part) for part in heading)]).encode() + b"".join(heading))
+        for chunk in column.chunks:
+            found.update(chunk.to_numpy(zero_copy_only=False).tobytes())
+    return found.hexdigest().encode()
 
 
 def read_trajectory(path: Path) -> Trajectory:
@@ -97,26 +134,58 @@ def read_trajectory(path: Path) -> Trajectory:
     Raises
     ------
     ValueError
-        If the file is not a trajectory.
+        If the file is not a trajectory, not a whole one, or was altered since it was written. Only files of
+        earlier versions carry no digest.
     """
+    table = _table(path)
+    facts = _facts(table, path)
+    values = {name: _field(table, name, names, path) for name, names in columns()}
+    time = table.column("time").to_numpy()
+    if not (len(time) and np.all(np.isfinite(time)) and np.all(np.diff(time) > 0)):
+        raise ValueError(f"{path} is not a trajectory: its times must be finite and rising, one or more")
+    found = digest(table)
+    if table.schema.metadata.get(DIGEST_KEY, found) != found:
+        raise ValueError(f"{path} is not the trajectory that was written: its contents do not match their digest")
+    return Trajectory(**facts.model_dump(), **values)  # pyright: ignore[reportArgumentType]
+
+
+def _table(path: Path) -> pa.Table:
+    """A Parquet file's table; of one file, whatever its folder is called."""
     try:
-        table = pq.read_table(path)
-    except (OSError, pa.ArrowInvalid) as error:
-        raise ValueError(f"{path} cannot be read as a trajectory: {error}") from error
+        with path.open("rb") as file:
+            return pq.ParquetFile(file).read()
+    except OSError as error:
+        reason = error.strerror or str(error)
+    except (pa.ArrowException, ValueError) as error:
+        reason = str(error)
+    line = " ".join("".join(letter if letter.isprintable() else " " for letter in reason).split())
+    raise ValueError(f"{path} cannot be read as a trajectory: {line[:_LONGEST_REASON]}")
+
+
+def _facts(table: pa.Table, path: Path) -> _Facts:
     try:
-        facts = json.loads((table.schema.metadata or {})[METADATA_KEY])
-        facts = {key: facts[key] for key in FACTS}
-    except (KeyError, TypeError, json.JSONDecodeError) as error:
-        raise ValueError(f"{path} is not a trajectory: its schema has no whole velodrome metadata") from error
-    values: dict[str, np.ndarray | None] = {}
-    present = set(table.column_names)
-    for name, names in columns():
-        absent = [column for column, _ in names if column not in present]
-        if absent and name in REQUIRED:
-            raise ValueError(f"{path} is not a trajectory: it has no column {absent[0]}")
-        if absent:
-            values[name] = None
-            continue
-        flat = np.column_stack([table.column(column).to_numpy() for column, _ in names])
-        values[name] = flat[:, 0] if name in VECTORS else flat.reshape(-1, *SHAPES.get(name, (len(names),)))
-    return Trajectory(**facts, **values)  # pyright: ignore[reportArgumentType]
+        return _Facts.model_validate(json.loads((table.schema.metadata or {})[METADATA_KEY]))
+    except (KeyError, ValueError, RecursionError) as error:
+        what = ""
+        if isinstance(error, ValidationError):
+            first = error.errors()[0]
+            what = f" ({'.'.join(str(part) for part in first['loc'])}: {first['msg']})"
+        raise ValueError(f"{path} is not a trajectory: its schema has no whole velodrome metadata{what}") from error
+
+
+def _field(table: pa.Table, name: str, names: list[tuple[str, str]], path: Path) -> np.ndarray | None:
+    """A field's array from its columns; None where all of them are absent and may be."""
+    counts = [table.column_names.count(column) for column, _ in names]
+    if not any(counts) and name not in REQUIRED:
+        return None
+    for (column, _), count in zip(names, counts, strict=True):
+        if count != 1:
+            raise ValueError(f"{path} is not a trajectory: it has {count or 'no'} column{'s' * (count > 1)} {column}")
+        found = table.column(column)
+        if found.type != pa.float64() or found.null_count:
+            what = f"is {found.type}" if found.type != pa.float64() else "has holes"
+            raise ValueError(
+                f"{path} is not a trajectory: its column {column} {what}; it must be double, without holes"
+            )
+    flat = np.column_stack([table.column(column).to_numpy() for column, _ in names])
+    return flat[:, 0] if name in VECTORS else flat.reshape(-1, *SHAPES.get(name, (len(names),)))

@@ -67,6 +67,7 @@ ANCHORS: dict[int, tuple[float | None, ...]] = {1: (15.0,), 2: (20.0,), 3: (20.0
 _TOWARDS_C = 6.0
 # Starts that lead to static equilibria: with a bowl's depth their pitch falls to -0.8.
 _STEERS, _PITCHES = np.pi * (np.arange(8) + 0.5) / 8, (0.0, -0.3, -0.6)
+_SMALLEST_CIRCLE = 1e-100  # [m]: the squares of smaller ones underflow
 _LARGEST_MOVE = 0.05  # of an unknown of order one, in a step of carrying an anchor
 _SAME = 1e-6  # two solutions of one condition; round-off, 1e-14, splits them by its root where they meet
 
@@ -367,7 +368,7 @@ def _to_surface_or_middle(
     except ValueError as error:
         lost = error
     radius, plane = sum(surface.extent) / 2, Steady(bicycle, Plane())
-    if not np.isfinite(radius):
+    if not _SMALLEST_CIRCLE < radius < np.inf:
         raise lost
     halfway = _radius_condition(radius)
     for towards in directions:

@@ -39,6 +39,9 @@ def _torus(x, y, parameters):
     return of_radius(x, y, r, k * d * d / (1 + w), k * d / w, k / (w * w * w))
 
 
+_SHARPEST = 1e-100  # rounding of a cone's tip [m]
+
+
 def _refuse(name: str, value: object, what: str) -> ValueError:
     return ValueError(f"{name} is {value!r}; it must be a finite number {what}")
 
@@ -103,7 +106,7 @@ class Cone:
     Raises
     ------
     ValueError
-        If one of them is not positive and finite.
+        If one of them is not positive and finite, or the rounding is next to nothing.
     """
 
     slope: float
@@ -114,6 +117,8 @@ class Cone:
             value = getattr(self, name)
             if not (is_number(value) and value > 0):
                 raise _refuse(name, value, "> 0")
+        if self.rounding < _SHARPEST:
+            raise _refuse("rounding", self.rounding, f">= {_SHARPEST!r}: the square of a smaller one underflows")
 
     @property
     def function(self) -> SurfaceFunction:

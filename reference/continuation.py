@@ -13,13 +13,14 @@ from scipy.optimize import brentq, minimize_scalar
 from .circular import CONTACT, Condition, Steady, newton
 from .kernels import curve as kernel
 from .kernels.steady import UNKNOWNS
-from .surface import SurfaceOfRevolution
+from .surface import SurfaceOfRevolution, has_tip
 
 FARTHEST = 1e3  # of D from the origin [m]: beyond, a large circle differs from its limit by round-off
 LARGEST_LEAN = 1.5
 LARGEST_SIGMA = 100.0  # 200 rad/s: a curve can run off to infinite speed at finite angles
 LONGEST_STEP = 0.15
 _FIRST_STEP = 0.02
+_REAR_SIDE = CONTACT.start + 1  # eta of the rear contact; its xi is zero, the rear wheel heads along its circle
 _CHUNK = 32  # points that are followed at once
 # Of the radius where the ground ends. Towards the rim of a sphere derivatives of the height lose digits like
 # the inverse of the distance, and steps of the arc can only creep: within a thousandth a curve is at its end.
@@ -80,12 +81,16 @@ def follow(
     ------
     Point
         The start, then points along the curve, until it ends: with the first point of sigma < 0, beyond
-        the largest lean, circle or speed, at the edge of the ground, or where the shortest steps no longer
-        converge.
+        the largest lean, circle or speed, at the edge of the ground, before a tip of it, or where the shortest
+        steps no longer converge.
     """
     direction = tangent(equations, start)
     first = Point(start, direction if direction @ towards > 0 else -direction)
+    tip, side = has_tip(equations.surface), start[_REAR_SIDE]
     for point in _steps(equations, first, longest, most):
+        # The rear wheel comes to the axis sideways; there a tip has no normal, and no motion to solve for.
+        if tip and side * point.unknowns[_REAR_SIDE] <= 0:
+            return
         yield point
         if at_edge(equations.surface, point):
             return

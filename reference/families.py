@@ -8,7 +8,6 @@ family that it was a part of.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from itertools import islice
@@ -18,8 +17,18 @@ import numpy as np
 from .anchors import ANCHORS, Anchor, anchor, further_anchors
 from .bicycle import Bicycle
 from .circular import FRONT_SPEED, LEAN, REAR_SPEED, SIGMA, CircularMotion, Steady, rear_rate_condition
-from .continuation import FARTHEST, LONGEST_STEP, Point, at_edge, crossings, follow, root_between
-from .surface import SurfaceOfRevolution
+from .continuation import (
+    FARTHEST,
+    LARGEST_LEAN,
+    LARGEST_SIGMA,
+    LONGEST_STEP,
+    Point,
+    at_edge,
+    crossings,
+    follow,
+    root_between,
+)
+from .surface import SurfaceOfRevolution, has_tip
 
 FAMILIES = (1, 2, 3, 4)
 
@@ -59,9 +68,10 @@ class Family:
 
     @property
     def ends(self) -> tuple[str, str]:
-        """What it ends in: ``static``, ``pivot``, ``edge``, ``large circle``, ``flat`` or ``fast front wheel``.
+        """What it ends in.
 
-        At the ``edge`` a wheel has come to where the ground ends.
+        ``static``, ``pivot``, ``edge`` (a wheel has come to where the ground ends), ``tip`` (the rear wheel has come
+        to the axis where the ground has no normal), ``large circle``, ``flat`` or ``fast front wheel``.
         """
         surface = self.equations.surface
         return _kind_of_end(surface, self.points[0]), _kind_of_end(surface, self.points[-1])
@@ -76,6 +86,10 @@ def _kind_of_end(surface: SurfaceOfRevolution, point: Point) -> str:
         return "pivot"
     if at_edge(surface, point):
         return "edge"
+    # Before a tip a curve breaks off in the midst of what it may reach.
+    within = abs(u[LEAN]) < LARGEST_LEAN and u[SIGMA] < LARGEST_SIGMA and np.linalg.norm(u[:3]) < FARTHEST
+    if within and has_tip(surface):
+        return "tip"
     if np.linalg.norm(u[:3]) > 0.3 * FARTHEST:
         return "large circle"
     return "flat" if abs(u[LEAN]) > 1.0 else "fast front wheel"
@@ -156,9 +170,7 @@ def _further(
     found: list[Family] = []
     for start in further_anchors(bicycle, surface):
         if not any(_passes(curve, start) for curve in (*followed, *found)):
-            # A step over a tip of the ground, which has no normal, passes no pivoting motion to end in.
-            with suppress(ValueError):
-                found.append(trace_from(start, longest))
+            found.append(trace_from(start, longest))
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -55,6 +56,10 @@ class PolynomialProfile:
         object.__setattr__(self, "coefficients", _numbers("coefficients", self.coefficients))
         if not any(self.coefficients):
             raise ValueError("coefficients are all zero; level ground is the plane")
+
+    def __repr__(self) -> str:
+        # There may be a thousand; a line that names the ground must stay one.
+        return f"{type(self).__name__}(coefficients={reprlib.repr(self.coefficients)})"
 
     @property
     def function(self) -> SurfaceFunction:
@@ -110,8 +115,15 @@ class SplineProfile:
         for i, (inner, outer) in enumerate(pairwise(self.radii)):
             if not outer > inner:
                 raise ValueError(f"radii[{i + 1}] is {outer!r}; it must be greater than {inner!r} before it")
+            if not outer**2 > inner**2:  # the spline's own variable
+                raise ValueError(
+                    f"radii[{i + 1}] is {outer!r}; its square cannot be told from that of {inner!r} before it"
+                )
         if len(set(self.heights)) == 1:
             raise ValueError("heights are all equal; level ground is the plane")
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}(radii={reprlib.repr(self.radii)})"
 
     @property
     def function(self) -> SurfaceFunction:

@@ -11,14 +11,17 @@ from scipy.integrate import DOP853
 from .bicycle import Bicycle
 from .dae import contact_parameters
 from .kernels import integrate as kernel
-from .kinematics import constants
-from .surface import Surface
+from .kinematics import WHEELS, constants
+from .surface import Surface, evaluate
 
 # Coefficients as data, from the library that everybody checks them against.
 _TABLEAU = tuple(
     np.ascontiguousarray(table, float) for table in (DOP853.A, DOP853.B, DOP853.E3, DOP853.E5, DOP853.A_EXTRA, DOP853.D)
 )
 _STEPS_A_CALL = 200  # between two reports of progress; a step takes some 6 us
+# Steps shrink to `kernel.SMALLEST_STEP` before the edge of the ground: at 100 m/s a wheel is within 1 um of it, but
+# where the ground turns upright, as a sphere does, they shrink earlier.
+_AT_THE_EDGE = 1e-3  # [m]
 
 
 @dataclass(frozen=True)
@@ -113,8 +116,19 @@ def simulate(
             progress(min(t, float(times[-1])))
     ended = None
     if status != kernel.DONE:
-        ended = f"no solution beyond t = {t:.6g} s: the equations of motion become singular"
+        why = _where_the_ground_ends(surface, y[18:]) or "the equations of motion become singular"
+        ended = f"no solution beyond t = {t:.6g} s: {why}"
     return _motion(bicycle, surface, times, out[:index], steps, evaluations, ended)
+
+
+def _where_the_ground_ends(surface: Surface, contact: np.ndarray) -> str | None:
+    """Which wheel, of those with contact parameters (6,), has come to the edge of the ground; None if none has."""
+    angle = np.arange(8) * np.pi / 4
+    for wheel, (x, y) in zip(WHEELS, (contact[0:2], contact[3:5]), strict=True):
+        around = evaluate(surface, x + _AT_THE_EDGE * np.cos(angle), y + _AT_THE_EDGE * np.sin(angle))
+        if np.isfinite(x + y) and not np.all(np.isfinite(around)):
+            return f"the ground ends under the {wheel} wheel"
+    return None
 
 
 def simulate_modified_euler(

@@ -218,6 +218,11 @@ def evaluate(surface: Surface, x: np.ndarray | float, y: np.ndarray | float) -> 
     return flat.reshape(*x.shape, 6)
 
 
+def has_tip(surface: SurfaceOfRevolution) -> bool:
+    """Whether a surface's profile meets the axis at an angle: there it has a height, but no normal."""
+    return surface.extent[0] == 0 and not np.all(np.isfinite(evaluate(surface, 0.0, 0.0)))
+
+
 def unit_normals(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Upward unit normals of a surface, shape (..., 3), at coordinates of any common shape [m]."""
     values = evaluate(surface, x, y)

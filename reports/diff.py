@@ -25,6 +25,7 @@ from reference.surface import Surface
 
 from .fall import until_fall
 from .limits import Scale, noise, ride_limits
+from .markdown import escaped
 from .metrics import position_errors
 
 TO_THE_BIT, WITHIN_ROUND_OFF, DIFFERS = "same to the bit", "same within round-off", "differs"
@@ -260,15 +261,16 @@ def diff_markdown(document: Mapping[str, Any]) -> str:
     """The document, with its ``notes``, as a page: the verdict, then a part an engine."""
     names = [run["name"] for run in document["runs"]]
     word = "the same within round-off" if document["same"] else "not the same"
-    lines = [f"# {document['title']}: {names[0]} against {names[1]}", "", f"The engines in both runs are {word}.", ""]
+    title = escaped(f"{document['title']}: {names[0]} against {names[1]}")
+    lines = [f"# {title}", "", f"The engines in both runs are {word}.", ""]
     for part, changes in document["differs"].items():
-        lines += [f"- {part}: {name} {_shown(a)} -> {_shown(b)}" for name, (a, b) in changes.items()]
-    lines += [f"- {note}" for note in document["notes"]]
+        lines += [f"- {part}: {escaped(f'{name} {_shown(a)} -> {_shown(b)}')}" for name, (a, b) in changes.items()]
+    lines += [f"- {escaped(note)}" for note in document["notes"]]
     for when, names in (("before", document["only_before"]), ("after", document["only_after"])):
-        lines += [f"- only in the run {when}: {', '.join(names)}"] if names else []
+        lines += [f"- only in the run {when}: {escaped(', '.join(names))}"] if names else []
     for name, entry in document["engines"].items():
-        said = [f"- {line}" for line in [*remarks(entry), *entry["reasons"]]]
-        lines += ["", f"## {name}: {entry['verdict']}", "", *said]
+        said = [f"- {escaped(line)}" for line in [*remarks(entry), *entry["reasons"]]]
+        lines += ["", f"## {escaped(name)}: {entry['verdict']}", "", *said]
         if entry["metrics"]:
             lines += ([""] if said else []) + [
                 "| metric | before | after | change | limit |",

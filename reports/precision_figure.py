@@ -43,7 +43,7 @@ def precision_figure(path: Path, document: Mapping[str, Any]) -> None:
         handles, labels = left.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=max(1, min(len(labels), 3)))
         title = f"{document['scenario']}, {compared_time(document):.3g} s"
-        figure.suptitle(title, x=0.99, ha="right", fontsize=8.5)
+        figure.suptitle(title, x=0.99, ha="right", fontsize=8.5, parse_math=False)  # a file's name may have a $
         write_figure(path, figure)
 
 

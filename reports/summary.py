@@ -7,6 +7,8 @@ from typing import Any
 
 from engines.engine import REFERENCE
 
+from .markdown import escaped
+
 # (title, unit, metric, part of a metric that has parts): seven, so that a terminal of 80 columns holds them.
 COLUMNS: tuple[tuple[str, str, str, str | None], ...] = (
     ("position error", "m", "position_error", "max"),
@@ -84,9 +86,9 @@ def summary(
     -------
     str
     """
-    lines = [f"# {title}", "", stability(growth_rate, steady), ""]
+    lines = [f"# {escaped(title)}", "", stability(growth_rate, steady), ""]
     # Engines as columns: they are fewer than quantities, and the recording's tab is narrow.
-    lines += ["| | " + " | ".join(measured) + " |", "|---|" + "---:|" * len(measured)]
+    lines += ["| | " + " | ".join(escaped(name) for name in measured) + " |", "|---|" + "---:|" * len(measured)]
     for name, unit, metric, part in COLUMNS:
         cells = (cell(values, metric, part) for values in measured.values())
         lines.append(f"| {name} [{unit}] | " + " | ".join(cells) + " |")
@@ -96,10 +98,9 @@ def summary(
         "",
     ]
     for engine, values in measured.items():
-        lines += [f"- {line}" for line in remarks(engine, values, duration)]
-    lines += [f"- {engine} did not run: {reason}" for engine, reason in failures.items()]
-    for verdict in verdicts:
-        lines.append(f"- {verdict_line(verdict)}")
+        lines += [f"- {escaped(line)}" for line in remarks(engine, values, duration)]
+    lines += [f"- {escaped(f'{engine} did not run: {reason}')}" for engine, reason in failures.items()]
+    lines += [f"- {escaped(verdict_line(verdict))}" for verdict in verdicts]
     return "\n".join(lines).rstrip() + "\n"
 
 

@@ -7,6 +7,7 @@ from itertools import groupby
 from xml.etree import ElementTree
 
 from .drift import Verdict
+from .markdown import escaped, printable
 
 Verdicts = Sequence[tuple[str, Verdict]]
 # What a reader must see first.
@@ -34,7 +35,7 @@ def junit_xml(verdicts: Verdicts) -> str:
                 suite, "testcase", classname=f"{name}.{verdict.engine}", name=verdict.quantity
             )
             if not verdict.passes:
-                ElementTree.SubElement(case, "failure", type=verdict.status, message=_printable(verdict.reason))
+                ElementTree.SubElement(case, "failure", type=verdict.status, message=printable(verdict.reason))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 
@@ -42,11 +43,6 @@ def junit_xml(verdicts: Verdicts) -> str:
 def _counts(verdicts: Verdicts) -> dict[str, str]:
     failures = sum(not verdict.passes for _, verdict in verdicts)
     return {"tests": str(len(verdicts)), "failures": str(failures), "errors": "0"}
-
-
-def _printable(text: str) -> str:
-    """Without the control characters that XML cannot carry."""
-    return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def markdown_page(verdicts: Verdicts) -> str:
@@ -66,8 +62,9 @@ def markdown_page(verdicts: Verdicts) -> str:
     ordered = sorted(verdicts, key=lambda item: _WORST_FIRST.index(item[1].status))
     moved = [(name, verdict) for name, verdict in ordered if verdict.status != "holds"]
     for name, verdict in moved:
-        reason = _cell(verdict.reason)
-        lines.append(f"- **{verdict.status}** {name}, {verdict.engine}, {verdict.quantity}: {reason}")
+        reason = escaped(verdict.reason)
+        who = escaped(f"{name}, {verdict.engine}")
+        lines.append(f"- **{verdict.status}** {who}, {verdict.quantity}: {reason}")
     lines += [""] if moved else []
     lines += [
         "| scenario | engine | quantity | value | baseline | limit | verdict |",
@@ -75,16 +72,10 @@ def markdown_page(verdicts: Verdicts) -> str:
     ]
     for name, verdict in ordered:
         numbers = (_number(value) for value in (verdict.value, verdict.baseline, verdict.limit))
-        lines.append(
-            f"| {name} | {verdict.engine} | {verdict.quantity} | " + " | ".join(numbers) + f" | {verdict.status} |"
-        )
+        cells = (escaped(name), escaped(verdict.engine), verdict.quantity, *numbers, verdict.status)
+        lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 
 def _number(value: float | None) -> str:
     return "–" if value is None else f"{value:.6g}"
-
-
-def _cell(text: str) -> str:
-    """Text of somebody else's making, shown as it is."""
-    return "".join(f"\\{letter}" if letter in "\\`*_|<>[]" else letter for letter in _printable(text))

@@ -18,7 +18,7 @@ from .error import ScenarioError
 from .files import make_folder, write_json
 from .survey import critical_entry
 
-SMALLEST = 1000
+SMALLEST, LARGEST = 1000, 20_000_000  # motions; the largest takes 3 GB
 UNITS = {
     "alpha": "1/m",
     "rear_rate": "rad/s",
@@ -64,8 +64,8 @@ def make_atlas(
     """
     from reports.atlas import growth_figure, stable_figure
 
-    if size < SMALLEST:
-        raise ScenarioError(f"--size {size}: an atlas has at least {SMALLEST} motions")
+    if not SMALLEST <= size <= LARGEST:
+        raise ScenarioError(f"--size {size}: an atlas has from {SMALLEST} to {LARGEST} motions")
     if not 0 < largest <= 1:
         raise ScenarioError(f"--largest {largest!r}: it must lie above 0 and not above 1, in 1/m")
     make_folder(out)

@@ -13,7 +13,6 @@ import numpy as np
 from pydantic import ValidationError
 
 from engines.engine import REFERENCE, Trajectory, engine_names, load_engine
-from engines.storage import read_trajectory
 from reference.kinematics import REAR_ANGLE
 from reference.surface import SurfaceOfRevolution
 from reports.diff import DIFFERS, Ground, StoredRun, diff_document, diff_markdown
@@ -25,7 +24,7 @@ from .error import ScenarioError
 from .files import make_folder, write_json, write_text
 from .scenario import CircularTable, Scenario, load_scenario
 from .start import make_start
-from .stored import document, part
+from .stored import document, part, ride
 
 ROUND_OFF = 2.0**-52
 # What makes two scenarios one: an engine's settings may well differ.
@@ -99,7 +98,7 @@ def _read(folder: Path, name: str, engines: Sequence[str] | None) -> StoredRun:
         _ = [manifest[key] for key in ("title", "scenario", "created", "complete", "libraries", "platform")]
         _ = [(entry["version"], dict(entry["settings"])) for entry in entries.values()]
         _ = [float(manifest["start"]["growth_rate"]), *_state(manifest)]
-        rides = {engine: _ride(folder, engine) for engine in entries if engine in metrics}
+        rides = {engine: ride(folder, manifest, metrics, engine) for engine in entries if engine in metrics}
     except ScenarioError:
         raise
     except (KeyError, TypeError, AttributeError, ValueError) as error:
@@ -109,13 +108,6 @@ def _read(folder: Path, name: str, engines: Sequence[str] | None) -> StoredRun:
 
 def _chosen(engine: str, engines: Sequence[str] | None) -> bool:
     return not engines or engine == REFERENCE or engine in engines
-
-
-def _ride(folder: Path, engine: str) -> Trajectory:
-    ride = read_trajectory(part(folder, f"{engine}.parquet"))
-    if len(ride.time) == 0:
-        raise ValueError(f"{engine}.parquet has no sample")
-    return ride
 
 
 def _state(manifest: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:

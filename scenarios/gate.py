@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 import reports
 from engines.engine import Engine, Settings, UnsuitableProblem, engine_names
@@ -19,11 +20,36 @@ from .run_folder import library_versions
 from .runner import Watch, configure
 from .scenario import library_names, load_scenario
 from .start import make_start
+from .stored import read_json
+from .table import one_line, shown
 
 BASELINES = Path(next(iter(reports.__path__))) / "baselines"
 GATED_TAG = "gated"
 DURATION = 3.0  # a turn of q2 and a bit: seconds of work in the slowest engine
 OUTPUT_RATE = 50.0  # an interval that doubled steps divide as well: a coarser step is judged, not refused
+
+
+class _Entry(BaseModel):
+    """What a baseline must say of an engine; whatever else it says is kept."""
+
+    model_config = ConfigDict(strict=True, extra="allow", allow_inf_nan=False)
+
+    created: str = ""
+    version: str
+    settings: dict[str, Any]
+    quantities: dict[str, float | None]
+
+
+class _Baseline(BaseModel):
+    """A baseline file."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+
+    scenario: str | None = None
+    duration: float = DURATION
+    short_horizon: float = SHORT_HORIZON
+    engines: dict[str, _Entry]
+
 
 Chosen = Callable[[str, Mapping[str, Any]], tuple[Engine, Settings]]
 
@@ -119,18 +145,29 @@ def read_baseline(scenario: str, folder: Path | None = None) -> dict[str, Any]:
     Raises
     ------
     ScenarioError
-        If the file is damaged.
+        If the file is damaged, of another scenario, or of a ride of another length.
     """
-    path = (BASELINES if folder is None else folder) / f"{scenario}.json"
+    within = BASELINES if folder is None else folder
+    path = within / f"{scenario}.json"
+    if within.exists() and not within.is_dir():
+        raise ScenarioError(f"{within}: is no folder of baselines")
     if not path.exists():
         return {}
     try:
-        entries = json.loads(path.read_text(encoding="utf-8"))["engines"]
-        for entry in entries.values():
-            _ = entry["version"], entry["settings"].items(), entry["quantities"].items()
-    except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError, AttributeError) as error:
-        raise ScenarioError(f"{path}: not a baseline: {error!r}") from error
-    return entries
+        data = read_json(path)
+        found = _Baseline.model_validate(data)
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        why = one_line(error) if isinstance(error, ValidationError) else " ".join(str(error).split())
+        raise ScenarioError(f"{path}: not a baseline: {why}") from error
+    if found.scenario not in (None, scenario):
+        raise ScenarioError(f"{path}: not the baseline of {scenario} but of {shown(repr(found.scenario))}")
+    for name, value in (("duration", DURATION), ("short_horizon", SHORT_HORIZON)):
+        if getattr(found, name) != value:
+            came = getattr(found, name)
+            raise ScenarioError(f"{path}: not a baseline of this gate: its {name} is {came!r} s, not {value!r} s")
+    return data["engines"]
 
 
 def update(

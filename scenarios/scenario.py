@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
@@ -14,7 +13,7 @@ from reference.bicycle import Bicycle
 
 from .error import ScenarioError
 from .surfaces import SurfaceTable
-from .table import Table, one_line
+from .table import Table, one_line, read_toml, shown
 
 LIBRARY = files("scenarios") / "library"
 
@@ -103,10 +102,13 @@ class Scenario(Table):
 
     @field_validator("title")
     @classmethod
-    def _one_line(cls, title: str) -> str:
-        if not title.strip() or not title.isprintable():
-            raise ValueError("must be one line of text")
-        return title
+    def _title_is_one_line(cls, title: str) -> str:
+        return _line_of_text(title)
+
+    @field_validator("tags")
+    @classmethod
+    def _tags_are_lines(cls, tags: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(_line_of_text(tag) for tag in tags)
 
     @model_validator(mode="before")
     @classmethod
@@ -131,8 +133,14 @@ class Scenario(Table):
         unknown = sorted(set(self.bicycle) - set(Bicycle.__dataclass_fields__))
         if unknown:
             names = ", ".join(Bicycle.__dataclass_fields__)
-            raise ValueError(f"bicycle parameter {unknown[0]!r} is unknown; there are {names}")
+            raise ValueError(f"bicycle parameter {shown(repr(unknown[0]))} is unknown; there are {names}")
         return Bicycle(**self.bicycle)
+
+
+def _line_of_text(text: str) -> str:
+    if not text.strip() or not text.isprintable():
+        raise ValueError("must be one line of text")
+    return text
 
 
 def library_names() -> list[str]:
@@ -164,21 +172,11 @@ def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tupl
     if source in library_names():
         name, text = source, (LIBRARY / f"{source}.toml").read_text(encoding="utf-8")
     else:
-        path = Path(source)
-        if path.suffix != ".toml":
-            raise ScenarioError(
-                f"no scenario {source!r} in the library; there are {', '.join(library_names())}, "
-                "or give a path to a .toml file"
-            )
-        try:
-            name, text = path.stem, path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
-            raise ScenarioError(f"{source}: cannot be read: {reason}") from error
+        name, text = _read(source)
     try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(f"{source}: not valid TOML: {error}") from error
+        data = read_toml(text)
+    except ValueError as error:
+        raise ScenarioError(f"{shown(source)}: not valid TOML: {shown(str(error))}") from error
     for key, value in (changes or {}).items():
         _put(data, key, value)
     return name, validate(data, source)
@@ -189,7 +187,29 @@ def validate(data: Mapping[str, Any], source: str) -> Scenario:
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError(f"{source}: {one_line(error)}") from error
+        raise ScenarioError(f"{shown(source)}: {one_line(error)}") from error
+
+
+def _read(source: str) -> tuple[str, str]:
+    """Stem and text of a scenario file."""
+    path = Path(source)
+    if path.suffix != ".toml":
+        raise ScenarioError(
+            f"no scenario {shown(repr(source))} in the library; there are {', '.join(library_names())}, "
+            "or give a path to a .toml file"
+        )
+    # Folders and files of what is run bear the stem.
+    if not path.stem.isprintable():
+        raise ScenarioError(f"{shown(source)}: cannot be read: a scenario's file name must be printable text")
+    try:
+        if path.exists() and not path.is_file():
+            raise ScenarioError(f"{shown(source)}: cannot be read: it is no file")  # and a pipe would keep us waiting
+        return path.stem, path.read_text(encoding="utf-8-sig")
+    except (OSError, ValueError) as error:
+        if isinstance(error, ScenarioError):
+            raise
+        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+        raise ScenarioError(f"{shown(source)}: cannot be read: {reason}") from error
 
 
 def _put(data: dict[str, Any], key: str, value: Any) -> None:
@@ -197,5 +217,5 @@ def _put(data: dict[str, Any], key: str, value: Any) -> None:
     for table in tables:
         data = data.setdefault(table, {})
         if not isinstance(data, dict):
-            raise ScenarioError(f"--set {key}: {table} is no table")
+            raise ScenarioError(f"--set {shown(key)}: {shown(table)} is no table")
     data[last] = value

@@ -2,10 +2,36 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterable, Mapping
 from typing import Any, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+
+# Letters of somebody else's text in a line: enough to find it by.
+_LONGEST = 200
+
+
+def shown(text: str) -> str:
+    """Text of somebody else's making as a part of one line: nothing that moves a cursor, not too long."""
+    if len(text) > _LONGEST:
+        # Both ends: that of a path is the file's name, that of a complaint says where.
+        text = f"{text[: _LONGEST // 2]}...{text[-_LONGEST // 2 :]}"
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
+
+
+def read_toml(text: str) -> dict[str, Any]:
+    """Read a TOML document.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or nested or written at such a length that it cannot be read.
+    """
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
 
 
 class Table(BaseModel):
@@ -26,7 +52,7 @@ def refuse_unknown(data: Mapping[str, Any], known: Iterable[str]) -> None:
     """Raise ValueError with the known keys if there is another."""
     unknown = sorted(set(data) - set(known))
     if unknown:
-        raise ValueError(f"unknown key {unknown[0]!r}; there are {', '.join(known)}")
+        raise ValueError(f"unknown key {shown(repr(unknown[0]))}; there are {', '.join(known)}")
 
 
 _PLAIN_WORDS = {
@@ -44,14 +70,23 @@ def _kinds() -> set[str]:
     return {value for kind in kinds for value in get_args(kind.annotation)}
 
 
+def _written(value: Any) -> str:
+    try:
+        return repr(value)
+    except ValueError:  # an integer of more digits than Python writes
+        return "a number of thousands of digits"
+    except RecursionError:
+        return "nested too deeply"
+
+
 def one_line(error: ValidationError) -> str:
     """Say the first thing wrong in one line: where, what, what came."""
     first = error.errors()[0]
     # Discriminator values appear in the location of a union's member: they are no keys of the file.
-    where = ".".join(str(part) for part in first["loc"] if part not in _kinds())
-    plain = _PLAIN_WORDS.get(first["type"], first["msg"].removeprefix("Value error, "))
-    message = plain.replace("\n", " ")
+    where = ".".join(shown(str(part)) for part in first["loc"] if part not in _kinds())
+    message = " ".join(_PLAIN_WORDS.get(first["type"], first["msg"].removeprefix("Value error, ")).split())
     came = first.get("input")
-    shown = "" if isinstance(came, Mapping | BaseModel) or first["type"] == "missing" else f" (it is {came!r})"
+    left_out = isinstance(came, Mapping | BaseModel) or first["type"] == "missing"
+    value = "" if left_out else f" (it is {shown(_written(came))})"
     more = len(error.errors()) - 1
-    return f"{where}: {message}{shown}".lstrip(": ") + (f"; and {more} more" if more else "")
+    return f"{where}: {message}{value}".lstrip(": ") + (f"; and {more} more" if more else "")

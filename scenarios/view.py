@@ -6,7 +6,6 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from engines.storage import read_trajectory
 from reports.fall import as_shown
 
 from .error import ScenarioError
@@ -14,7 +13,8 @@ from .files import write_text
 from .page_server import LOOPBACK, PageServer
 from .replay import ReplayError, rerun, viewer_files
 from .scenario import load_scenario
-from .stored import document, part
+from .stored import document, part, ride
+from .table import shown
 
 RECORDING, REPORT = "comparison.rrd", "report.html"
 
@@ -79,8 +79,13 @@ def page_server(folder: Path, port: int) -> PageServer:
         viewer = viewer_files()
     except ReplayError as error:
         raise ScenarioError(str(error)) from error
-    # What is in the folder now and nothing above it: an address is looked up, never joined to a path.
-    files = {path.name: path for path in folder.iterdir() if path.is_file() and not path.name.startswith(".")}
+    # What is in the folder now and nothing above it: an address is looked up, never joined to a path, and a link
+    # may lead anywhere.
+    files = {
+        path.name: path
+        for path in folder.iterdir()
+        if path.is_file() and not path.is_symlink() and not path.name.startswith(".")
+    }
     try:
         return PageServer(port, files, viewer)
     except OSError as error:
@@ -113,10 +118,11 @@ def stored_page(folder: Path) -> str:
     _, scenario = load_scenario(str(part(folder, "scenario.toml")))
     try:
         where = scenario.make_bicycle(), scenario.surface.make()
-        runs = {name: as_shown(read_trajectory(part(folder, f"{name}.parquet")), *where) for name in measured}
+        runs = {name: as_shown(ride(folder, manifest, measured, name), *where) for name in measured}
         verdicts = manifest.get("verdicts", [])
         return page(manifest, scenario.model_dump(), measured, verdicts, runs, where[1])
-    except (KeyError, TypeError, AttributeError, TemplateError) as error:
-        raise ScenarioError(f"{folder}: not the files of one run: {type(error).__name__}: {error}") from error
-    except ValueError as error:
-        raise ScenarioError(str(error)) from error
+    except ScenarioError:
+        raise
+    except (LookupError, TypeError, AttributeError, ArithmeticError, ValueError, TemplateError) as error:
+        what = shown(f"{type(error).__name__}: {error}")
+        raise ScenarioError(f"{folder}: not the files of one run: {what}") from error

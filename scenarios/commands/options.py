@@ -39,14 +39,20 @@ def changed(change: list[str] | None, duration: float | None) -> dict[str, Any]:
 
 def _assignment(text: str) -> tuple[str, Any]:
     """Split KEY=VALUE; the value is TOML, or a plain word."""
+    from ..table import read_toml, shown
+
     key, equals, value = text.partition("=")
     key = key.strip()
     if not equals or not key or not all(key.split(".")):
-        raise ScenarioError(f"--set {text}: must be KEY=VALUE, e.g. simulation.duration=5")
+        raise ScenarioError(f"--set {shown(text)}: must be KEY=VALUE, e.g. simulation.duration=5")
     try:
-        return key, tomllib.loads(f"value = {value}")["value"]
+        found = read_toml(f"value = {value}")
     except tomllib.TOMLDecodeError:
         return key, value
+    except ValueError as error:
+        raise ScenarioError(f"--set {shown(text)}: {error}") from None
+    # A second line would be a second statement.
+    return key, found["value"] if len(found) == 1 else value
 
 
 def angles_of(text: str | None) -> tuple[float, float] | None:
@@ -56,7 +62,9 @@ def angles_of(text: str | None) -> tuple[float, float] | None:
     try:
         lean, steer = (float(part) for part in text.split(","))
     except ValueError:
-        raise ScenarioError(f"--near {text}: must be two angles LEAN,STEER in rad, e.g. 0.74,2.84") from None
+        from ..table import shown
+
+        raise ScenarioError(f"--near {shown(text)}: must be two angles LEAN,STEER in rad, e.g. 0.74,2.84") from None
     return lean, steer
 
 

@@ -21,9 +21,12 @@ def paper_command(
     from reports.paper.table import show_ledger
 
     from .. import present
+    from ..files import make_folder
     from ..paper import ledger
     from ..paper_figures import write_paper
 
+    if out is not None:
+        make_folder(out)  # before the work: half a minute of it would be for nothing
     with present.Progress() as progress:
         lines = ledger(lambda part, done, parts: progress.watch(part, done, parts))
         written = [] if out is None else write_paper(out, lines, progress.watch)
@@ -54,11 +57,14 @@ def precision_command(
     from rich.console import Console
 
     from .. import present
+    from ..files import make_folder
     from ..precision import precision, write_precision
     from ..scenario import load_scenario
 
     changes = changed(change, duration)
     name, loaded = load_scenario(scenario, changes)
+    if out is not None:
+        make_folder(out)  # before the work
     with present.Progress() as progress:
         document = precision(name, loaded, engine, levels, eigenvalues, progress.watch)
     written = [] if out is None else write_precision(document, out)

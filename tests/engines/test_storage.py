@@ -35,6 +35,7 @@ def trajectory(count: int = 5, **changes: Any) -> Trajectory:
     """Distinct numbers everywhere, so that a swapped column shows."""
     rng = np.random.default_rng(1)
     values: dict[str, Any] = {name: rng.standard_normal((count, *shape)) for name, shape in SHAPES.items()}
+    values["time"].sort()
     facts = {"engine": "exudyn", "version": "1.0", "settings": {"step": 0.001, "method": None}}
     return Trajectory(**{**values, **facts, "steps": 7, "cpu_time": 0.1 + 0.2, "ended": "fell", **changes})
 

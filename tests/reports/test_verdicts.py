@@ -32,8 +32,8 @@ def test_markdown_puts_the_worst_first_and_shows_foreign_text_as_it_is() -> None
     lines = page.splitlines()
     assert lines[0] == "# Drift gate: fails"
     assert lines[2] == "1 of 3 quantities hold."
-    assert lines[4].startswith("- **missing** plane-circle, warp, run: did not run: \\<no\\>   \\*engine\\* \\|")
-    assert lines[5].startswith("- **worse** q2, mujoco-native, max_slip: 0.1 -\\> 0.2")
+    assert lines[4].startswith("- **missing** plane-circle, warp, run: did not run: \\<no>   \\*engine\\* \\|")
+    assert lines[5].startswith("- **worse** q2, mujoco-native, max_slip: 0.1 -> 0.2")
     rows = [line for line in lines if line.startswith("| ")][1:]
     assert [row.split(" | ")[-1] for row in rows] == ["missing |", "worse |", "holds |"]
 

@@ -1,0 +1,31 @@
+"""What a complaint must be, whatever it is about."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from scenarios.error import ScenarioError
+
+PATIENCE = 5.0  # CPU time that an answer may take [s]
+# A path of 200 letters, the names of all parameters of a bicycle, and some words.
+LONGEST = 1000
+
+
+def is_one_line(text: str) -> bool:
+    """Whether a terminal shows it as one line that moves no cursor."""
+    return bool(text.strip()) and text.isprintable() and len(text) <= LONGEST
+
+
+@contextmanager
+def refusing() -> Iterator[list[str]]:
+    """Take a `ScenarioError` as an answer, one line; any other exception, and a long wait, is a fault."""
+    said: list[str] = []
+    start = time.process_time()
+    try:
+        yield said
+    except ScenarioError as error:
+        said.append(str(error))
+        assert is_one_line(said[0]), said
+    assert time.process_time() - start < PATIENCE

@@ -1,0 +1,267 @@
+"""What input and stored files may not do: write elsewhere, run code, become markup; and what is installed is known."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+import shutil
+import tomllib
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from importlib.metadata import EntryPoint, PackageNotFoundError, distribution
+from pathlib import Path
+
+import pytest
+from complaints import refusing
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from engines import engine as registry
+from reports.drift import Verdict
+from reports.precision_figure import precision_figure
+from reports.summary import summary
+from reports.verdicts import junit_xml, markdown_page
+from scenarios import view
+from scenarios.page_server import Content
+from scenarios.run_folder import new_folder
+from scenarios.runner import plan_run, run
+from scenarios.scenario import LIBRARY, load_scenario
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("reference", "engines", "reports", "scenarios")
+Q2 = (LIBRARY / "q2.toml").read_text(encoding="utf-8")
+
+# Stems that a shell, an address or another system would take for another place.
+STEMS = [
+    "..",
+    "...",
+    ". .",
+    "-rf",
+    "--out",
+    "a b",
+    "a|b",
+    "%2e%2e",
+    "~",
+    "$HOME",
+    "`id`",
+    "<b>",
+    "é漢😀",
+    "C:x",
+    "a\\b",
+]
+
+
+@pytest.mark.parametrize("stem", STEMS)
+def test_a_run_folder_stays_inside_the_output_folder(stem: str, tmp_path: Path) -> None:
+    path = tmp_path / f"{stem}.toml"
+    path.write_text(Q2)
+    name, _ = load_scenario(str(path))
+    assert name == stem
+    folder = new_folder(tmp_path / "out", name)
+    assert folder.resolve().parent == tmp_path.resolve() / "out"
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == sorted(["out", path.name])
+
+
+@pytest.mark.parametrize("stem", ["..", "$x^{ <b> | `id`"])
+def test_a_scenarios_name_stays_inside_the_output_folder(stem: str, tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    path = tmp_path / "in" / f"{stem}.toml"
+    path.write_text(Q2)
+    name, scenario = load_scenario(str(path), {"simulation.duration": 0.02})
+    assert name == stem
+    plan = plan_run(name, scenario, ["reference"])
+    out = tmp_path / "a" / "runs"
+    folder = run(plan, out, lambda *_: None, lambda _: None).folder
+    assert folder.resolve().parent == out.resolve()
+    # Nothing but the folder, and in it what every run leaves.
+    assert [entry.name for entry in out.iterdir()] == [folder.name]
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["a", "in"]
+    assert sorted(entry.name for entry in (tmp_path / "in").iterdir()) == [path.name]
+    names = {"scenario.toml", "manifest.json", "metrics.json", "reference.parquet", "comparison.rrd", "report.html"}
+    assert {entry.name for entry in folder.iterdir()} == names
+    assert load_scenario(str(folder / "scenario.toml"))[1] == scenario
+
+
+@pytest.mark.parametrize(
+    "name", ["../x", "a/b", "/tmp/x", "..", ".", "", "a\\b", "a\nb", "a b", "-x", ".x", "é", "x" * 65]
+)
+def test_an_engines_name_leads_no_file_elsewhere(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    bad = EntryPoint(name=name, value="engines.lagrange:ENGINE", group=registry.ENTRY_POINT_GROUP)
+    here = registry.entry_points(group=registry.ENTRY_POINT_GROUP)
+    monkeypatch.setattr(registry, "entry_points", lambda group: [bad, *here])
+    assert name not in registry.engine_names()
+    with pytest.raises(ValueError, match="is not installed"):
+        registry.load_engine(name)
+    with refusing() as said:
+        plan_run("q2", load_scenario("q2", {f"engines.{name}": {}} if "." not in name else None)[1], [name])
+    assert said
+
+
+def calls(tree: ast.AST) -> Iterator[str]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield (node.module or "").partition(".")[0]
+        elif isinstance(node, ast.Call):
+            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            # A method of that name, such as a regular expression's, is another matter.
+            if name in ("eval", "exec", "compile", "__import__") and isinstance(node.func, ast.Name):
+                yield name
+            if name in ("read_pickle", "unsafe_load"):
+                yield name
+            yield from (word.arg for word in node.keywords if word.arg in ("allow_pickle", "shell"))
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_no_file_is_run_as_code(package: str) -> None:
+    forbidden = {
+        *("pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "dbm", "yaml"),
+        *("eval", "exec", "compile", "__import__", "read_pickle", "unsafe_load", "allow_pickle", "shell"),
+    }
+    paths = sorted((ROOT / package).rglob("*.py"))
+    assert paths
+    for path in paths:
+        used = set(calls(ast.parse(path.read_text(encoding="utf-8")))) & forbidden
+        assert not used, f"{path}: {used}"
+
+
+def test_such_code_would_be_seen() -> None:
+    text = (
+        "import pickle, os.path\nfrom marshal import loads\nnp.load(f, allow_pickle=True)\neval('1')\nre.compile('x')\n"
+    )
+    assert set(calls(ast.parse(text))) == {"pickle", "os", "marshal", "allow_pickle", "eval"}
+
+
+def test_a_link_in_a_run_folder_is_not_served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(view, "viewer_files", lambda: {"": Content("text/html", b"")})
+    folder = tmp_path / "run"
+    folder.mkdir()
+    for name in (view.RECORDING, view.REPORT):
+        (folder / name).write_text("")
+    (tmp_path / "secret.txt").write_text("secret")
+    (folder / "link.txt").symlink_to(tmp_path / "secret.txt")
+    with view.page_server(folder, 0) as server:
+        assert sorted(server.files) == [view.RECORDING, view.REPORT]
+
+
+class Seen(HTMLParser):
+    """Names of all elements and of all their attributes."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: set[str] = set()
+        self.attributes: set[str] = set()
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        self.attributes |= {name for name, _ in attrs}
+
+
+MARKUP = "\"><wbr onerror=x>'><wbr></script><wbr></style><wbr><!--<wbr>{{ 7 }}<wbr>&lt;wbr&gt;"
+
+
+def test_no_text_of_a_run_is_markup_in_its_page(tmp_path: Path) -> None:
+    changes = {"title": MARKUP, "tags": [MARKUP], "simulation.duration": 0.02}
+    plan = plan_run("a<wbr>", load_scenario("q2", changes)[1], ["reference"])
+    folder = run(plan, tmp_path, lambda *_: None, lambda _: None).folder
+    clean = Seen((folder / "report.html").read_text(encoding="utf-8"))
+    assert "wbr" not in clean.tags
+    assert "onerror" not in clean.attributes
+    # And of a folder that somebody else has written: every text in every document.
+    copied = Path(shutil.copytree(folder, tmp_path / "theirs"))
+    for name in ("manifest.json", "metrics.json"):
+        document = json.loads((copied / name).read_text())
+        (copied / name).write_text(json.dumps(hostile(document)))
+    theirs = Seen(view.stored_page(copied))
+    assert "wbr" not in theirs.tags
+    assert "onerror" not in theirs.attributes
+
+
+def hostile(document: object) -> object:
+    """A document with markup at the end of each of its texts, but for a date, which must be one."""
+    if isinstance(document, dict):
+        return {key: value if key == "created" else hostile(value) for key, value in document.items()}
+    if isinstance(document, list):
+        return [hostile(value) for value in document]
+    return document + MARKUP if isinstance(document, str) else document
+
+
+def test_no_text_of_a_verdict_is_markup_in_junit_xml() -> None:
+    verdict = Verdict(MARKUP, MARKUP, None, None, None, "missing", f"{MARKUP}\x00\x1b\n")
+    assert "<wbr" not in junit_xml([(MARKUP, verdict)])
+
+
+def markup(page: str) -> str:
+    """What of a page of Markdown is left to be a sign: letters behind a backslash are none."""
+    return re.sub(r"\\.", "", page)
+
+
+def test_no_text_of_a_run_is_markup_in_markdown() -> None:
+    name = f"[a](http://b)![c](d)`{MARKUP}|"
+    verdict = Verdict(name, "steps", None, None, None, "missing", name)
+    unmeasured = dict.fromkeys(("fell_at", "friction_left_at", "min_normal_force", "ended", "contact_force_error_at"))
+    measured = {name: {**unmeasured, "horizon": None, "ended": name}}
+    pages = [
+        markdown_page([(name, verdict)]),
+        summary(name, measured, {name: name}, [], -1.0, 1.0),
+    ]
+    for page in pages:
+        left = markup(page)
+        assert "<" not in left
+        assert "](" not in left
+        assert "`" not in left.replace("`reference`", "")
+        assert "\n\n\n" not in page
+
+
+def test_a_files_name_is_no_formula_in_a_figure(tmp_path: Path) -> None:
+    document = {"scenario": "$\\frac{$", "duration": 1.0, "horizon": None, "engines": {}}
+    precision_figure(tmp_path / "a.png", document)
+    assert (tmp_path / "a.png").stat().st_size > 0
+
+
+def test_every_installed_requirement_is_pinned() -> None:
+    """The requirements of the suite and its extras, with all of theirs, against constraints.txt."""
+    pins = {}
+    for line in (ROOT / "constraints.txt").read_text().splitlines():
+        name, equals, version = line.partition("==")
+        assert equals, line
+        pins[canonicalize_name(name)] = version.strip()
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    # What only a benchmark compares with may be absent.
+    asked = [*project["dependencies"], *(line for extra in extras.values() for line in extra)]
+    found = dict(installed([Requirement(line) for line in asked]))
+    assert {canonicalize_name(Requirement(line).name) for line in project["dependencies"]} <= set(found)
+    wrong = {name: version for name, version in found.items() if pins.get(name) != version}
+    in_benchmark = dict(installed([Requirement(line) for line in extras.get("benchmark", [])]))
+    wrong = {name: version for name, version in wrong.items() if name not in in_benchmark}
+    assert not wrong, f"installed, but not pinned so in constraints.txt: {wrong}"
+
+
+def installed(requirements: list[Requirement]) -> Iterator[tuple[str, str]]:
+    """Names and versions of the installed packages among requirements, and of all that these require."""
+    todo, seen = [(one.name, frozenset(one.extras)) for one in requirements], set()
+    while todo:
+        name, extras = todo.pop()
+        if (name, extras) in seen:
+            continue
+        seen.add((name, extras))
+        try:
+            found = distribution(name)
+        except PackageNotFoundError:
+            continue
+        yield canonicalize_name(name), found.version
+        for line in found.requires or []:
+            required = Requirement(line)
+            marker = required.marker
+            if marker is None or any(marker.evaluate({"extra": extra}) for extra in (*extras, "")):
+                todo.append((required.name, frozenset(required.extras)))
+
+
+def test_pins_are_exact() -> None:
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    assert all(re.fullmatch(r"[A-Za-z0-9._-]+==[0-9][A-Za-z0-9.+!]*", line) for line in lines)
+    assert len({canonicalize_name(line.partition("==")[0]) for line in lines}) == len(lines)
