@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .engine import Engine, EngineError, Problem, Progress, Trajectory
+from .engine import Engine, EngineError, Problem, Progress, Settings, Trajectory
 
 # Shapes of what is sampled, but for the number of samples; the first five must be given.
 SHAPES: dict[str, tuple[int, ...]] = {
@@ -53,7 +53,7 @@ def ride(engine: Engine, problem: Problem, settings: Any, progress: Progress) ->
     trajectory = engine.simulate(problem, settings, progress)
     if not isinstance(trajectory, Trajectory):
         raise EngineError(f"it gave a {type(trajectory).__name__}, not a Trajectory")
-    for wrong in _faults(engine, problem, trajectory):
+    for wrong in _faults(engine, problem, settings, trajectory):
         raise EngineError(wrong)
     finite = np.all([np.isfinite(_rows(getattr(trajectory, name))).all(axis=1) for name in REQUIRED], axis=0)
     if finite.all():
@@ -69,10 +69,15 @@ def _rows(values: np.ndarray) -> np.ndarray:
     return values.reshape(len(values), -1)
 
 
-def _faults(engine: Engine, problem: Problem, trajectory: Trajectory) -> Iterator[str]:
+def _faults(engine: Engine, problem: Problem, settings: Settings, trajectory: Trajectory) -> Iterator[str]:
     """What makes it no trajectory of the problem, in words."""
-    if trajectory.engine != engine.name:
-        yield f"its trajectory says that it is of {trajectory.engine!r}"
+    for name, said, own in (
+        ("engine", trajectory.engine, engine.name),
+        ("version", trajectory.version, engine.version),
+        ("settings", trajectory.settings, settings.model_dump(mode="json")),
+    ):
+        if said != own:
+            yield f"its trajectory is of {name} {said!r}, not {own!r}"
     samples = np.size(trajectory.time)
     for name, shape in SHAPES.items():
         value = getattr(trajectory, name)

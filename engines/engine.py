@@ -107,6 +107,11 @@ class Trajectory:
         cut = {name: value[:samples] for name in _SAMPLED if (value := getattr(self, name)) is not None}
         return replace(self, **cut)
 
+    def not_finite(self) -> list[str]:
+        """Names of what is given and is not finite in some samples."""
+        given = ((name, getattr(self, name)) for name in _SAMPLED)
+        return [name for name, value in given if value is not None and not np.all(np.isfinite(value))]
+
 
 _SAMPLED = tuple(field.name for field in fields(Trajectory) if "ndarray" in str(field.type))
 
@@ -213,12 +218,40 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 
 
 def _announced() -> dict[str, EntryPoint]:
-    """Entry points by name; one whose name could lead a file elsewhere is no engine."""
-    return {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP) if _NAME.fullmatch(point.name)}
+    """Entry points by name; one whose name could lead a file elsewhere is no engine.
+
+    Raises
+    ------
+    ValueError
+        If two packages announce one name: which of them ran would hang on the order of the path.
+    """
+    found: dict[str, EntryPoint] = {}
+    for point in entry_points(group=ENTRY_POINT_GROUP):
+        if not _NAME.fullmatch(point.name):
+            continue
+        other = found.setdefault(point.name, point)
+        # One package may stand on the path twice, as with an editable install.
+        if _package(other) != _package(point):
+            raise ValueError(
+                f"engine {point.name!r} is announced by two packages, {_package(other)} and {_package(point)}; "
+                "uninstall one of them"
+            )
+    return found
+
+
+def _package(point: EntryPoint) -> str:
+    """What announces an entry point: its distribution's name, as package indices compare them."""
+    return point.value if point.dist is None else re.sub(r"[-_.]+", "-", point.dist.name).lower()
 
 
 def engine_names() -> list[str]:
-    """Names of all installed engines, the reference first."""
+    """Names of all installed engines, the reference first.
+
+    Raises
+    ------
+    ValueError
+        If two packages announce an engine of one name.
+    """
     return sorted(_announced(), key=lambda name: (name != REFERENCE, name))
 
 
@@ -228,7 +261,8 @@ def load_engine(name: str) -> Engine:
     Raises
     ------
     ValueError
-        If no engine of that name is installed, or what is announced under it is no engine.
+        If no engine of that name is installed, or what is announced under it is no engine, or two packages
+        announce an engine of one name.
     """
     points = _announced()
     if name not in points:

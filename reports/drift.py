@@ -11,20 +11,30 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-# Of a ride, in the order shown; they are metrics but for the first.
+# Of a ride, in the order shown.
 RIDE_QUANTITIES = (
     "short_error",
+    "position_error",
+    "state_error",
     "radius_drift_rate",
     "phase_drift_rate",
     "rear_rate_drift_rate",
     "energy_drift",
+    "max_gap",
     "max_slip",
     "mean_slip",
+    "report_mismatch",
     "contact_force_error",
+    "settled_force_error",
     "fell_at",
     "steps",
 )
 
+
+# Why an order may not be seen; of another version that is an improvement.
+BELOW_NOISE = "the errors of its steps cannot be told from what its iterations leave"
+
+CHANGES = "settings"  # under which other settings or another version are told, whatever they do
 
 # Of these more is better; of all others, less in size.
 _MORE_IS_BETTER = ("fell_at", "observed_order")
@@ -73,19 +83,6 @@ class Verdict:
         return asdict(self) | {"passes": self.passes}
 
 
-def quantities(measured: Mapping[str, Any], short_error: float) -> dict[str, float | None]:
-    """Pick the gated quantities of a ride; drifts keep their signs.
-
-    Parameters
-    ----------
-    measured : mapping
-        Metrics of a run against the exact circular motion.
-    short_error : float
-        Position error at the short horizon [m].
-    """
-    return {"short_error": short_error} | {name: measured[name] for name in RIDE_QUANTITIES[1:]}
-
-
 def judge(
     engine: str,
     values: Mapping[str, float | None],
@@ -93,6 +90,7 @@ def judge(
     allowed: Mapping[str, float | None],
     settings: Mapping[str, Any],
     version: str,
+    reasons: Mapping[str, str] | None = None,
 ) -> list[Verdict]:
     """Hold an engine's quantities against its baseline.
 
@@ -107,6 +105,8 @@ def judge(
         Limits by quantity; None where this run cannot tell the quantity.
     settings, version
         Of this run, to explain a change.
+    reasons : mapping, optional
+        Why this run does not give a quantity.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def judge(
     changes = _changes(baseline, settings, version)
     stored = " ".join(["the baseline", *(["of " + baseline["created"]] if "created" in baseline else [])])
     since = f"since {stored}: {changes}" if changes else f"same version and settings as {stored}"
-    verdicts = []
+    verdicts = [Verdict(engine, CHANGES, None, None, None, "holds", since)] if changes else []
     for quantity, limit in allowed.items():
         value, before = values.get(quantity), baseline["quantities"].get(quantity)
         if value is None and before is None:
@@ -126,8 +126,10 @@ def judge(
             verdicts.append(_fall(engine, value, before, since, excused=bool(changes)))
             continue
         if value is None or before is None or limit is None:
-            reason = "not in the baseline" if before is None else "not given by this run"
-            verdicts.append(Verdict(engine, quantity, value, before, limit, "missing", f"{reason}; {since}"))
+            why = (reasons or {}).get(quantity, "not given by this run")
+            reason = "not in the baseline" if before is None else why
+            status = "better" if why == BELOW_NOISE and before is not None and changes else "missing"
+            verdicts.append(Verdict(engine, quantity, value, before, limit, status, f"{reason}; {since}"))
             continue
         status = _status(quantity, value, before, limit, excused=bool(changes))
         move = f"{before:.6g} -> {value:.6g}, limit {limit:.2g}"

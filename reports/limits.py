@@ -92,18 +92,26 @@ def ride_limits(scale: Scale, noise: float) -> dict[str, float]:
     dict
         Limit by quantity, in the quantity's unit.
     """
+    # An error of the speed carries D away from where it should be.
+    away = 1 + scale.speed * scale.duration / scale.radius
+    force = noise * scale.rear_rate**2 * scale.radius / scale.gravity
     return {
-        "short_error": noise * scale.radius,
+        "short_error": noise * scale.radius * away,
+        "position_error": noise * scale.radius * away,
+        "state_error": noise * away,
         "radius_drift_rate": _SLOPE * noise * scale.radius / scale.duration,
         "phase_drift_rate": _SLOPE * noise / scale.duration,
         "rear_rate_drift_rate": _SLOPE * noise * scale.rear_rate / scale.duration,
         # Energy is quadratic in the speeds.
         "energy_drift": 2 * noise,
+        "max_gap": noise * scale.radius,
         "max_slip": noise * scale.speed,
         "mean_slip": noise * scale.speed,
+        "report_mismatch": noise,
         # Forces follow accelerations, whose sensitivity to the state is the square of its fastest rate, the
         # wheels', and which are measured against the weight.
-        "contact_force_error": noise * scale.rear_rate**2 * scale.radius / scale.gravity,
+        "contact_force_error": force,
+        "settled_force_error": force,
         # The frame comes down at the speed of a fall from its height.
         "fell_at": noise * scale.radius / math.sqrt(2 * scale.gravity * scale.height),
         # Where a step is accepted or not by its error, one may stand at the very tolerance.

@@ -14,6 +14,8 @@ from reference.surface import Surface
 
 from .fall import fell_at, until_fall
 
+SETTLED = 0.2  # from here on contacts that start unsettled have settled, of any model here [s]
+
 
 def metrics(
     trajectory: Trajectory,
@@ -54,6 +56,7 @@ def metrics(
     result |= _drifts(trajectory, reference, circular)
     result |= _energy(trajectory)
     result |= _constraints(trajectory)
+    result["not_finite"] = trajectory.not_finite()
     result |= _friction(trajectory, trajectory if reference is None else reference, surface)
     result |= {
         "steps": trajectory.steps,
@@ -139,7 +142,8 @@ def _extremes(values: np.ndarray) -> dict[str, float]:
 
 
 def _errors(trajectory: Trajectory, reference: Trajectory | None) -> dict[str, Any]:
-    names = ("position_error", "orientation_error", "rear_rate_error", "contact_force_error", "contact_force_error_at")
+    names = ("position_error", "orientation_error", "rear_rate_error", "contact_force_error")
+    names += ("contact_force_error_at", "settled_force_error")
     result: dict[str, Any] = dict.fromkeys(names)
     if reference is None:
         return result
@@ -154,7 +158,11 @@ def _errors(trajectory: Trajectory, reference: Trajectory | None) -> dict[str, A
         largest = np.linalg.norm(reference.contact_force[:n], axis=2).max()
         result["contact_force_error"] = float(difference.max() / largest)
         # Contacts that start unsettled are worst in the first sample, which says little of the ride.
-        result["contact_force_error_at"] = float(trajectory.time[difference.max(axis=1).argmax()])
+        if difference.max() > 0:
+            result["contact_force_error_at"] = float(trajectory.time[difference.max(axis=1).argmax()])
+        settled = trajectory.time[:n] >= SETTLED
+        if settled.any():
+            result["settled_force_error"] = float(difference[settled].max() / largest)
     return result
 
 

@@ -47,7 +47,11 @@ def remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]
     if metrics["ended"] is not None:
         lines.append(f"{name} ended early: {metrics['ended']}")
     if metrics["contact_force_error_at"] == 0:
-        lines.append(f"{name}: the force error is largest in the first sample")
+        later = metrics["settled_force_error"]
+        rest = "" if later is None else f"; once settled it is {later:.2g}"
+        lines.append(f"{name}: the force error is largest in the first sample{rest}")
+    if metrics["not_finite"]:
+        lines.append(f"{name}: not finite in some samples: {', '.join(metrics['not_finite'])}")
     if metrics["horizon"] is not None and metrics["horizon"] < duration:
         lines.append(
             f"{name}: beyond {metrics['horizon']:.2f} s the motion's own instability makes the error meaningless"

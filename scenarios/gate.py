@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 import reports
 from engines.engine import Engine, Settings, UnsuitableProblem, engine_names
@@ -18,7 +18,7 @@ from .files import make_folder, write_json
 from .gate_sample import SHORT_HORIZON, sample
 from .run_folder import library_versions
 from .runner import Watch, configure
-from .scenario import library_names, load_scenario
+from .scenario import Scenario, library_names, load_scenario
 from .start import make_start
 from .stored import read_json
 from .table import one_line, shown
@@ -37,6 +37,7 @@ class _Entry(BaseModel):
     created: str = ""
     version: str
     settings: dict[str, Any]
+    step_noise: float | None = Field(default=None, ge=0)
     quantities: dict[str, float | None]
 
 
@@ -48,6 +49,7 @@ class _Baseline(BaseModel):
     scenario: str | None = None
     duration: float = DURATION
     short_horizon: float = SHORT_HORIZON
+    content: dict[str, Any] | None = None
     engines: dict[str, _Entry]
 
 
@@ -95,7 +97,7 @@ def check(
     folder = BASELINES if baselines is None else baselines
     changes = {"simulation.duration": DURATION, "simulation.output_rate": OUTPUT_RATE}
     plans = [load_scenario(source, changes) for source in (sources or gated_names())]
-    known = {name: read_baseline(name, folder) for name, _ in plans}
+    known = {name: read_baseline(name, folder, content(scenario)) for name, scenario in plans}
     # Engines of a baseline count too: one that is gone did not run.
     names = [*engine_names(), *sorted({name for entries in known.values() for name in entries} - set(engine_names()))]
     for engine in engines or []:
@@ -114,10 +116,11 @@ def check(
             entry = baseline.get(engine_name)
             try:
                 engine, settings = chosen(engine_name, scenario.engines.get(engine_name, {}))
-                found = sample(start, engine, settings, lambda t, e=engine_name: watch(e, t, DURATION))
+                known_noise = (entry or {}).get("step_noise")
+                found = sample(start, engine, settings, lambda t, e=engine_name: watch(e, t, DURATION), known_noise)
             except Exception as error:  # an engine that breaks in any way did not run
-                if entry is None and isinstance(error, UnsuitableProblem):
-                    continue  # it never could
+                if entry is None and not engines and isinstance(error, UnsuitableProblem):
+                    continue  # it never could, and nobody asked for it
                 verdicts.append((name, missing(engine_name, f"did not run: {' '.join(str(error).split())}")))
                 continue
             entries[engine_name] = {
@@ -125,22 +128,39 @@ def check(
                 "version": found.version,
                 "settings": found.settings,
                 "steps": found.steps,
+                "step_noise": found.step_noise,
                 "quantities": found.values,
             }
-            judged = judge(engine_name, found.values, entry, found.limits, found.settings, found.version)
+            run = (found.settings, found.version, found.reasons)
+            judged = judge(engine_name, found.values, entry, found.limits, *run)
             verdicts += [(name, verdict) for verdict in judged]
         fresh[name] = {
             "scenario": name,
             "duration": DURATION,
             "short_horizon": SHORT_HORIZON,
+            "content": content(scenario),
             "libraries": library_versions(),
             "engines": entries,
         }
+    if not verdicts:
+        raise ScenarioError("nothing was judged: no engine and no scenario go together")
     return verdicts, fresh
 
 
-def read_baseline(scenario: str, folder: Path | None = None) -> dict[str, Any]:
+def content(scenario: Scenario) -> dict[str, Any]:
+    """What of a scenario its motion depends on, as JSON values."""
+    return scenario.model_dump(mode="json", exclude_none=True, include={"surface", "motion", "perturbation", "bicycle"})
+
+
+def read_baseline(scenario: str, folder: Path | None = None, motion: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Committed entries of a scenario, by engine; empty where there is no baseline.
+
+    Parameters
+    ----------
+    scenario : str
+    folder : Path, optional
+    motion : mapping, optional
+        Its `content`, which must be the baseline's.
 
     Raises
     ------
@@ -167,6 +187,8 @@ def read_baseline(scenario: str, folder: Path | None = None) -> dict[str, Any]:
         if getattr(found, name) != value:
             came = getattr(found, name)
             raise ScenarioError(f"{path}: not a baseline of this gate: its {name} is {came!r} s, not {value!r} s")
+    if motion is not None and found.content not in (None, motion):
+        raise ScenarioError(f"{path}: not the baseline of this {scenario}: its motion, ground or bicycle is another")
     return data["engines"]
 
 

@@ -12,13 +12,15 @@ import numpy as np
 
 from engines.admission import ride
 from engines.convergence import observed_orders
-from engines.engine import Engine, EngineError, Problem, Settings
+from engines.engine import Engine, EngineError, Problem, Settings, Trajectory
 from engines.identify import DISTURBANCES, STENCIL_WEIGHT, interval_of, jacobian_at
 from engines.steady import steady_trajectory
+from reference.contact import observe
 from reference.kinematics import REAR_ANGLE, YAW
 from reference.stability import growth_rate, linearise, sorted_eigenvalues
-from reports.drift import quantities
+from reports.drift import BELOW_NOISE, RIDE_QUANTITIES
 from reports.fall import fell_at, until_fall
+from reports.inspection import report_mismatch, state_error
 from reports.limits import Scale, eigenvalue_limits, noise, order_limit, ride_limits
 from reports.metrics import position_errors
 from reports.precision import match
@@ -31,6 +33,8 @@ SHORT_HORIZON = 1.0  # of the first error and of the order [s]
 # four steps of common sizes divide [s].
 FACTORS = (4.0, 2.0, 1.0)
 ORDER_INTERVAL = 0.2
+# A step that may be off by more has no limits that would bite.
+LARGEST_NOISE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -41,8 +45,12 @@ class Sample:
     ----------
     values, limits : dict
         By quantity; None where the engine does not give it, or no figure could be told from noise.
+    reasons : dict
+        Why there is no figure, by quantity.
     steps : int
         Of the ride.
+    step_noise : float
+        As the engine has it with these settings.
     version : str
     settings : dict
         JSON values.
@@ -50,15 +58,24 @@ class Sample:
 
     values: dict[str, float | None]
     limits: dict[str, float | None]
+    reasons: dict[str, str]
     steps: int
+    step_noise: float
     version: str
     settings: dict[str, Any]
 
 
-def sample(start: Start, engine: Engine, settings: Settings, watch: Callable[[float], None]) -> Sample:
+def sample(
+    start: Start,
+    engine: Engine,
+    settings: Settings,
+    watch: Callable[[float], None],
+    known_noise: float | None = None,
+) -> Sample:
     """Run an engine on a circular motion and measure it against the exact one.
 
-    An engine that falls is measured up to its fall; it has no order and no eigenvalues.
+    Contacts, poses and energies are those that follow from its coordinates; what it reports of them must agree. An
+    engine that falls is measured up to its fall; it has no order and no eigenvalues.
 
     Parameters
     ----------
@@ -67,40 +84,69 @@ def sample(start: Start, engine: Engine, settings: Settings, watch: Callable[[fl
     settings : Settings
     watch : callable
         Called with the simulated time reached in the ride.
+    known_noise : float, optional
+        The step noise of the baseline: an engine that has become noisier has no more room for it.
 
     Raises
     ------
     UnsuitableProblem
         If the engine is not made for such a motion.
     EngineError, ValueError
-        If the engine does not run, or neither falls nor comes to the end.
+        If the engine does not run, neither falls nor comes to the end, or gives what is not finite.
     """
     problem, motion = start.problem, start.motion
     if motion is None:
         raise ValueError("only a circular motion can be gated: its exact solution is known")
     engine.check(problem, settings)
+    own_noise = engine.step_noise(settings)
+    if not 0 <= own_noise <= LARGEST_NOISE:
+        raise EngineError(f"its step_noise is {own_noise!r}; it must be from 0 to {LARGEST_NOISE:g}")
+    step_noise = own_noise if known_noise is None else min(own_noise, known_noise)
     trajectory = ride(engine, problem, settings, watch)
     fall = fell_at(trajectory, problem.bicycle, problem.surface)
     if trajectory.ended is not None and fall is None:
         raise EngineError(trajectory.ended)
-    scale, steps, whole = _scale(start), trajectory.steps, float(trajectory.time[-1])
-    exact = steady_trajectory(problem.bicycle, motion, problem.times)
-    measured = measure_one(start, trajectory, exact)
     standing = until_fall(trajectory, problem.bicycle, problem.surface)
-    scale = replace(scale, duration=float(standing.time[-1]))
-    errors = position_errors(standing, exact)
-    short = float(errors[min(int(np.searchsorted(problem.times, SHORT_HORIZON)), len(errors) - 1)])
-    # As many as the part that is measured took.
-    values = quantities(measured | {"steps": steps * scale.duration / whole}, short)
+    if standing.not_finite():
+        raise EngineError(f"not finite in some samples: {', '.join(standing.not_finite())}")
+    scale = replace(_scale(start), duration=float(standing.time[-1]))
+    values = _ride_values(start, trajectory, standing, scale)
     limits: dict[str, float | None] = dict(
-        ride_limits(scale, noise(scale, engine.step_noise(settings), steps, fall is not None))
+        ride_limits(scale, noise(scale, step_noise, trajectory.steps, fall is not None))
     )
+    reasons: dict[str, str] = {}
     if fall is None:
-        for part in (_order(start, engine, settings), _eigenvalues(start, engine, settings, steps / scale.duration)):
+        rate = trajectory.steps / scale.duration
+        order, reasons = _order(start, engine, settings, step_noise)
+        for part in (order, _eigenvalues(start, engine, settings, rate, step_noise)):
             values |= {name: value for name, (value, _) in part.items()}
             limits |= {name: limit for name, (_, limit) in part.items()}
     values = {name: value if value is not None and np.isfinite(value) else None for name, value in values.items()}
-    return Sample(values, limits, steps, engine.version, settings.model_dump(mode="json"))
+    shown = settings.model_dump(mode="json")
+    return Sample(values, limits, reasons, trajectory.steps, own_noise, engine.version, shown)
+
+
+def _ride_values(start: Start, trajectory: Trajectory, standing: Trajectory, scale: Scale) -> dict[str, float | None]:
+    """Quantities of a ride, of the part of it that is ``standing``."""
+    problem, motion = start.problem, start.motion
+    assert motion is not None
+    exact = steady_trajectory(problem.bicycle, motion, problem.times)
+    measured = measure_one(start, trajectory, exact)
+    errors = position_errors(standing, exact)
+    seen = observe(problem.bicycle, problem.surface, standing.q, standing.qd)
+    slip = np.linalg.norm(seen.slip, axis=2)
+    found = measured | {
+        "short_error": float(errors[min(int(np.searchsorted(problem.times, SHORT_HORIZON)), len(errors) - 1)]),
+        "position_error": float(errors.max()),
+        "state_error": state_error(standing, exact, scale),
+        "max_gap": float(np.abs(seen.gap).max()) if seen.found else None,
+        "max_slip": float(slip.max()) if seen.found else None,
+        "mean_slip": float(slip.mean()) if seen.found else None,
+        "report_mismatch": report_mismatch(standing, seen, problem.bicycle, scale) if seen.found else None,
+        # As many as the part that is measured took.
+        "steps": trajectory.steps * scale.duration / float(trajectory.time[-1]),
+    }
+    return {name: found[name] for name in RIDE_QUANTITIES}
 
 
 def _scale(start: Start) -> Scale:
@@ -120,25 +166,28 @@ def _scale(start: Start) -> Scale:
 Found = dict[str, tuple[float | None, float | None]]
 
 
-def _order(start: Start, engine: Engine, settings: Settings) -> Found:
-    """Order of convergence over the short horizon, with its limit."""
+def _order(start: Start, engine: Engine, settings: Settings, step_noise: float) -> tuple[Found, dict[str, str]]:
+    """Order of convergence over the short horizon with its limit, or why there is none."""
     short = replace(start.problem, times=ORDER_INTERVAL * np.arange(round(SHORT_HORIZON / ORDER_INTERVAL) + 1))
+    none: Found = {"observed_order": (None, None)}
     try:
         ladder = [settings.refined(factor) for factor in FACTORS]
         rides = [ride(engine, short, refined, lambda _: None) for refined in ladder]
-    except ValueError:  # settings without a step, or of a step at the end of its range or beside the interval
-        return {"observed_order": (None, None)}
+    except ValueError as error:  # settings without a step, or of a step at the end of its range or beside the interval
+        return none, {"observed_order": " ".join(str(error).split())}
     samples = min(len(one.time) for one in rides)
     paths = [one.q[:samples, :3] for one in rides]
     first, second = (float(np.abs(b - a).max()) for a, b in pairwise(paths))
     scale = replace(_scale(start), duration=float(short.times[-1]))
     # The finest ride has the most steps.
-    error = scale.radius * noise(scale, engine.step_noise(settings), rides[-1].steps)
+    error = scale.radius * noise(scale, step_noise, rides[-1].steps)
     limit = order_limit(error, (first, second))
-    return {"observed_order": (None if limit is None else observed_orders(paths)[-1], limit)}
+    if limit is None:
+        return none, {"observed_order": BELOW_NOISE}
+    return {"observed_order": (observed_orders(paths)[-1], limit)}, {}
 
 
-def _eigenvalues(start: Start, engine: Engine, settings: Settings, rate: float) -> Found:
+def _eigenvalues(start: Start, engine: Engine, settings: Settings, rate: float, step_noise: float) -> Found:
     """How far the engine's own eigenvalues are from the reference's, at ``rate`` steps a second.
 
     Those that decay within the interval of the flow from which they are measured are left out: little is left of
@@ -150,7 +199,7 @@ def _eigenvalues(start: Start, engine: Engine, settings: Settings, rate: float) 
     jacobian = jacobian_at(engine, settings, motion, interval)
     exact = linearise(problem.bicycle, problem.surface, *start.undisturbed)
     scale = replace(_scale(start), duration=1.5 * interval)
-    error = noise(scale, engine.step_noise(settings), ceil(rate * scale.duration))
+    error = noise(scale, step_noise, ceil(rate * scale.duration))
     allowed = eigenvalue_limits(exact.jacobian, scale, error, DISTURBANCES, STENCIL_WEIGHT, interval)
     found = match(exact.eigenvalues, sorted_eigenvalues(jacobian))
     slow = np.real(exact.eigenvalues) > -1 / interval

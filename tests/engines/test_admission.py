@@ -52,7 +52,9 @@ def test_a_whole_trajectory_is_taken_as_it_is() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"engine": "warp"}, "says that it is of 'warp'"),
+        ({"engine": "warp"}, "is of engine 'warp', not 'reference'"),
+        ({"version": "0"}, "is of version '0', not "),
+        ({"settings": {"step": 9}}, "is of settings {'step': 9}, not {"),
         ({"q": np.zeros((11, 8))}, r"its q has shape (11, 8); it must be (11, 9)"),
         ({"qd": np.zeros((10, 9))}, r"its qd has shape (10, 9); it must be (11, 9)"),
         ({"q": [[0.0] * 9] * 11}, "its q is no array of floats"),

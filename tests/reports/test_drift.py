@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from reports.drift import RIDE_QUANTITIES, Verdict, judge, missing, quantities
+from reports.drift import BELOW_NOISE, CHANGES, Verdict, judge, missing
 
 SETTINGS = {"step": 0.001, "tolerance": 1e-10}
 ENTRY = {"version": "1.0", "settings": SETTINGS, "quantities": {"short_error": 1e-5, "max_slip": None}}
@@ -15,9 +15,14 @@ ALLOWED = {"short_error": 1e-7, "max_slip": 1e-6}
 
 
 def judged(value: float | None, entry: dict[str, Any] | None = ENTRY, **changes: Any) -> list[Verdict]:
+    """Verdicts on quantities."""
     values = {"short_error": value, "max_slip": None}
     run = {"settings": SETTINGS, "version": "1.0"} | changes
-    return judge("exudyn", values, entry, ALLOWED, run["settings"], run["version"])
+    return of_quantities(judge("exudyn", values, entry, ALLOWED, run["settings"], run["version"]))
+
+
+def of_quantities(verdicts: list[Verdict]) -> list[Verdict]:
+    return [verdict for verdict in verdicts if verdict.quantity != CHANGES]
 
 
 @pytest.mark.parametrize(
@@ -80,21 +85,6 @@ def test_verdicts_are_json() -> None:
     assert [row["passes"] for row in rows] == [True, False]
 
 
-def test_quantities_keep_their_signs() -> None:
-    rates = {"radius_drift_rate": -1e-6, "phase_drift_rate": 2e-6, "rear_rate_drift_rate": -3e-6}
-    others = {
-        "energy_drift": 1e-8,
-        "max_slip": None,
-        "mean_slip": None,
-        "contact_force_error": 2e-9,
-        "fell_at": 1.5,
-        "steps": 9,
-    }
-    found = quantities(rates | others | {"cpu_time": 3.0}, 5e-6)
-    assert found == {"short_error": 5e-6} | rates | others
-    assert tuple(found) == RIDE_QUANTITIES
-
-
 @pytest.mark.parametrize(
     ("value", "before", "status"),
     [
@@ -111,7 +101,7 @@ def test_an_earlier_fall_is_worse_and_one_that_is_new_too(
     entry = ENTRY | {"quantities": {"fell_at": before}}
     (verdict,) = judge("exudyn", {"fell_at": value}, entry, {"fell_at": 1e-3}, SETTINGS, "1.0")
     assert (verdict.status, verdict.passes) == (status, status == "holds")
-    (verdict,) = judge("exudyn", {"fell_at": value}, entry, {"fell_at": 1e-3}, SETTINGS, "1.1")
+    (verdict,) = of_quantities(judge("exudyn", {"fell_at": value}, entry, {"fell_at": 1e-3}, SETTINGS, "1.1"))
     assert verdict.status == ("better" if status == "changed" else status)
 
 
@@ -119,7 +109,7 @@ def test_a_lower_order_is_worse() -> None:
     entry = ENTRY | {"quantities": {"observed_order": 2.0}}
     found = {}
     for value in (1.0, 1.995, 1.9, 4.0):
-        (verdict,) = judge("exudyn", {"observed_order": value}, entry, {"observed_order": 0.01}, SETTINGS, "1.1")
+        _, verdict = judge("exudyn", {"observed_order": value}, entry, {"observed_order": 0.01}, SETTINGS, "1.1")
         found[value] = verdict.status
     # 1.9 is an order of two as well, of another version; of the same it is a fault.
     assert found == {1.0: "worse", 1.995: "holds", 1.9: "holds", 4.0: "better"}
@@ -130,7 +120,7 @@ def test_a_lower_order_is_worse() -> None:
 def test_another_number_of_steps_is_neither_worse_nor_better() -> None:
     entry = ENTRY | {"quantities": {"steps": 3000}}
     for value, status in ((3001, "holds"), (1500, "changed"), (6000, "changed")):
-        (verdict,) = judge("exudyn", {"steps": value}, entry, {"steps": 1.0}, SETTINGS, "1.1")
+        _, verdict = judge("exudyn", {"steps": value}, entry, {"steps": 1.0}, SETTINGS, "1.1")
         assert verdict.status == status
 
 
@@ -138,6 +128,21 @@ def test_what_this_run_cannot_tell_from_noise_is_missing() -> None:
     entry = ENTRY | {"quantities": {"observed_order": 2.0}}
     (verdict,) = judge("exudyn", {"observed_order": None}, entry, {"observed_order": None}, SETTINGS, "1.0")
     assert (verdict.status, verdict.share) == ("missing", None)
+    arguments = ("exudyn", {"observed_order": None}, entry, {"observed_order": None}, SETTINGS)
+    # Errors that another version has brought below the noise are an improvement; of the same it is a fault.
+    for version, status in (("1.0", "missing"), ("1.1", "better")):
+        verdict = judge(*arguments, version, {"observed_order": BELOW_NOISE})[-1]
+        assert verdict.status == status
+        assert verdict.reason.startswith(BELOW_NOISE)
+    verdict = judge(*arguments, "1.1", {"observed_order": "a step that does not divide"})[-1]
+    assert (verdict.status, "a step that does not divide" in verdict.reason) == ("missing", True)
+
+
+def test_other_settings_are_told_even_if_all_holds() -> None:
+    change, held = judge("exudyn", {"short_error": 1e-5}, ENTRY, {"short_error": 1e-7}, SETTINGS | {"step": 2}, "1.0")
+    assert (change.quantity, change.status, change.passes) == (CHANGES, "holds", True)
+    assert "step 0.001 -> 2" in change.reason
+    assert held.status == "holds"
 
 
 def test_the_baselines_date_is_told() -> None:

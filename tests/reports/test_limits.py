@@ -38,14 +38,20 @@ def test_noise_is_what_the_steps_add_and_the_motion_amplifies() -> None:
 
 def test_limits_are_noise_times_sensitivity() -> None:
     expected = {
-        "short_error": 2e-7,
+        # In 4 s an error of the speed carries D away by ten times as much as one of the radius.
+        "short_error": 2e-7 * 11,
+        "position_error": 2e-7 * 11,
+        "state_error": 1e-7 * 11,
         "radius_drift_rate": 3 * 2e-7 / 4,
         "phase_drift_rate": 3 * 1e-7 / 4,
         "rear_rate_drift_rate": 3 * 18e-7 / 4,
         "energy_drift": 2e-7,
+        "max_gap": 2e-7,
         "max_slip": 5e-7,
         "mean_slip": 5e-7,
+        "report_mismatch": 1e-7,
         "contact_force_error": 1e-7 * 18**2 * 2 / 9.81,
+        "settled_force_error": 1e-7 * 18**2 * 2 / 9.81,
         "fell_at": 2e-7 / np.sqrt(2 * 9.81 * 0.9),
         "steps": 1.0,
     }

@@ -13,6 +13,8 @@ MEASURED: dict[str, Any] = {
     "orientation_error": {"max": 5.1e-6, "end": 2e-6},
     "contact_force_error": 1.7e-4,
     "contact_force_error_at": 0.5,
+    "settled_force_error": 1.2e-5,
+    "not_finite": [],
     "radius_drift_rate": -1.23e-5,
     "energy_drift": 6.2e-8,
     "max_slip": 3.1e-12,

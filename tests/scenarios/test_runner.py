@@ -26,6 +26,8 @@ METRICS = {
     *("radius_drift_rate", "phase_drift_rate", "rear_rate_drift_rate"),
     *("energy_drift", "energy_drift_rate", "energy_variation", "max_gap", "max_slip", "mean_slip"),
     *(
+        "settled_force_error",
+        "not_finite",
         "required_friction",
         "friction",
         "friction_left_at",
