@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import cache
 from importlib.metadata import version
 from typing import Literal, Self
 
@@ -15,6 +16,12 @@ from reference.simulate import simulate, simulate_modified_euler, steps_per_outp
 from .engine import REFERENCE, EngineError, Problem, Progress, Settings, Trajectory
 
 ORDER = 8  # of dop853: a step's error goes with this power of it
+
+
+@cache
+def _version() -> str:
+    # Looked up in the packages' metadata it would take longer than a short ride.
+    return version("velodrome")
 
 
 class LagrangeSettings(Settings):
@@ -45,7 +52,7 @@ class LagrangeEngine:
     @property
     def version(self) -> str:
         """Version of this suite."""
-        return version("velodrome")
+        return _version()
 
     def check(self, problem: Problem, settings: LagrangeSettings) -> None:
         """Refuse output times that the fixed step does not meet; see `engines.engine.Engine`."""

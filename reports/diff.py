@@ -6,13 +6,14 @@ the relative error of the state that these allow by a time t (`reports.limits.no
     reach(t) = noise(t) x (1 + speed x t / radius)
 
 is how far two rides may be apart, in radii of the circle: an error of the rates takes a bicycle away by its share
-of the way ridden. Beyond that something else is different: the engine, its settings, or the machine's arithmetic.
+of the way ridden. All else that is stored is held to the same law, by sizes of its own (`reports.diff_fields`). Beyond
+that something else is different: the engine, its settings, or the machine's arithmetic.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any
@@ -23,6 +24,7 @@ from engines.engine import Trajectory
 from reference.bicycle import Bicycle
 from reference.surface import Surface
 
+from .diff_fields import field_differences
 from .fall import until_fall
 from .limits import Scale, noise, ride_limits
 from .markdown import escaped
@@ -125,32 +127,45 @@ def _engine(name: str, before: StoredRun, after: StoredRun, ground: Ground, step
         "settings": _changed(facts[0]["settings"], facts[1]["settings"]),
         "step_noise": step_noise,
         "position_difference": None,
+        "fields": {},
         "metrics": {},
+        "cpu_time": None,
     }
     gone = [run for run in (before, after) if name not in run.trajectories]
     if gone:
         reasons = [f"gave no trajectory in {run.name}: {_failure(run, name)}" for run in gone]
         return entry | {"verdict": DIFFERS, "reasons": reasons}
-    rides = [run.trajectories[name] for run in (before, after)]
+    rides = (before.trajectories[name], after.trajectories[name])
     standing = [until_fall(ride, ground.bicycle, ground.surface) for ride in rides]
     # Where one falls and the other does not, the fall is no growth that both have: it is what differs.
     fell = all(len(short.time) < len(ride.time) for short, ride in zip(standing, rides, strict=True))
     # Of the run with the smaller steps, since each may err.
     rate = max(ride.steps / (float(ride.time[-1]) or ground.scale.duration) for ride in rides)
-    reach = partial(_reach, ground.scale, step_noise * rate, fell)
+    allowed, reach = (partial(law, ground.scale, step_noise * rate, fell) for law in (_noise, _reach))
     difference = _position_difference(standing, ground.scale.radius, reach)
+    # No further than positions are: beyond, nothing means anything.
+    compared = [ride.first(difference["samples"]) for ride in standing]
+    found = field_differences((compared[0], compared[1]), ground.scale, allowed, reach)
     scale = replace(ground.scale, duration=difference["compared_until"] or ground.scale.duration)
     # Metrics are of the whole ride: where a part of it means nothing, neither do they.
     limits = ride_limits(scale, reach(scale.duration)) if difference["horizon"] is None else {}
     metrics = _metrics(before.metrics[name], after.metrics[name], limits)
-    reasons = _reasons(difference, metrics, rides)
+    reasons = _reasons(difference, found, metrics, rides)
     same = TO_THE_BIT if _identical(*rides) else WITHIN_ROUND_OFF
     return entry | {
         "position_difference": difference,
+        "fields": found,
         "metrics": metrics,
+        "cpu_time": _cpu_time(*rides),
         "verdict": DIFFERS if reasons else same,
         "reasons": reasons,
     }
+
+
+def _cpu_time(before: Trajectory, after: Trajectory) -> dict[str, float | None]:
+    """CPU times [s] and their ratio: information, since they say as much of the machine."""
+    ratio = after.cpu_time / before.cpu_time if before.cpu_time > 0 else None
+    return {"before": before.cpu_time, "after": after.cpu_time, "ratio": ratio}
 
 
 def _failure(run: StoredRun, name: str) -> str:
@@ -167,22 +182,30 @@ def _identical(before: Trajectory, after: Trajectory) -> bool:
     )
 
 
-def _reach(scale: Scale, noise_rate: float, fell: bool, time: float) -> float:
-    """How far two rides may be apart after a time [s], in radii; steps add ``noise_rate`` to it a second."""
+def _noise(scale: Scale, noise_rate: float, fell: bool, time: float) -> float:
+    """Relative error of the state that is allowed after a time [s]; steps add ``noise_rate`` to it a second."""
     try:
-        here = noise(replace(scale, duration=time), noise_rate * time, 1, fell)
+        return noise(replace(scale, duration=time), noise_rate * time, 1, fell)
     except OverflowError:
         return math.inf
-    return here * (1 + scale.speed * time / scale.radius)
 
 
-def _position_difference(rides: list[Trajectory], radius: float, reach: Callable[[float], float]) -> dict[str, Any]:
+def _reach(scale: Scale, noise_rate: float, fell: bool, time: float) -> float:
+    """How far two rides may be apart after a time [s], in radii."""
+    return _noise(scale, noise_rate, fell, time) * (1 + scale.speed * time / scale.radius)
+
+
+def _position_difference(rides: Sequence[Trajectory], radius: float, reach: Callable[[float], float]) -> dict[str, Any]:
     """Distance of D in one ride from D in the other over time, and what is allowed [m].
 
     They are compared as far as both stand, and as the motion's growth leaves anything to compare: up to where
     what is allowed reaches the size of the motion.
     """
     distance = np.nan_to_num(position_errors(rides[1], rides[0]), nan=np.inf)
+    lost = [np.isnan(ride.q[: len(distance), :3]) for ride in rides]
+    if (lost[0] | lost[1]).any():
+        # No number in the same places is no difference.
+        distance[lost[0].any(axis=1) & (lost[0] == lost[1]).all(axis=1)] = 0.0
     allowed = np.array([radius * reach(t) for t in rides[0].time[: len(distance)].tolist()])
     telling = max(1, int(np.searchsorted(allowed, radius)))
     cut = telling < len(distance)
@@ -190,6 +213,7 @@ def _position_difference(rides: list[Trajectory], radius: float, reach: Callable
     beyond, apart = np.flatnonzero(distance > allowed), np.flatnonzero(distance)
     most = int(distance.argmax())
     return {
+        "samples": telling,
         "max": _number(distance[most]),
         "max_at": float(time[most]),
         "end": _number(distance[-1]),
@@ -235,22 +259,49 @@ def _flat(metrics: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _reasons(
-    difference: Mapping[str, Any], metrics: Mapping[str, Mapping[str, Any]], rides: list[Trajectory]
+    difference: Mapping[str, Any],
+    found: Mapping[str, Mapping[str, Any]],
+    metrics: Mapping[str, Mapping[str, Any]],
+    rides: tuple[Trajectory, Trajectory],
 ) -> list[str]:
     """Why two rides are not the same, a line each; none if they are."""
     reasons = []
     if difference["exceeds_at"] is not None:
         far = "" if difference["max"] is None else f", by up to {difference['max']:.3g} m"
         reasons.append(f"positions are apart by more than round-off from {difference['exceeds_at']:.4g} s on{far}")
+    reasons += [line for name, entry in found.items() if (line := _field_reason(name, entry)) is not None]
     if len(rides[0].time) != len(rides[1].time) or rides[0].ended != rides[1].ended:
         ends = (f"at {ride.time[-1]:.4g} s ({ride.ended or 'its end'})" for ride in rides)
         reasons.append("they end differently: " + " and ".join(ends))
+    if rides[0].friction != rides[1].friction:
+        reasons.append(f"friction: {_shown(rides[0].friction)} -> {_shown(rides[1].friction)}")
     for name, entry in metrics.items():
         if entry["holds"] is False:
             move = "" if entry["change"] is None else f", by {entry['change']:.2g}"
             limit = f"{move}, limit {entry['limit']:.2g}"
             reasons.append(f"{name}: {_shown(entry['before'])} -> {_shown(entry['after'])}{limit}")
     return reasons
+
+
+def _field_reason(name: str, entry: Mapping[str, Any]) -> str | None:
+    """What is to say of a field that differs."""
+    words = name.replace("_", " ")
+    if "only_in" in entry:
+        return f"{words}: only the run {entry['only_in']} has it"
+    if entry["exceeds_at"] is None:
+        return None
+    more = entry["columns_beyond"] - 1
+    column = entry["column"].replace("_", " ") + (f" and {more} more" if more else "")
+    what = column if name in (entry["column"], "q", "qd") else f"{words} ({column})"
+    far = (
+        "no number in one"
+        if entry["max"] is None
+        else f"by up to {entry['max']:.3g} {entry['unit']}".removesuffix(" 1")
+    )
+    return (
+        f"{what}: apart by more than round-off from {entry['exceeds_at']:.4g} s on, {far}, "
+        f"where {entry['allowed']:.2g} is allowed"
+    )
 
 
 def _shown(value: Any) -> str:
@@ -271,6 +322,9 @@ def diff_markdown(document: Mapping[str, Any]) -> str:
     for name, entry in document["engines"].items():
         said = [f"- {escaped(line)}" for line in [*remarks(entry), *entry["reasons"]]]
         lines += ["", f"## {escaped(name)}: {entry['verdict']}", "", *said]
+        if entry["fields"]:
+            lines += [*([""] if said else []), *_field_table(entry["fields"])]
+            said = ["a table"]
         if entry["metrics"]:
             lines += ([""] if said else []) + [
                 "| metric | before | after | change | limit |",
@@ -282,11 +336,25 @@ def diff_markdown(document: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _field_table(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Fields that both runs have, as rows: the column nearest to its limit or furthest beyond, and how far."""
+    rows = ["| field | column | unit | largest difference | at s | allowed there | beyond from s |"]
+    rows.append("|---|---|---|---:|---:|---:|---:|")
+    for name, entry in found.items():
+        if "only_in" not in entry:
+            cells = [_cell(entry[key]) for key in ("column", "unit", "max", "max_at", "allowed", "exceeds_at")]
+            rows.append(f"| {name} | " + " | ".join(cells) + " |")
+    return rows
+
+
 def remarks(entry: Mapping[str, Any]) -> list[str]:
     """What a reader must know of an engine's part: version and settings that differ, and how far it was compared."""
     before, after = entry["version"]
     lines = [f"version {before} -> {after}"] if before != after else []
     lines += [f"{name} {_shown(a)} -> {_shown(b)}" for name, (a, b) in entry["settings"].items()]
+    if entry["cpu_time"] is not None and entry["cpu_time"]["ratio"] is not None:
+        spent = entry["cpu_time"]
+        lines.append(f"CPU time {spent['before']:.3g} s -> {spent['after']:.3g} s, {spent['ratio']:.3g} times")
     found = entry["position_difference"]
     if found is not None and found["horizon"] is not None:
         lines.append(

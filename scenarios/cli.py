@@ -15,6 +15,7 @@ from .commands.motions import atlas_command, circular_command, critical_command,
 from .commands.run import list_command, run_command
 from .commands.stored import diff_command, view_command
 from .commands.studies import paper_command, precision_command
+from .commands.sweep import sweep_command
 from .error import ScenarioError
 
 app = typer.Typer(
@@ -36,6 +37,7 @@ for _command in (
     precision_command,
     diff_command,
     view_command,
+    sweep_command,
     check_command,
 ):
     app.command(_command.__name__.removesuffix("_command"))(_command)
@@ -59,11 +61,13 @@ def main() -> None:
     except SystemExit:
         # What rich makes of a broken pipe; the commands themselves end with typer.Exit.
         sys.exit(0)
-    except OSError as error:
+    except (OSError, UnicodeEncodeError) as error:  # the latter of a path that is no text
         _complain(f"cannot write: {error}")
     sys.exit(status or 0)
 
 
 def _complain(message: str) -> None:
-    print(f"velodrome: {' '.join(message.split())}", file=sys.stderr)
+    # What was typed may be repeated, but must not move the cursor.
+    line = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in " ".join(message.split()))
+    print(f"velodrome: {line}", file=sys.stderr)
     sys.exit(2)

@@ -102,7 +102,9 @@ def _read(folder: Path, name: str, engines: Sequence[str] | None) -> StoredRun:
     except ScenarioError:
         raise
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        raise ScenarioError(f"{folder}: not the files of one run: {type(error).__name__}: {error}") from error
+        # A ValueError is a sentence; the others are a word that says nothing without their kind.
+        kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
+        raise ScenarioError(f"{folder}: not the files of one run: {kind}{error}") from error
     return StoredRun(name, {**manifest, "engines": entries}, metrics, rides)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from reference.surface import Plane, Surface, SurfaceOfRevolution, evaluate
 from .error import ScenarioError
 from .scenario import CircularTable, Scenario
 from .surfaces import bowl
+
+# Runs of one motion, disturbed in many ways, need it once.
+_found = lru_cache(maxsize=256)(find_motion)
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,7 @@ def _undisturbed(
     table = scenario.motion
     if isinstance(table, CircularTable):
         near = (table.near.lean, table.near.steer) if table.near is not None else None
-        family, motion = find_motion(bicycle, bowl(surface), table.rear_rate, table.family, near)
+        family, motion = _found(bicycle, bowl(surface), table.rear_rate, table.family, near)
         return family, motion, *motion.state()
     rates = (0.0, 0.0, table.speed / bicycle.rear_wheel_radius)
     q, qd = consistent_state(bicycle, surface, (float(bicycle.reference_point[0]), 0.0), 0.0, 0.0, rates)

@@ -58,8 +58,9 @@ def page(
     seen = plan.plan(ride, names) if names else None
     steady = isinstance(surface, SurfaceOfRevolution)
     duration, rate = scenario["simulation"]["duration"], manifest["start"]["growth_rate"]
+    ends = {name: float(run.time[-1]) for name, run in trajectories.items()}
     return _template().render(
-        _results(measured, rate, duration),
+        _results(measured, rate, duration, ends),
         manifest=manifest,
         facts=words.facts(manifest, scenario),
         stability=stability(rate, steady),
@@ -74,7 +75,7 @@ def page(
         has_plan=seen is not None,
         most=curves.MOST,
         data={
-            "duration": max((float(run.time[-1]) for run in trajectories.values()), default=duration),
+            "duration": max(ends.values(), default=duration),
             "engines": names,
             "panels": [curves.panel_data(shown, names, measured) for _, group in groups for shown in group],
             "plan": seen,
@@ -85,14 +86,19 @@ def page(
     )
 
 
-def _results(measured: Mapping[str, Mapping[str, Any]], growth_rate: float, duration: float) -> dict[str, Any]:
-    """What the template says of the metrics."""
+def _results(
+    measured: Mapping[str, Mapping[str, Any]], growth_rate: float, duration: float, ends: Mapping[str, float]
+) -> dict[str, Any]:
+    """What the template says of the metrics; ``ends`` are the times of the engines' last samples [s]."""
     return {
         "columns": COLUMNS,
         "meanings": trust.MEANINGS,
         "horizon_meaning": trust.HORIZON,
         "rows": {name: _row(values) for name, values in measured.items()},
-        "trust": {name: trust.trust(name, values, growth_rate, duration) for name, values in measured.items()},
+        "trust": {
+            name: trust.trust(name, values, growth_rate, duration, ends.get(name)) for name, values in measured.items()
+        },
+        "fallen": [name for name, values in measured.items() if values.get("fell_at") is not None],
         "remarks": [line for name, values in measured.items() for line in remarks(name, values, duration)],
     }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
 from engines.engine import REFERENCE
@@ -26,7 +27,7 @@ HORIZON = (
 )
 
 
-def trust(name: str, values: Mapping[str, Any], growth_rate: float, duration: float) -> str:
+def trust(name: str, values: Mapping[str, Any], growth_rate: float, duration: float, end: float | None = None) -> str:
     """How far to trust an engine's row.
 
     Parameters
@@ -38,6 +39,8 @@ def trust(name: str, values: Mapping[str, Any], growth_rate: float, duration: fl
         Of the motion's own disturbances [1/s].
     duration : float
         Of the run [s].
+    end : float, optional
+        Time of the engine's last sample [s]; of a ride that ended early and is not at hand, it is not known.
 
     Returns
     -------
@@ -48,29 +51,40 @@ def trust(name: str, values: Mapping[str, Any], growth_rate: float, duration: fl
         return _reference(values)
     if values["position_error"] is None:
         return "There is no reference in this run: nothing is known of its error, only what it keeps and loses itself."
+    until, stop = _stop(values, duration, end)
     if growth_rate <= 0:
-        return "The motion amplifies no error: what is seen is the engine's own, over the whole run."
+        return f"The motion amplifies no error: what is seen is the engine's own, {stop or 'over the whole run'}."
     horizon = values["horizon"]
     if horizon is None:
-        return "It agrees with the reference to the last digit: there is no error that could grow."
-    if horizon < duration:
+        whole = f" {stop}" if stop else ""
+        return f"It agrees with the reference to the last digit{whole}: there is no error that could grow."
+    if horizon < until:
         return (
             f"Up to {horizon:.2f} s the error is the engine's, grown at the motion's rate of {growth_rate:.3g} 1/s. "
             "Beyond that it says nothing of the engine: any difference would have grown as large."
         )
     return (
         f"The error is the engine's, grown at the motion's rate of {growth_rate:.3g} 1/s; it would mean something up "
-        f"to {horizon:.2f} s, longer than the run."
+        f"to {horizon:.2f} s, longer than {'it rode: it is seen ' + stop if stop else 'the run'}."
     )
+
+
+def _stop(values: Mapping[str, Any], duration: float, end: float | None) -> tuple[float, str]:
+    """Up to when there is anything of an engine to see [s], and this in words; none for a ride of the whole run."""
+    if values.get("fell_at") is not None:
+        return values["fell_at"], f"up to its fall at {values['fell_at']:.2f} s"
+    if values.get("ended") is None:
+        return duration, ""
+    return (duration, "up to its early end") if end is None else (end, f"up to its early end at {end:.2f} s")
 
 
 def _reference(values: Mapping[str, Any]) -> str:
     kept = [
-        f"{words} {values[metric]:.2g}{unit}"
+        f"{words} {_rounded_up(values[metric])}{unit}"
         for words, metric, unit in (
             ("its energy changes by at most", "energy_drift", " of itself"),
-            ("its gaps stay below", "max_gap", " m"),
-            ("its slip stays below", "max_slip", " m/s"),
+            ("its gaps stay within", "max_gap", " m"),
+            ("its slip stays within", "max_slip", " m/s"),
         )
         if values.get(metric) is not None
     ]
@@ -78,3 +92,11 @@ def _reference(values: Mapping[str, Any]) -> str:
         "The measure of the others, integrated to round-off. What it can be held to: " + ", ".join(kept) + ". "
         "Errors of others near these sizes are its own as much as theirs."
     )
+
+
+def _rounded_up(value: float, digits: int = 2) -> str:
+    """A bound in few digits that still holds: the next number of so many digits that is not below."""
+    exact = Decimal(repr(float(value)))
+    if not exact:
+        return "0"
+    return f"{float(exact.quantize(Decimal(1).scaleb(exact.adjusted() + 1 - digits), ROUND_CEILING)):.{digits}g}"

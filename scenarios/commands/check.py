@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from ..error import ScenarioError
+from .installed import installed
 from .options import Json, print_json
 
 
@@ -15,7 +17,13 @@ def check_command(
     scenario: Annotated[
         list[str] | None, typer.Argument(help="Library names or paths to TOML files; all gated ones if none is named.")
     ] = None,
-    engine: Annotated[list[str] | None, typer.Option(help="Judge only this engine.")] = None,
+    engine: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Judge only this engine; may be given several times. Its settings are those of the scenario's "
+            "[engines.NAME]."
+        ),
+    ] = None,
     baselines: Annotated[Path | None, typer.Option(help="Folder of the baselines instead of the suite's own.")] = None,
     update: Annotated[bool, typer.Option("--update", help="Write this run's values as the new baselines.")] = False,
     reason: Annotated[str | None, typer.Option(help="Why, for the new baselines; what moved if not given.")] = None,
@@ -26,7 +34,6 @@ def check_command(
     """The drift gate: run the gated scenarios and hold them against the committed baselines."""
     from rich.console import Console
 
-    from engines.engine import engine_names
     from reports.verdicts import junit_xml, markdown_page
 
     from .. import gate, present
@@ -34,6 +41,11 @@ def check_command(
 
     if reason is not None and not update:
         raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
+    # Before the work: minutes of it would be for nothing.
+    for option, path in (("--junit", junit), ("--markdown", markdown)):
+        if path is not None:
+            _check_path(option, path)
+    engines = installed()
     console = Console(stderr=as_json)
     with present.Progress() as progress:
         verdicts, fresh = gate.check(progress.watch, scenario, engine, baselines)
@@ -46,7 +58,7 @@ def check_command(
         absent = [
             verdict
             for _, verdict in verdicts
-            if verdict.engine in engine_names() and verdict.quantity == "run" and verdict.reason.startswith("did not")
+            if verdict.engine in engines and verdict.quantity == "run" and verdict.reason.startswith("did not")
         ]
         if absent:
             raise ScenarioError(f"no baseline written: {absent[0].engine} {absent[0].reason}")
@@ -61,3 +73,13 @@ def check_command(
             console.print(f"baseline written: {path}", soft_wrap=True)
     if not passes:
         raise typer.Exit(1)
+
+
+def _check_path(option: str, path: Path) -> None:
+    """Refuse a file that cannot be written where it is to be."""
+    if path.is_dir():
+        raise ScenarioError(f"{option} {path}: it is a folder; name a file")
+    if not path.parent.is_dir():
+        raise ScenarioError(f"{option} {path}: there is no folder {path.parent}")
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        raise ScenarioError(f"{option} {path}: no file can be written to {path.parent}")

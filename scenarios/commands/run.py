@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..error import ScenarioError
+from .installed import installed
 from .options import STARTING, Changes, Duration, Json, changed, print_json
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ def list_command(as_json: Json = False) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from engines.engine import engine_names, load_engine
+    from engines.engine import load_engine
 
     from ..scenario import library_names, load_scenario
 
@@ -29,7 +30,7 @@ def list_command(as_json: Json = False) -> None:
         _, scenario = load_scenario(name)
         scenarios.append({"name": name, "title": scenario.title, "tags": list(scenario.tags)})
     engines = []
-    for name in engine_names():
+    for name in installed():
         try:
             engine = load_engine(name)
             engines.append({"name": name, "version": engine.version, "gives": list(engine.gives)})
@@ -53,7 +54,10 @@ def list_command(as_json: Json = False) -> None:
 
 def run_command(
     scenario: Annotated[list[str] | None, typer.Argument(help="Library names or paths to TOML files.")] = None,
-    engine: Annotated[list[str] | None, typer.Option(help="Run only this engine, beside the reference.")] = None,
+    engine: Annotated[
+        list[str] | None,
+        typer.Option(help="Run only this engine, beside the reference; may be given several times."),
+    ] = None,
     tag: Annotated[str | None, typer.Option(help="Run all library scenarios with this tag.")] = None,
     change: Changes = None,
     duration: Duration = None,
@@ -70,6 +74,7 @@ def run_command(
     if not sources:
         raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
     changes = changed(change, duration)
+    installed()  # whether each has a name of its own
     with present.working(STARTING):
         plans = [_plan(source, changes, engine) for source in dict.fromkeys(sources)]
     console = Console(stderr=as_json)

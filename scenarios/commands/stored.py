@@ -8,13 +8,17 @@ from typing import Annotated
 import typer
 
 from ..error import ScenarioError
+from .installed import installed
 from .options import Json, print_json
 
 
 def diff_command(
     before: Annotated[Path, typer.Argument(metavar="RUN", help="The earlier run's folder.")],
     after: Annotated[Path, typer.Argument(metavar="RUN", help="The later run's folder.")],
-    engine: Annotated[list[str] | None, typer.Option(help="Compare only this engine, beside the reference.")] = None,
+    engine: Annotated[
+        list[str] | None,
+        typer.Option(help="Compare only this engine, beside the reference; may be given several times."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for diff.json, diff.md and the recording diff.rrd.")] = None,
     as_json: Json = False,
 ) -> None:
@@ -24,6 +28,7 @@ def diff_command(
     from ..diff import diff, read_pair, write_diff
     from ..present_diff import show_diff
 
+    installed()  # whether each has a name of its own
     pair = read_pair(before, after, engine)
     found = diff(pair)
     written = [] if out is None else write_diff(pair, found, out)

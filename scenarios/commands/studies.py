@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .installed import installed
 from .options import Changes, Duration, Json, changed, print_json
 
 
@@ -43,11 +44,17 @@ def paper_command(
 
 def precision_command(
     scenario: Annotated[str, typer.Argument(help="Library name or path to a TOML file.")],
-    engine: Annotated[list[str] | None, typer.Option(help="Study only this engine, beside the reference.")] = None,
+    engine: Annotated[
+        list[str] | None,
+        typer.Option(help="Study only this engine, beside the reference; may be given several times."),
+    ] = None,
     change: Changes = None,
     duration: Duration = None,
     levels: Annotated[
-        int, typer.Option(min=2, max=12, help="Steps: four times the scenario's, then halved each time.")
+        int,
+        typer.Option(
+            min=2, max=12, help="Number of step sizes: four times the scenario's step, then halved each time."
+        ),
     ] = 5,
     eigenvalues: Annotated[bool, typer.Option(help="Measure each engine's own eigenvalues too.")] = True,
     out: Annotated[Path | None, typer.Option(help="Folder for the document and its figure.")] = None,
@@ -63,6 +70,7 @@ def precision_command(
 
     changes = changed(change, duration)
     name, loaded = load_scenario(scenario, changes)
+    installed()  # whether each has a name of its own
     if out is not None:
         make_folder(out)  # before the work
     with present.Progress() as progress:

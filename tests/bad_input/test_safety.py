@@ -203,7 +203,7 @@ def test_no_text_of_a_run_is_markup_in_markdown() -> None:
     name = f"[a](http://b)![c](d)`{MARKUP}|"
     verdict = Verdict(name, "steps", None, None, None, "missing", name)
     unmeasured = dict.fromkeys(("fell_at", "friction_left_at", "min_normal_force", "ended", "contact_force_error_at"))
-    measured = {name: {**unmeasured, "horizon": None, "ended": name}}
+    measured = {name: {**unmeasured, "horizon": None, "ended": name, "not_finite": []}}
     pages = [
         markdown_page([(name, verdict)]),
         summary(name, measured, {name: name}, [], -1.0, 1.0),

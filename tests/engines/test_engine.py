@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from importlib.metadata import EntryPoint
+from importlib.metadata import Distribution, EntryPoint
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -66,6 +67,27 @@ def test_an_engine_of_another_package_is_found(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(registry, "entry_points", lambda group: [own, *here])
     assert engine_names() == [REFERENCE, "aaa", *NAMES[1:]]
     assert load_engine("aaa").name == "aaa"
+
+
+def announced_by(package: str, folder: Path) -> Distribution:
+    """A distribution that announces the engine "aaa"."""
+    info = folder / f"{package}-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[velodrome.engines]\naaa = engines.lagrange:OWN\n")
+    return Distribution.at(info)
+
+
+def test_two_packages_may_not_announce_one_name(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    # The second is the first once more, as an editable install puts it on the path.
+    places = (("one.engine", "a"), ("one_engine", "b"), ("other-engine", "c"))
+    points = [point for name, where in places for point in announced_by(name, tmp_path / where).entry_points]
+    monkeypatch.setattr(registry, "entry_points", lambda group: points[:2])
+    assert engine_names() == ["aaa"]
+    monkeypatch.setattr(registry, "entry_points", lambda group: points)
+    for call in (engine_names, lambda: load_engine("aaa")):
+        with pytest.raises(ValueError, match="'aaa' is announced by two packages, one-engine and other-engine"):
+            call()
 
 
 @pytest.mark.parametrize("name", NAMES)

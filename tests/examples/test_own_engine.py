@@ -123,8 +123,10 @@ def test_the_guides_smallest_engine_is_gated(own: str, tmp_path: Path, monkeypat
     assert [verdict.status for verdict in check()] == ["missing"]
     again = check()
     assert all(verdict.passes for verdict in again)
-    # What it does not give is not judged.
-    assert {"energy_drift", "max_slip", "mean_slip", "contact_force_error"}.isdisjoint(v.quantity for v in again)
+    # What it does not give is not judged; gaps and slip follow from its coordinates.
+    found = {verdict.quantity for verdict in again}
+    assert {"energy_drift", "contact_force_error"}.isdisjoint(found)
+    assert {"max_gap", "max_slip", "report_mismatch"} <= found
     assert any(not verdict.passes for verdict in check(step=0.002))
 
 

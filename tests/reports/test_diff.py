@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +13,7 @@ import pytest
 
 from engines.engine import Trajectory
 from engines.steady import steady_trajectory
-from reference.bicycle import Bicycle
+from reference.bicycle import BODIES, Bicycle
 from reference.families import find_motion
 from reference.surface import Paraboloid
 from reports.diff import Ground, StoredRun, diff_document, diff_markdown
@@ -22,7 +24,20 @@ BICYCLE, BOWL = Bicycle(), Paraboloid(0.005)
 _, MOTION = find_motion(BICYCLE, BOWL, 18.0, 2, (0.74, 2.84))
 STATE = MOTION.state()
 TIMES = np.arange(101) / 10
-EXACT = replace(steady_trajectory(BICYCLE, MOTION, TIMES), engine="one", version="1", steps=1000)
+STEADY = steady_trajectory(BICYCLE, MOTION, TIMES)
+WHEELS = [BODIES.index(f"{wheel}_wheel") for wheel in ("rear", "front")]
+# Fields that a steady ride does not hold get values of the right shape and size.
+EXACT = replace(
+    STEADY,
+    engine="one",
+    version="1",
+    steps=1000,
+    contact_point=STEADY.body_position[:, WHEELS],
+    gap=np.zeros((len(TIMES), 2)),
+    slip=np.zeros((len(TIMES), 2, 2)),
+    kinetic_energy=np.full(len(TIMES), 1000.0),
+    potential_energy=np.full(len(TIMES), 700.0),
+)
 SCALE = Scale(
     radius=float(np.hypot(*MOTION.position[:2])),
     speed=float(np.hypot(*STATE[1][:2])),
@@ -113,7 +128,10 @@ def test_a_metric_that_moves_beyond_its_limit_differs_although_positions_do_not(
     force = np.array(EXACT.contact_force) * (1 + 1e-6)
     entry = compare(stored("a", EXACT), stored("b", replace(EXACT, contact_force=force)))["engines"]["one"]
     assert entry["verdict"] == "differs"
-    assert [reason.split(":")[0] for reason in entry["reasons"]] == ["contact_force_error"]
+    names = [reason.split(":")[0] for reason in entry["reasons"]]
+    assert names[0].startswith("contact force (")
+    assert "contact_force_error" in names
+    assert entry["fields"]["contact_force"]["exceeds_at"] == 0.0
 
 
 def test_beyond_what_growth_leaves_nothing_is_compared() -> None:
@@ -178,3 +196,88 @@ def test_a_metric_that_only_one_suite_knows_is_not_judged() -> None:
     found = compare(replace(before, metrics=older), after)
     assert found["engines"]["one"]["metrics"]["fell_at"]["holds"] is None
     assert found["same"]
+
+
+def changed(field: str, change: Callable[[np.ndarray], np.ndarray], begin: float = 0.0) -> Trajectory:
+    """The circle with one field changed from a time on."""
+    values = getattr(EXACT, field).copy()
+    values[begin <= TIMES] = change(values[begin <= TIMES])
+    return replace(EXACT, **{field: values})
+
+
+LEAN, REAR_WHEEL_RATE = np.eye(9)[4], np.eye(9)[7]
+
+
+@pytest.mark.parametrize(
+    ("field", "change", "says"),
+    [
+        ("q", lambda q: q + 0.3 * LEAN, "lean: apart by more than round-off from 4 s on, by up to 0.3 rad, where "),
+        ("qd", lambda qd: qd + 1e-3 * REAR_WHEEL_RATE, "rear angle rate: .* by up to 0.001 rad/s"),
+        (
+            "body_position",
+            lambda x: x + 0.2 * np.eye(3)[1],
+            r"body position \(\S+ \S+ y and 3 more\): .* by up to 0.2 m",
+        ),
+        ("body_quaternion", lambda e: e[..., ::-1], "body quaternion .* from 4 s on"),
+        ("contact_point", lambda x: x + 1e-6 * np.eye(3)[0], "contact point .* by up to 1e-06 m"),
+        ("contact_force", lambda f: 1.01 * f, "contact force .* N"),
+        ("gap", lambda gap: gap + 0.05, r"gap \(rear gap and 1 more\): .* by up to 0.05 m"),
+        ("slip", lambda slip: slip + 1e-6, "slip .* by up to 1e-06 m/s"),
+        ("kinetic_energy", lambda energy: 3 * energy, "kinetic energy: .* from 4 s on, .* J"),
+        ("potential_energy", lambda energy: 3 * energy, "potential energy: .* from 4 s on, .* J"),
+    ],
+)
+def test_every_stored_field_is_compared(field: str, change: Callable[[np.ndarray], np.ndarray], says: str) -> None:
+    found = compare(stored("a", EXACT), stored("b", changed(field, change, begin=4.0)))
+    entry = found["engines"]["one"]
+    assert (found["same"], entry["verdict"]) == (False, "differs")
+    assert {name for name, values in entry["fields"].items() if values["exceeds_at"] is not None} == {field}
+    assert entry["fields"][field]["exceeds_at"] == 4.0
+    assert any(re.match(says, reason) for reason in entry["reasons"]), entry["reasons"]
+    assert f"| {field} |" in diff_markdown(found | {"notes": []})
+
+
+@pytest.mark.parametrize(("field", "column", "size"), [("q", 4, 1.0), ("qd", 6, 18.0), ("qd", 0, SCALE.speed)])
+def test_a_field_may_differ_by_what_the_law_allows_and_no_more(field: str, column: int, size: float) -> None:
+    allowed = limit(6.0) / SCALE.radius * size
+    for share, verdict in ((0.9, "same within round-off"), (1.1, "differs")):
+        values = getattr(EXACT, field).copy()
+        values[60, column] += share * allowed
+        entry = compare(stored("a", EXACT), stored("b", replace(EXACT, **{field: values})))["engines"]["one"]
+        assert (entry["verdict"], entry["fields"][field]["max_at"]) == (verdict, 6.0)
+        assert entry["fields"][field]["allowed"] == pytest.approx(allowed, rel=1e-12)
+
+
+def test_a_quaternion_and_its_opposite_are_one_orientation() -> None:
+    opposite = replace(EXACT, body_quaternion=-EXACT.body_quaternion)
+    entry = compare(stored("a", EXACT), stored("b", opposite))["engines"]["one"]
+    assert (entry["verdict"], entry["fields"]["body_quaternion"]["max"]) == ("same within round-off", 0.0)
+
+
+def test_a_field_of_one_run_alone_differs() -> None:
+    for rides, only in (((EXACT, replace(EXACT, gap=None)), "before"), ((replace(EXACT, gap=None), EXACT), "after")):
+        entry = compare(stored("a", rides[0]), stored("b", rides[1]))["engines"]["one"]
+        assert entry["verdict"] == "differs"
+        assert f"gap: only the run {only} has it" in entry["reasons"]
+    bare = replace(EXACT, gap=None)
+    assert "gap" not in compare(stored("a", bare), stored("b", bare))["engines"]["one"]["fields"]
+
+
+def test_no_number_in_the_same_places_is_the_same() -> None:
+    holes = [changed(field, lambda x: x * np.nan, begin=9.0) for field in ("q", "slip", "contact_force")]
+    for ride in holes:
+        twin = replace(ride, kinetic_energy=np.full(len(TIMES), np.nextafter(1000.0, 0)))  # not the same to the bit
+        pair = stored("a", ride), stored("b", twin)
+        entry = compare(*pair)["engines"]["one"]
+        assert (entry["verdict"], entry["reasons"]) == ("same within round-off", [])
+        entry = compare(stored("a", EXACT), stored("b", ride))["engines"]["one"]
+        assert entry["verdict"] == "differs"
+        json.dumps(entry, allow_nan=False)
+
+
+def test_cpu_times_are_told_and_not_judged() -> None:
+    found = compare(stored("a", replace(EXACT, cpu_time=2.0)), stored("b", replace(EXACT, cpu_time=3.0)))
+    entry = found["engines"]["one"]
+    assert entry["cpu_time"] == {"before": 2.0, "after": 3.0, "ratio": 1.5}
+    assert found["same"]
+    assert "- CPU time 2 s -> 3 s, 1.5 times" in diff_markdown(found | {"notes": []})

@@ -360,6 +360,43 @@ def test_trust_follows_from_the_metrics(growth: float, horizon: float | None, er
     assert says in trust("one", {"horizon": horizon, "position_error": error}, growth, 20.0)
 
 
+@pytest.mark.parametrize(
+    ("growth", "horizon", "changes", "end", "says"),
+    [
+        (-0.1, None, {}, 20.0, "own, over the whole run."),
+        (-0.1, None, {"fell_at": 3.217}, 3.22, "own, up to its fall at 3.22 s."),
+        (-0.1, None, {"ended": "it gave up"}, 6.1, "own, up to its early end at 6.10 s."),
+        (-0.1, None, {"ended": "it gave up"}, None, "own, up to its early end."),
+        (0.4, 5.0, {"fell_at": 3.0}, 3.1, "longer than it rode: it is seen up to its fall at 3.00 s."),
+        (0.4, 2.0, {"fell_at": 3.0}, 3.1, "Up to 2.00 s the error"),
+        (0.4, None, {"ended": "it gave up"}, 6.1, "to the last digit up to its early end at 6.10 s:"),
+    ],
+)
+def test_trust_goes_no_further_than_the_ride(
+    growth: float, horizon: float | None, changes: dict[str, Any], end: float | None, says: str
+):
+    values = {"horizon": horizon, "position_error": {"max": 1.0}, "fell_at": None, "ended": None} | changes
+    assert says in trust("one", values, growth, 20.0, end)
+
+
+def test_bounds_of_the_reference_are_rounded_up():
+    values = {"energy_drift": 5.01e-13, "max_gap": 1.3004e-14, "max_slip": 9.91e-12}
+    said = trust(REFERENCE, values, 0.4, 20.0)
+    for words in ("at most 5.1e-13 of itself", "within 1.4e-14 m", "within 1e-11 m/s"):
+        assert words in said
+    said = trust(REFERENCE, {"energy_drift": 0.0, "max_gap": 1.3e-14, "max_slip": None}, 0.4, 20.0)
+    assert "at most 0 of itself, its gaps stay within 1.3e-14 m." in said
+
+
+def test_a_fall_is_said_where_the_figures_count_a_sample_more():
+    lying = RUNS["one"].body_position.copy()
+    lying[200:, 0, 2] = 0.0
+    fallen = made({REFERENCE: RUNS[REFERENCE], "one": replace(RUNS["one"], body_position=lying)})
+    words = "What fell (one) is drawn up to the first sample after its fall"
+    assert words in " ".join(fallen.split())
+    assert "What fell" not in made()
+
+
 # In a browser.
 
 needs_browser = pytest.mark.skipif(headless.missing() is not None, reason=str(headless.missing()))

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 from altered import Altered, raising
 
+from engines import engine as registry
 from engines.engine import Engine, EngineError, Settings, engine_names, load_engine
 from reference.bicycle import Bicycle
 from reference.families import find_motion
@@ -332,13 +333,35 @@ def test_check_writes_its_verdicts_for_a_ci_service(velodrome, monkeypatch: pyte
     assert (result.status, result.stdout) == (2, "")
 
 
+@pytest.mark.parametrize("option", ["--junit", "--markdown"])
+def test_check_refuses_a_file_without_a_folder_before_its_work(
+    velodrome, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, option: str
+) -> None:
+    monkeypatch.setattr(gate, "check", lambda *_: pytest.fail("the gate ran"))
+    for path, words in (("absent/x.xml", "there is no folder absent"), (str(tmp_path), "it is a folder; name a file")):
+        result = velodrome("check", option, path)
+        assert (result.status, result.stderr) == (2, f"velodrome: {option} {path}: {words}\n")
+
+
+def test_two_engines_of_one_name_get_one_line(velodrome, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = "engine 'aaa' is announced by two packages, one and other; uninstall one of them"
+
+    def refuse() -> None:
+        raise ValueError(words)
+
+    monkeypatch.setattr(registry, "_announced", refuse)
+    for command in (("list",), ("run", "q2"), ("check",), ("precision", "q2"), ("diff", "a", "b")):
+        result = velodrome(*command)
+        assert (result.status, result.stderr) == (2, f"velodrome: {words}\n"), command
+
+
 def test_check_judges_what_it_is_asked_for(velodrome, tmp_path: Path) -> None:
     arguments = ("check", "q2", "--engine", "mujoco-multipliers", "--baselines", str(tmp_path / "own"))
     assert "no baseline" in velodrome(*arguments).stdout
     result = velodrome(*arguments, "--update", "--reason", "the first of its kind", "--json")
     assert (result.status, result.json()["updated"]) == (0, [str(tmp_path / "own" / "q2.json")])
     assert json.loads((tmp_path / "own" / "q2.json").read_text())["reason"] == "the first of its kind"
-    assert "mujoco-multipliers  12 of 12  nothing moved" in velodrome(*arguments).stdout
+    assert "mujoco-multipliers  17 of 17  nothing moved" in velodrome(*arguments).stdout
     for wrong, words in (
         (("q2", "--engine", "warp"), "engine 'warp' is not installed"),
         (("iftomm-1",), "iftomm-1: only a circular motion can be gated"),

@@ -47,8 +47,8 @@ def copy(folder: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(folder, tmp_path / "copy"))
 
 
-def shown(document: dict[str, Any]) -> str:
-    console = Console(file=io.StringIO(), width=100)
+def shown(document: dict[str, Any], width: int = 100) -> str:
+    console = Console(file=io.StringIO(), width=width)
     show_diff(console, document)
     assert isinstance(console.file, io.StringIO)
     return console.file.getvalue()
@@ -74,6 +74,19 @@ def test_a_changed_setting_differs_and_is_named(folder: Path, halved: Path) -> N
     text = shown(found)
     assert f"{NATIVE}: step 0.002 -> 0.001" in text
     assert "the engines in both runs are not the same" in text
+
+
+def test_the_table_tears_no_verdict_at_eighty_columns(folder: Path, halved: Path) -> None:
+    found = diff(read_pair(folder, halved))
+    found["engines"]["reference"]["verdict"] = "same within round-off"
+    long = found["engines"].pop(NATIVE)
+    # As long as the longest name of the suite's own engines, which must not fold, and as long as a name may be.
+    for name in ("mujoco-exact-contact", "x" * 64):
+        lines = shown(found | {"engines": found["engines"] | {name: long}}, width=80).splitlines()
+        assert any(line.endswith("to round-off") for line in map(str.rstrip, lines))
+        row = next(line for line in lines if line.startswith(name[:20]))
+        assert row.split()[-1] == "differs"
+        assert row.split()[-2] == f"{long['cpu_time']['ratio']:.2g}"
 
 
 def test_document_page_and_recording_are_written(folder: Path, halved: Path, tmp_path: Path) -> None:
@@ -170,4 +183,12 @@ def test_what_is_no_run_folder_gets_one_line(folder: Path, copy: Path, name: str
 def test_a_manifest_without_its_parts_gets_one_line(folder: Path, copy: Path, manifest: str) -> None:
     (copy / "manifest.json").write_text(manifest)
     with pytest.raises(ScenarioError, match=r"not a JSON object|not the files of one run"):
+        read_pair(folder, copy)
+
+
+def test_a_damaged_start_is_told_in_words(folder: Path, copy: Path) -> None:
+    manifest = json.loads((copy / "manifest.json").read_text())
+    manifest["start"]["q"] = [0.0]
+    (copy / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(ScenarioError, match=r"not the files of one run: a start has nine coordinates and nine rates$"):
         read_pair(folder, copy)

@@ -1,0 +1,244 @@
+"""What a sweep costs beside its engines, and how it grows with workers.
+
+python benchmarks/sweep.py                    # overhead, bytes and speed-up from 1 to 2 processes
+python benchmarks/sweep.py --cluster 2 4 8    # and Dask clusters of so many workers on this machine
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+from rich.console import Console
+from rich.table import Table
+
+from scenarios.sweep.plan import Plan, plan_sweep
+from scenarios.sweep.pool import ONE_THREAD
+from scenarios.sweep.run import Work, locally, run_sweep
+from scenarios.sweep.store import JOURNAL, RESULTS, TIMINGS, write_results
+
+# Starts of a straight ride are computed in a millisecond: what is left beside the engine is the sweep's own.
+SWEEP = """
+scenario = "iftomm-1"
+engines = [{engines}]
+[grid]
+simulation.duration = [{duration}]
+simulation.output_rate = [10.0]
+[latin_hypercube]
+count = {count}
+seed = 1
+ranges.perturbation.lean_rate = [-0.1, 0.5]
+ranges.motion.speed = [4.4, 5.8]
+"""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Costs of one sweep.
+
+    Attributes
+    ----------
+    rate : float
+        Rows per second from the first row to the last, without the start of the workers.
+    elapsed : float
+        Seconds in all.
+    others : float
+        Cores that others on this machine kept busy meanwhile: above some 0.1, rates say little.
+    engine, task, parent : float
+        CPU seconds a row: in the engine, in the worker, in the process that hands out tasks and keeps rows.
+    journal, results, timing : float
+        Bytes a row.
+    finish : float
+        CPU seconds a row of making the data set of the journal.
+    """
+
+    rate: float
+    elapsed: float
+    others: float
+    engine: float
+    task: float
+    parent: float
+    journal: float
+    results: float
+    timing: float
+    finish: float
+
+
+def planned(folder: Path, engines: list[str], count: int, duration: float = 20.0) -> Plan:
+    """A sweep of rides on the plane."""
+    path = folder / "sweep.toml"
+    path.write_text(SWEEP.format(engines=", ".join(f'"{name}"' for name in engines), count=count, duration=duration))
+    return plan_sweep(path)
+
+
+def measured(plan: Plan, work: Work) -> Measured:
+    """Run a sweep in a fresh folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "out"
+        begin, own, before = time.perf_counter(), time.process_time(), busy() - with_children()
+        outcome = run_sweep(plan, out, work, False, lambda *_: None)
+        elapsed, own = time.perf_counter() - begin, time.process_time() - own
+        others = (busy() - with_children() - before) / elapsed
+        assert outcome.stopped is None, outcome.stopped
+        begin = time.process_time()
+        write_results(out, plan)
+        finish = time.process_time() - begin
+        timing = pq.read_table(out / TIMINGS)
+        columns = {name: timing.column(name).to_numpy() for name in ("engine_time", "task_time", "finished")}
+        results = sum(path.stat().st_size for path in (out / RESULTS).rglob("*.parquet"))
+        journal, clock = (out / JOURNAL).stat().st_size, (out / TIMINGS).stat().st_size
+    rows = len(plan.tasks)
+    return Measured(
+        (rows - 1) / float(np.ptp(columns["finished"])),
+        elapsed,
+        others,
+        float(columns["engine_time"].mean()),
+        float(columns["task_time"].mean()),
+        (own - finish) / rows,
+        journal / rows,
+        results / rows,
+        clock / rows,
+        finish / rows,
+    )
+
+
+def busy() -> float:
+    """CPU seconds that this machine has spent so far, by anybody."""
+    user, nice, system, _, _, irq, soft, *_ = map(int, Path("/proc/stat").read_text().split()[1:9])
+    return (user + nice + system + irq + soft) / os.sysconf("SC_CLK_TCK")
+
+
+def with_children() -> float:
+    """CPU seconds of this process and of all that it has started and that have ended."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+def costs_table(folder: Path, engines: list[str], count: int) -> Table:
+    """What a row costs, an engine at a time."""
+    table = Table("engine", "rows", "rows/s", box=None, pad_edge=False)
+    for title in ("engine", "worker's own", "parent's own", "data set's"):
+        table.add_column(f"{title}\nms a row", justify="right")
+    table.add_column("journal, data set,\ntiming: bytes a row", justify="right")
+    for name in engines:
+        rows = count if name == "reference" else max(20, count // 20)
+        found = measured(planned(folder, [name], rows), locally(1))
+        times = (found.engine, found.task - found.engine, found.parent, found.finish)
+        sizes = f"{found.journal:.0f}, {found.results:.0f}, {found.timing:.0f}"
+        table.add_row(name, str(rows), f"{found.rate:.3g}", *(f"{1e3 * seconds:.2f}" for seconds in times), sizes)
+    return table
+
+
+def speed_table(folder: Path, count: int, rounds: int) -> Table:
+    """Rows per second of one process and of two, by turns.
+
+    A machine that is shared does not give the same second twice. What the sweep itself loses shows in how busy
+    its workers are; the ratio of that is the speed-up at equal CPU time a row.
+    """
+    table = Table("processes", "rows/s", "seconds in all", "CPU ms a row", box=None, pad_edge=False)
+    table.add_column("workers busy", justify="right")
+    table.add_column("others' cores", justify="right")
+    plan = planned(folder, ["reference"], count, 100.0)
+    for _ in range(rounds):
+        one, two = (measured(plan, locally(workers)) for workers in (1, 2))
+        for workers, found in ((1, one), (2, two)):
+            share = f"{found.rate * found.task / workers:.3f}"
+            numbers = (f"{found.rate:.4g}", f"{found.elapsed:.3g}", f"{1e3 * found.task:.3g}", share)
+            table.add_row(str(workers), *numbers, f"{found.others:.2f}")
+        speed, equal = two.rate / one.rate, two.rate * two.task / (one.rate * one.task)
+        table.add_row("2 / 1", f"{speed:.3f}", "", "", f"{equal:.3f}")
+    return table
+
+
+def cluster_table(folder: Path, sizes: list[int], count: int) -> Table:
+    """Rows per second of Dask clusters on this machine, and what their scheduler and client spend."""
+    from scenarios.sweep.cluster import on_cluster
+
+    table = Table("Dask workers", "rows/s", "worker", "client", "scheduler", box=None, pad_edge=False)
+    plan = planned(folder, ["reference"], count)
+    for workers in sizes:
+        with cluster(workers) as (address, scheduler):
+            work = on_cluster(address)
+            idle = idle_share(scheduler)
+            before = cpu_seconds(scheduler)
+            found = measured(plan, work)
+            # What it does all the time, heartbeats and the like, is not the rows'.
+            spent = (cpu_seconds(scheduler) - before - idle * found.elapsed) / len(plan.tasks)
+        times = (found.task, found.parent, spent)
+        table.add_row(str(workers), f"{found.rate:.4g}", *(f"{1e3 * seconds:.2f} ms" for seconds in times))
+    return table
+
+
+@contextmanager
+def cluster(workers: int) -> Iterator[tuple[str, int]]:
+    """A scheduler and its workers, one thread each; its address and process id."""
+    address = "tcp://127.0.0.1:18786"
+    # The command without its console script: it is there wherever the package is.
+    dask = [sys.executable, "-m", "dask"]
+    with tempfile.TemporaryDirectory() as folder:
+        quiet = {
+            "cwd": folder,
+            "stdout": subprocess.DEVNULL,
+            "stderr": subprocess.DEVNULL,
+            "env": os.environ | ONE_THREAD,
+        }
+        scheduler = subprocess.Popen(
+            [*dask, "scheduler", "--host", "127.0.0.1", "--port", "18786", "--no-dashboard"], **quiet
+        )
+        own = ["--nworkers", str(workers), "--nthreads", "1", "--host", "127.0.0.1", "--no-dashboard"]
+        members = subprocess.Popen([*dask, "worker", address, *own], **quiet)
+        try:
+            yield address, scheduler.pid
+        finally:
+            for process in (members, scheduler):
+                process.terminate()
+                process.wait()
+
+
+def idle_share(pid: int, seconds: float = 5.0) -> float:
+    """CPU time per second of a process that has nothing to do, once it has settled."""
+    time.sleep(seconds)
+    before = cpu_seconds(pid)
+    time.sleep(seconds)
+    return (cpu_seconds(pid) - before) / seconds
+
+
+def cpu_seconds(pid: int) -> float:
+    """CPU time that a process has taken."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def main() -> None:
+    """Measure and print the tables."""
+    parser = argparse.ArgumentParser(description="What a sweep costs beside its engines.")
+    parser.add_argument("--rows", type=int, default=500, help="rows of the reference; of slower engines fewer")
+    parser.add_argument("--rounds", type=int, default=2, help="repetitions of the speed-up")
+    parser.add_argument("--engines", nargs="*", default=["reference", "mujoco-native", "exudyn"])
+    parser.add_argument("--cluster", type=int, nargs="*", default=[], help="numbers of Dask workers")
+    options, console = parser.parse_args(), Console()
+    console.print("load of this machine before: {:.1f} {:.1f} {:.1f}".format(*os.getloadavg()))
+    with tempfile.TemporaryDirectory() as folder:
+        begin = time.process_time()
+        planned(Path(folder), ["reference"], 2000)
+        console.print(f"planning: {(time.process_time() - begin) / 2:.3f} ms a run")
+        if options.engines:
+            console.print(costs_table(Path(folder), options.engines, options.rows))
+        if options.rounds:
+            console.print(speed_table(Path(folder), options.rows, options.rounds))
+        if options.cluster:
+            console.print(cluster_table(Path(folder), options.cluster, options.rows * 4))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,34 @@
+"""Many runs: `sweep`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import Json
+
+
+def sweep_command(
+    file: Annotated[Path, typer.Argument(metavar="FILE.toml", help="What to vary; see examples/sweeps.")],
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler instead of processes of this machine.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="Number of processes; one a core if not given.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="The sweep's folder; sweeps/NAME if not given.")] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with what the folder has: do what is missing.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Many runs over a grid, a list or a Latin hypercube, on local processes or a Dask cluster."""
+    from ..sweep.command import sweep
+    from .installed import installed
+
+    installed()
+    status = sweep(file, scheduler, workers, out, resume, as_json)
+    if status:
+        raise typer.Exit(status)

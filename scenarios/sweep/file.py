@@ -1,0 +1,133 @@
+"""The schema of a sweep file: a base scenario, engines, and what changes from run to run."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import Field, ValidationError, field_validator, model_validator
+
+from engines.engine import REFERENCE
+from scenarios.error import ScenarioError
+from scenarios.scenario import Scenario, load_scenario, validate
+from scenarios.table import Table, one_line
+
+_Range = Annotated[tuple[float, float], Field(strict=False)]  # TOML has arrays only
+_Values = Annotated[tuple[Any, ...], Field(strict=False, min_length=1)]
+_Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
+
+
+def flattened(table: Any) -> Any:
+    """Dotted keys for tables in tables: ``{"surface": {"alpha": 1}}`` becomes ``{"surface.alpha": 1}``."""
+    if not isinstance(table, Mapping):
+        return table  # the schema says what is wrong with it
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, Mapping) and value:
+            found |= {f"{key}.{rest}": part for rest, part in flattened(value).items()}
+        else:
+            found[key] = value
+    return found
+
+
+class Hypercube(Table):
+    """Points of a Latin hypercube."""
+
+    count: int = Field(ge=1, description="number of points")
+    seed: int = Field(ge=0, description="of the random numbers")
+    ranges: dict[str, _Range] = Field(min_length=1, description="dotted key to [low, high]")
+
+    @field_validator("ranges", mode="before")
+    @classmethod
+    def _dotted(cls, ranges: Any) -> Any:
+        return flattened(ranges)
+
+    @field_validator("ranges")
+    @classmethod
+    def _rising(cls, ranges: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+        for key, (low, high) in ranges.items():
+            if not low < high:
+                raise ValueError(f"{key} must be [low, high] with low < high")
+        return ranges
+
+
+class SweepFile(Table):
+    """A sweep as its file declares it."""
+
+    title: str = ""
+    scenario: str | dict[str, Any] = Field(description="library name, path from the sweep file, or tables")
+    engines: _Names = (REFERENCE,)
+    time_limit: float = Field(600.0, gt=0, le=1e6, description="of a run, on the clock [s]")
+    memory_limit: float | None = Field(None, ge=1, le=1e9, description="that a run may take for itself [MB]")
+    grid: dict[str, _Values] = Field(default_factory=dict, description="dotted key to values, all combinations")
+    latin_hypercube: Hypercube | None = None
+    list: Annotated[tuple[dict[str, Any], ...], Field(strict=False)] = ()
+
+    @field_validator("grid", mode="before")
+    @classmethod
+    def _dotted(cls, grid: Any) -> Any:
+        return flattened(grid)
+
+    @field_validator("list")
+    @classmethod
+    def _rows_dotted(cls, rows: tuple[dict[str, Any], ...]) -> tuple[dict[str, Any], ...]:
+        return tuple(flattened(row) for row in rows)
+
+    @model_validator(mode="after")
+    def _each_key_once(self) -> Self:
+        places = {"grid": set(self.grid), "list": {key for row in self.list for key in row}}
+        places["latin_hypercube"] = set(self.latin_hypercube.ranges) if self.latin_hypercube else set()
+        taken: dict[str, str] = {}
+        for place, keys in places.items():
+            for key in sorted(keys):
+                for other, where in taken.items():
+                    if key == other or key.startswith(f"{other}.") or other.startswith(f"{key}."):
+                        raise ValueError(f"{place}: {key!r} is changed by {where} {other!r} already")
+            taken |= dict.fromkeys(keys, place)
+        if len(set(self.engines)) < len(self.engines):
+            raise ValueError("engines: each engine once")
+        return self
+
+
+def read_sweep(path: Path) -> tuple[SweepFile, dict[str, Any]]:
+    """Read a sweep file and its base scenario.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    sweep : SweepFile
+    base : dict
+        The base scenario as resolved, JSON values.
+
+    Raises
+    ------
+    ScenarioError
+        With one line.
+    """
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+        raise ScenarioError(f"{path}: cannot be read: {reason}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{path}: not valid TOML: {error}") from error
+    try:
+        sweep = SweepFile.model_validate(data)
+    except ValidationError as error:
+        raise ScenarioError(f"{path}: {one_line(error)}") from error
+    return sweep, _base(sweep, path).model_dump(mode="json", exclude_none=True)
+
+
+def _base(sweep: SweepFile, path: Path) -> Scenario:
+    if isinstance(sweep.scenario, dict):
+        return validate(sweep.scenario, f"{path}: scenario")
+    source = sweep.scenario
+    try:
+        return load_scenario(str(path.parent / source) if source.endswith(".toml") else source)[1]
+    except ScenarioError as error:
+        raise ScenarioError(f"{path}: scenario: {error}") from error

@@ -1,0 +1,136 @@
+"""The journal of a sweep: finished rows, a line each, there before anybody is told of them.
+
+A line is a checksum, the task's index and JSON. What a crash or a full disk leaves of a line is not taken
+for one, and a damaged line is as if its task had not run. One process at a time writes.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import time
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from scenarios.error import ScenarioError
+
+_BATCH, _WAIT = 200, 0.5  # rows, seconds: what a power failure may cost; a killed process costs none
+
+
+def line_of(index: int, row: dict[str, Any], timing: dict[str, Any]) -> bytes:
+    """A finished task as a line."""
+    text = json.dumps({"row": row, "timing": timing}, separators=(",", ":"), allow_nan=False)
+    body = f"{index} {text}".encode()
+    return b"%08x %b\n" % (zlib.crc32(body), body)
+
+
+def parsed(line: bytes) -> tuple[int, dict[str, Any], dict[str, Any]] | None:
+    """Index, row and timing of a line; None if it is not whole."""
+    checksum, _, body = line.rstrip(b"\n").partition(b" ")
+    if not line.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(body):
+        return None
+    index, _, text = body.partition(b" ")
+    found = json.loads(text)
+    return int(index), found["row"], found["timing"]
+
+
+class Journal:
+    """Appends rows to a file that one process at a time may have open; a context.
+
+    Parameters
+    ----------
+    path : Path
+        Made if need be. What a crash left of a line at its end is cut off.
+
+    Raises
+    ------
+    ScenarioError
+        If another process writes it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            os.close(self._file)
+            raise ScenarioError(f"{path.parent}: another sweep is writing there") from error
+        self._end = _whole_lines(path)
+        os.ftruncate(self._file, self._end)
+        os.lseek(self._file, self._end, os.SEEK_SET)
+        self._unsynced, self._synced_at = 0, time.monotonic()
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        os.close(self._file)  # and with it the lock
+
+    def append(self, index: int, row: dict[str, Any], timing: dict[str, Any]) -> None:
+        """Write a finished task.
+
+        Raises
+        ------
+        OSError
+            If the disk is full, or the like; the journal is then as before.
+        """
+        data = line_of(index, row, timing)
+        written = 0
+        try:
+            while written < len(data):
+                written += os.write(self._file, data[written:])
+        except OSError:
+            os.ftruncate(self._file, self._end)
+            os.lseek(self._file, self._end, os.SEEK_SET)
+            raise
+        self._end += len(data)
+        self._unsynced += 1
+        if self._unsynced >= _BATCH or time.monotonic() - self._synced_at > _WAIT:
+            self.sync()
+
+    def sync(self) -> None:
+        """Let a power failure cost nothing of what is written."""
+        os.fsync(self._file)
+        self._unsynced, self._synced_at = 0, time.monotonic()
+
+
+def finished(path: Path) -> Iterator[tuple[int, int, dict[str, Any], dict[str, Any]]]:
+    """Whole rows of a journal: offset of the line, index, row, timing; of two with one index the first."""
+    seen: set[int] = set()
+    if not path.exists():
+        return
+    with path.open("rb") as file:
+        offset = 0
+        for line in file:
+            found = parsed(line)
+            if found is not None and found[0] not in seen:
+                seen.add(found[0])
+                yield offset, *found
+            offset += len(line)
+
+
+def row_at(file: BinaryIO, offset: int) -> tuple[int, dict[str, Any], dict[str, Any]]:
+    """The row whose line begins at an offset."""
+    file.seek(offset)
+    found = parsed(file.readline())
+    if found is None:
+        raise OSError(f"{file.name}: was changed while it was read")
+    return found
+
+
+def _whole_lines(path: Path) -> int:
+    """Length of a file up to its last line feed."""
+    with path.open("rb") as file:
+        end = file.seek(0, os.SEEK_END)
+        while end > 0:
+            start = max(0, end - 65536)
+            file.seek(start)
+            last = file.read(end - start).rfind(b"\n")
+            if last >= 0:
+                return start + last + 1
+            end = start
+    return 0

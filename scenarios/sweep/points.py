@@ -1,0 +1,68 @@
+"""The points of a sweep: rows of its list, times a Latin hypercube, times a grid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from .file import Hypercube, SweepFile
+
+
+def count(sweep: SweepFile) -> int:
+    """Number of points, before any that coincide are made one."""
+    sizes = [len(values) for values in sweep.grid.values()]
+    cube = 1 if sweep.latin_hypercube is None else sweep.latin_hypercube.count
+    found = max(1, len(sweep.list)) * cube
+    for size in sizes:
+        found *= size
+    return found
+
+
+def points(sweep: SweepFile) -> Iterator[dict[str, Any]]:
+    """Changes of every point, dotted key to value; the grid's last key changes fastest."""
+    rows = sweep.list or ({},)
+    cube = [{}] if sweep.latin_hypercube is None else list(_sampled(sweep.latin_hypercube))
+    for row, sample, values in product(rows, cube, product(*sweep.grid.values())):
+        yield {**row, **sample, **dict(zip(sweep.grid, values, strict=True))}
+
+
+def _sampled(cube: Hypercube) -> Iterator[dict[str, float]]:
+    # scipy.stats takes half a second to load; only this needs it.
+    from scipy.stats import qmc
+
+    unit = qmc.LatinHypercube(len(cube.ranges), rng=cube.seed).random(cube.count)
+    low, high = np.array(list(cube.ranges.values())).T
+    for row in low + (high - low) * unit:
+        yield dict(zip(cube.ranges, row.tolist(), strict=True))
+
+
+def placed(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy of nested tables with dotted keys set.
+
+    Parameters
+    ----------
+    data : mapping
+        Stays as it is.
+    changes : mapping
+        Dotted key to value.
+
+    Raises
+    ------
+    ValueError
+        If a key leads through something that is no table.
+    """
+    result = dict(data)
+    for key, value in changes.items():
+        *tables, last = key.split(".")
+        here = result
+        for table in tables:
+            inner = here.get(table, {})
+            if not isinstance(inner, Mapping):
+                raise ValueError(f"{key}: {table} is no table")
+            here[table] = dict(inner)
+            here = here[table]
+        here[last] = value
+    return result

@@ -1,0 +1,100 @@
+"""The columns of a sweep's data set."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import pyarrow as pa
+
+from .plan import Task
+
+COMPUTED = ("done", "fell", "ended", "no-motion")
+BROKEN = ("failed", "timeout", "killed", "memory")
+
+_ERRORS = ("position_error_max", "position_error_end", "orientation_error_max", "orientation_error_end")
+FACTS = {
+    "key": pa.string(),
+    "index": pa.int64(),
+    "version": pa.string(),
+    "status": pa.string(),
+    "reason": pa.string(),
+}
+METRICS: dict[str, pa.DataType] = {
+    "family": pa.int64(),
+    "growth_rate": pa.float64(),
+    "size": pa.float64(),
+    **dict.fromkeys(_ERRORS, pa.float64()),
+    **dict.fromkeys(
+        ("rear_rate_error", "contact_force_error", "contact_force_error_at", "settled_force_error"), pa.float64()
+    ),
+    **dict.fromkeys(("radius_drift_rate", "phase_drift_rate", "rear_rate_drift_rate"), pa.float64()),
+    **dict.fromkeys(("energy_drift", "energy_drift_rate", "energy_variation"), pa.float64()),
+    **dict.fromkeys(("max_gap", "max_slip", "mean_slip"), pa.float64()),
+    **dict.fromkeys(("required_friction", "friction", "friction_left_at", "min_normal_force"), pa.float64()),
+    "not_finite": pa.string(),
+    "steps": pa.int64(),
+    "fell_at": pa.float64(),
+    "ended": pa.string(),
+    "horizon": pa.float64(),
+}
+# What differs from one run of the same task to the next: kept apart, so that the rest is equal to the bit.
+TIMING: dict[str, pa.DataType] = {
+    "key": pa.string(),
+    "index": pa.int64(),
+    "engine": pa.string(),
+    "cpu_time": pa.float64(),
+    "real_time_factor": pa.float64(),
+    "engine_time": pa.float64(),
+    "task_time": pa.float64(),
+    "finished": pa.float64(),
+    "host": pa.string(),
+    "process": pa.int64(),
+}
+
+
+def flat(metrics: Mapping[str, Any]) -> dict[str, Any]:
+    """Metrics as columns: ``position_error`` becomes ``position_error_max`` and ``_end``, names one text or None."""
+    found: dict[str, Any] = {}
+    for name, value in metrics.items():
+        if isinstance(value, Mapping):
+            found |= {f"{name}_{part}": number for part, number in value.items()}
+        elif isinstance(value, list):
+            found[name] = ", ".join(value) or None
+        else:
+            found[name] = value
+    return found
+
+
+def schema(tasks: Sequence[Task]) -> pa.Schema:
+    """Columns of the data set beside the engine, which is the partition: facts, parameters, metrics."""
+    fields = [*FACTS.items(), *_parameter_types(tasks).items(), *METRICS.items()]
+    return pa.schema([pa.field(name, kind) for name, kind in fields])
+
+
+def _parameter_types(tasks: Iterable[Task]) -> dict[str, pa.DataType]:
+    kinds: dict[str, set[type]] = {}
+    for task in tasks:
+        for key, value in task.changes.items():
+            kinds.setdefault(key, set()).add(type(value))
+    return {key: _column_type(found) for key, found in kinds.items()}
+
+
+def _column_type(kinds: set[type]) -> pa.DataType:
+    if kinds == {bool}:
+        return pa.bool_()
+    if kinds == {int}:
+        return pa.int64()
+    if kinds <= {int, float}:
+        return pa.float64()
+    return pa.string()
+
+
+def record(task: Task, row: Mapping[str, Any], columns: pa.Schema) -> dict[str, Any]:
+    """A row as the data set has it: the task's parameters with what a worker found."""
+    values: dict[str, Any] = {"key": task.key, "index": task.index, **row}
+    for key, value in task.changes.items():
+        text = columns.field(key).type == pa.string() and not isinstance(value, str)
+        values[key] = json.dumps(value) if text else value
+    return values

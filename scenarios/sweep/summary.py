@@ -1,0 +1,111 @@
+"""What a sweep came to, by engine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+import pyarrow.parquet as pq
+from rich.console import Console
+from rich.table import Table
+
+from .live import STYLES
+from .plan import Plan
+from .rows import BROKEN
+from .run import Outcome
+from .store import RESULTS, TIMINGS
+
+_REASONS = 5
+
+
+def summary(plan: Plan, outcome: Outcome) -> dict[str, Any]:
+    """The JSON document of `velodrome sweep`.
+
+    Parameters
+    ----------
+    plan : Plan
+    outcome : Outcome
+
+    Returns
+    -------
+    dict
+        ``sweep, folder, tasks, missing, complete, stopped`` and ``engines``: per engine ``rows`` by status and, of
+        a complete sweep, ``position_error`` (median and worst of the rides' largest), ``rows_per_second`` of one
+        worker, and ``reasons`` of rows that broke.
+    """
+    complete = outcome.stopped is None
+    engines: dict[str, Any] = {}
+    for engine in plan.file.engines:
+        entry: dict[str, Any] = {"rows": outcome.counts[engine]}
+        engines[engine] = entry | (_of_results(outcome, engine) if complete else {})
+    return {
+        "sweep": plan.name,
+        "title": plan.file.title,
+        "folder": str(outcome.folder),
+        "tasks": len(plan.tasks),
+        "missing": outcome.missing,
+        "complete": complete,
+        "stopped": outcome.stopped,
+        "engines": engines,
+    }
+
+
+def _of_results(outcome: Outcome, engine: str) -> dict[str, Any]:
+    path = outcome.folder / RESULTS / f"engine={quote(engine, safe='')}" / "part-0.parquet"
+    columns = ["status", "reason", "position_error_max"]
+    table = pq.ParquetFile(path).read(columns=columns)
+    errors = table.column("position_error_max").drop_null().to_numpy()
+    error = {"median": float(np.median(errors)), "worst": float(errors.max())} if len(errors) else None
+    timing = pq.read_table(outcome.folder / TIMINGS, filters=[("engine", "=", engine)], columns=["task_time"])
+    seconds = timing.column("task_time").drop_null().to_numpy()
+    broken = [row for row in table.select(columns[:2]).to_pylist() if row["status"] in BROKEN]
+    return {
+        "position_error": error,
+        "rows_per_second": float(len(seconds) / seconds.sum()) if seconds.sum() > 0 else None,
+        "reasons": list(dict.fromkeys(f"{row['status']}: {row['reason']}" for row in broken))[:_REASONS],
+    }
+
+
+def status_of(outcome: Outcome) -> int:
+    """Exit status: 0 if every run has its result, 1 if some broke or are missing, 130 after Ctrl-C."""
+    if outcome.interrupted:
+        return 130
+    broke = any(counts.get(status) for counts in outcome.counts.values() for status in BROKEN)
+    return int(broke or outcome.stopped is not None)
+
+
+def resume_command(plan: Plan, outcome: Outcome) -> str:
+    """What goes on with a sweep that was stopped."""
+    return f"velodrome sweep {plan.path} --out {outcome.folder} --resume"
+
+
+def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> None:
+    """Print a table by engine, why rows broke, and where the data set is or how to go on."""
+    entries: Mapping[str, Mapping[str, Any]] = document["engines"]
+    statuses = [status for status in STYLES if any(entry["rows"].get(status) for entry in entries.values())]
+    table = Table("engine", box=None, pad_edge=False)
+    for status in statuses:
+        table.add_column(status, justify="right", style=STYLES[status], no_wrap=True)
+    for title in ("error,\nmedian, m", "error,\nworst, m", "rows/s of\na worker"):
+        table.add_column(title, justify="right", no_wrap=True)
+    for name, entry in entries.items():
+        error = entry.get("position_error") or {}
+        numbers = (error.get("median"), error.get("worst"), entry.get("rows_per_second"))
+        shown = ("–" if number is None else f"{number:.3g}" for number in numbers)
+        table.add_row(name, *(str(entry["rows"].get(status, 0)) for status in statuses), *shown)
+    console.print(table)
+    for name, entry in entries.items():
+        for reason in entry.get("reasons", ()):
+            _say(console, f"{name} {reason}", "red")
+    if document["stopped"] is None:
+        _say(console, f"data set: {document['folder']}/{RESULTS}")
+        return
+    missing = f"{document['missing']} of {document['tasks']} runs are missing, what is done is kept"
+    _say(console, f"{document['stopped']}: {missing}", "yellow")
+    _say(console, f"go on with: {resume}")
+
+
+def _say(console: Console, line: str, style: str | None = None) -> None:
+    console.print(line, style=style, markup=False, highlight=False, soft_wrap=True)

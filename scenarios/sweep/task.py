@@ -1,0 +1,172 @@
+"""One task, as a worker does it: a scenario to a row."""
+
+from __future__ import annotations
+
+import errno
+import json
+import math
+import time
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from engines.admission import ride
+from engines.engine import REFERENCE, Engine, EngineError, Settings, Trajectory
+from scenarios.error import ScenarioError
+from scenarios.runner import configure, measure_one
+from scenarios.scenario import Scenario, validate
+from scenarios.start import Start, make_start
+
+from .plan import canonical, pruned
+from .points import placed
+from .rows import METRICS, flat
+
+_LONGEST_REASON = 500
+
+
+class Tasks:
+    """Does the tasks of one sweep, one after the other; neighbours share their start and the reference's ride.
+
+    Parameters
+    ----------
+    base : mapping
+        The base scenario as resolved.
+    """
+
+    def __init__(self, base: Mapping[str, Any]) -> None:
+        self._base = base
+        self._starts: Callable[[str], Start | str] = lru_cache(maxsize=64)(_start)
+        self._references: dict[str, Trajectory | str] = {}
+
+    def do(self, engine: str, changes: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Run an engine at a point.
+
+        Parameters
+        ----------
+        engine : str
+        changes : mapping
+            Dotted key to value.
+
+        Returns
+        -------
+        row : dict
+            Version, status, reason and metrics: the same whenever and wherever it is done.
+        timing : dict
+            What is not.
+        """
+        begin = time.process_time()
+        timing: dict[str, Any] = {}
+        try:
+            row = self._ride(engine, changes, timing)
+        except MemoryError:
+            row = {"status": "memory", "reason": "more memory than the sweep's memory_limit, or than there is"}
+        except Exception as error:  # whatever an engine raises is one row that says so
+            row = _broken(error)
+        timing["task_time"] = time.process_time() - begin
+        timing["finished"] = time.time()
+        return _plain(row), _plain(timing)
+
+    def _ride(self, name: str, changes: Mapping[str, Any], timing: dict[str, Any]) -> dict[str, Any]:
+        scenario = validate(pruned(placed(self._base, changes), name), "task")
+        engine, version, settings = _configured(name, canonical(scenario.engines.get(name, {})))
+        facts: dict[str, Any] = {"version": version}
+        start = self._starts(_what_starts(scenario))
+        if isinstance(start, str):
+            return facts | {"status": "no-motion", "reason": one_line(start)}
+        facts |= {"family": start.family, "growth_rate": start.growth_rate, "size": start.size}
+        begin = time.process_time()
+        reference: Trajectory | str | None = None
+        try:
+            if name == REFERENCE:
+                trajectory, reference = self._reference(scenario, start), None
+                if isinstance(trajectory, str):
+                    return facts | {"status": "failed", "reason": trajectory}
+            else:
+                engine.check(start.problem, settings)
+                reference = self._reference(scenario, start)
+                trajectory = ride(engine, start.problem, settings, lambda _: None)
+        except MemoryError:
+            raise
+        except Exception as error:
+            return facts | _broken(error)
+        finally:
+            timing["engine_time"] = time.process_time() - begin
+        measured = flat(measure_one(start, trajectory, None if isinstance(reference, str) else reference))
+        timing |= {key: measured.get(key) for key in ("cpu_time", "real_time_factor")}
+        facts |= {key: measured.get(key) for key in METRICS if key not in facts}
+        reason = f"nothing to compare with: the reference: {reference}" if isinstance(reference, str) else None
+        return facts | _outcome(measured, reason)
+
+    def _reference(self, scenario: Scenario, start: Start) -> Trajectory | str:
+        """The reference's ride at this point, or why there is none; the last is kept for the other engines."""
+        chosen = canonical(scenario.engines.get(REFERENCE, {}))
+        text = f"{_what_starts(scenario)} {chosen}"
+        if text not in self._references:
+            engine, _, settings = _configured(REFERENCE, chosen)
+            found: Trajectory | str
+            try:
+                engine.check(start.problem, settings)
+                found = ride(engine, start.problem, settings, lambda _: None)
+            except MemoryError:
+                raise
+            except Exception as error:
+                found = _reason(error)
+            self._references = {text: found}
+        return self._references[text]
+
+
+def _what_starts(scenario: Scenario) -> str:
+    """What of a scenario its start depends on."""
+    return canonical(
+        scenario.model_dump(mode="json", exclude_none=True, exclude={"title", "tags", "criterion", "engines"})
+    )
+
+
+def _start(text: str) -> Start | str:
+    try:
+        return make_start(validate(json.loads(text) | {"title": "start"}, "task"))
+    except ScenarioError as error:
+        return str(error)
+
+
+@lru_cache(maxsize=1024)
+def _configured(name: str, settings: str) -> tuple[Engine, str, Settings]:
+    """An engine, its version, its settings; to look each up takes longer than a short ride."""
+    engine, chosen = configure(name, json.loads(settings))
+    return engine, engine.version, chosen
+
+
+def _outcome(measured: Mapping[str, Any], reason: str | None) -> dict[str, Any]:
+    if measured["fell_at"] is not None:
+        words = f"fell at {measured['fell_at']!r} s"
+        return {"status": "fell", "reason": "; ".join(filter(None, (words, measured["ended"], reason)))}
+    if measured["ended"] is not None:
+        return {"status": "ended", "reason": "; ".join(filter(None, (measured["ended"], reason)))}
+    return {"status": "done", "reason": reason}
+
+
+def _broken(error: Exception) -> dict[str, Any]:
+    """A failed run; C++ and the system say in their own ways that there is no memory."""
+    if "bad_alloc" in str(error) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
+        return {"status": "memory", "reason": "more memory than the sweep's memory_limit, or than there is"}
+    return {"status": "failed", "reason": _reason(error)}
+
+
+def _reason(error: Exception) -> str:
+    """One line on why an engine failed; its own words where it chose them."""
+    return one_line(str(error) if isinstance(error, EngineError) else f"{type(error).__name__}: {error}")
+
+
+def one_line(text: str) -> str:
+    """Fit for a row: one line, not endless, nothing that is no text."""
+    return " ".join(text.encode(errors="replace").decode().split())[:_LONGEST_REASON]
+
+
+def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values that JSON carries: numbers of Python, and None for one that is none."""
+    plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()}
+    return {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in plain.items()
+    }

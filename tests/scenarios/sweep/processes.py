@@ -1,0 +1,72 @@
+"""A sweep in a process of its own, and who works for it."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+from scenarios.sweep.store import JOURNAL
+
+_COMMAND = """
+import sys
+from pathlib import Path
+from scenarios.sweep.command import sweep
+path, out, resume = sys.argv[1:]
+sys.exit(sweep(Path(path), None, 2, Path(out), resume == "resume", False))
+"""
+
+
+def started(path: Path, out: Path, resume: bool, largest: int | None = None) -> subprocess.Popen[str]:
+    """Run a sweep file on two workers; no file of it may become larger than so many bytes."""
+    limit = None if largest is None else lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
+    return subprocess.Popen(
+        [sys.executable, "-c", _COMMAND, str(path), str(out), "resume" if resume else ""],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        preexec_fn=limit,
+    )
+
+
+def children(pid: int) -> list[int]:
+    with suppress(OSError):
+        return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    return []
+
+
+def workers_of(pid: int) -> list[int]:
+    """The keepers of a sweep's workers, and their children."""
+    keepers = children(pid)
+    return keepers + [child for keeper in keepers for child in children(keeper)]
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs; a zombie does not."""
+    with suppress(OSError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    return False
+
+
+def gone(pids: list[int]) -> bool:
+    """Whether all processes end soon; one that is still loading notices afterwards that it is not needed."""
+    give_up = time.monotonic() + 30
+    while any(alive(pid) for pid in pids) and time.monotonic() < give_up:
+        time.sleep(0.05)
+    return not any(alive(pid) for pid in pids)
+
+
+def killed(pid: int) -> None:
+    with suppress(ProcessLookupError):
+        os.kill(pid, signal.SIGKILL)
+
+
+def lines(out: Path) -> int:
+    """Rows in the journal so far."""
+    journal = out / JOURNAL
+    return journal.read_bytes().count(b"\n") if journal.exists() else 0

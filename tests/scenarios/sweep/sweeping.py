@@ -1,0 +1,56 @@
+"""Small sweeps and what comes of them."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+
+from scenarios.sweep.plan import Plan, Task, plan_sweep
+from scenarios.sweep.pool import Done
+from scenarios.sweep.run import Outcome, Work, locally, run_sweep
+from scenarios.sweep.store import RESULTS
+from scenarios.sweep.task import Tasks
+from scenarios.sweep.worker import Setup
+
+# Upright starts are computed in a millisecond.
+UPRIGHT = """
+scenario = "iftomm-1"
+time_limit = 60.0
+[grid]
+simulation.duration = [0.5]
+simulation.output_rate = [20.0]
+"""
+
+
+def written(folder: Path, text: str, name: str = "small") -> Path:
+    path = folder / f"{name}.toml"
+    path.write_text(text)
+    return path
+
+
+def planned(folder: Path, text: str) -> Plan:
+    return plan_sweep(written(folder, text))
+
+
+def here(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
+    """Work in this process, last task first."""
+    work = Tasks(setup.base)
+    for task in reversed(tasks):
+        yield Done(task.index, *work.do(task.engine, task.changes))
+
+
+def swept(plan: Plan, out: Path, work: Work | int = here, resume: bool = False) -> Outcome:
+    return run_sweep(plan, out, locally(work) if isinstance(work, int) else work, resume, lambda *_: None)
+
+
+def rows(out: Path, engine: str = "reference") -> list[dict[str, Any]]:
+    return pq.ParquetFile(out / RESULTS / f"engine={engine}" / "part-0.parquet").read().to_pylist()
+
+
+def data_set(out: Path) -> dict[str, bytes]:
+    """Every file of the data set, to the byte."""
+    folder = out / RESULTS
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}

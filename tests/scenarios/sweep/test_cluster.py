@@ -1,0 +1,109 @@
+"""A Dask cluster gives the rows of local processes to the bit, and may lose workers."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Generator, Sequence
+from pathlib import Path
+from typing import Any
+
+import planted
+import pytest
+from processes import killed
+from sweeping import UPRIGHT, data_set, here, planned, swept
+from test_kills import MANY, indices
+
+from scenarios.error import ScenarioError
+from scenarios.sweep.plan import Task
+from scenarios.sweep.pool import Done
+from scenarios.sweep.run import Work
+from scenarios.sweep.summary import status_of
+from scenarios.sweep.worker import Setup
+
+distributed: Any = pytest.importorskip("distributed")
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def cluster() -> Generator[Any]:
+    with two_workers() as found:
+        yield found
+
+
+def two_workers() -> Any:
+    """A cluster of one thread a worker, on the loopback."""
+    quiet = {"dashboard_address": None, "silence_logs": logging.CRITICAL}
+    return distributed.LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", **quiet)
+
+
+def on_cluster(address: str) -> Work:
+    from scenarios.sweep.cluster import on_cluster
+
+    return on_cluster(address)
+
+
+def test_a_cluster_gives_the_bits_of_local_processes(cluster: Any, tmp_path: Path) -> None:
+    text = 'engines = ["reference", "exudyn", "mujoco-native"]\n' + UPRIGHT + "perturbation.lean_rate = [0.0, 0.1, 0.2]"
+    plan = planned(tmp_path, text)
+    swept(plan, tmp_path / "cluster", on_cluster(cluster.scheduler_address))
+    swept(plan, tmp_path / "local", 2)
+    assert data_set(tmp_path / "cluster") == data_set(tmp_path / "local")
+
+
+def test_a_worker_that_is_lost_midway_loses_nothing(cluster: Any, tmp_path: Path) -> None:
+    plan = planned(tmp_path, MANY)
+    pids = [worker.pid for worker in cluster.workers.values()]
+    work = on_cluster(cluster.scheduler_address)
+
+    def losing(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
+        for number, done in enumerate(work(setup, tasks)):
+            if number == 200:
+                killed(pids[0])
+            yield done
+
+    outcome = swept(plan, tmp_path / "out", losing)
+    assert outcome.missing == 0
+    assert indices(tmp_path / "out") == Counter(range(1500))
+    swept(plan, tmp_path / "undisturbed", here)
+    assert data_set(tmp_path / "out") == data_set(tmp_path / "undisturbed")
+
+
+def test_a_scheduler_that_is_lost_stops_the_sweep_and_it_goes_on_elsewhere(cluster: Any, tmp_path: Path) -> None:
+    plan, out = planned(tmp_path, MANY), tmp_path / "out"
+    work = on_cluster(cluster.scheduler_address)
+
+    def losing(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
+        for number, done in enumerate(work(setup, tasks)):
+            if number == 100:
+                cluster.close()
+            yield done
+
+    first = swept(plan, out, losing)
+    assert first.stopped is not None
+    assert first.missing < 1500
+    assert status_of(first) == 1
+    swept(plan, out, 2, resume=True)
+    assert indices(out) == Counter(range(1500))
+    swept(plan, tmp_path / "undisturbed", here)
+    assert data_set(out) == data_set(tmp_path / "undisturbed")
+
+
+def test_faults_on_a_cluster_are_the_rows_they_are_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    planted.announce(tmp_path / "site", monkeypatch)
+    text = 'engines = ["planted"]\nmemory_limit = 300\n' + UPRIGHT.replace("60.0", "5.0")
+    plan = planned(tmp_path, text + '"engines.planted.fault" = ["hang", "crash", "none", "hog", "raise", "abort"]')
+    # Its processes must find the engine.
+    with two_workers() as cluster:
+        outcome = swept(plan, tmp_path / "cluster", on_cluster(cluster.scheduler_address))
+    assert outcome.stopped is None
+    swept(plan, tmp_path / "local", 2)
+    assert data_set(tmp_path / "cluster") == data_set(tmp_path / "local")
+
+
+def test_no_scheduler_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    from scenarios.sweep import cluster
+
+    monkeypatch.setattr(cluster, "_PATIENCE", 1)
+    with pytest.raises(ScenarioError, match="no Dask scheduler answers"):
+        on_cluster("tcp://127.0.0.1:1")

@@ -1,0 +1,70 @@
+"""What a sweep says: JSON, a table, the live view; how it ends."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from sweeping import UPRIGHT, here, planned, written
+
+from scenarios.error import ScenarioError
+from scenarios.sweep import command
+from scenarios.sweep.live import SweepView
+from scenarios.sweep.pool import Done
+
+THREE = UPRIGHT + "perturbation.lean_rate = [0.0, 0.1, 0.2]\n"
+
+
+@pytest.fixture
+def in_process(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(command, "_work", lambda *_: here)
+    return tmp_path
+
+
+def test_the_summary_is_the_only_thing_on_stdout(in_process: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = written(in_process, THREE)
+    assert command.sweep(path, None, None, None, resume=False, as_json=True) == 0
+    said = capsys.readouterr()
+    document = json.loads(said.out)
+    assert document["folder"] == "sweeps/small"
+    assert (document["tasks"], document["missing"], document["complete"]) == (3, 0, True)
+    assert document["engines"]["reference"]["rows"] == {"done": 3}
+    assert "data set: sweeps/small/results" in said.err
+
+
+def test_rows_that_broke_are_named_with_their_reason(in_process: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = written(in_process, 'scenario = "q2"\nengines = ["exudyn-builtin"]\ngrid.simulation.duration = [0.1]')
+    assert command.sweep(path, None, None, in_process / "out", resume=False, as_json=False) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert "exudyn-builtin failed: UnsuitableProblem: it rolls on the level plane only" in said
+
+
+def test_workers_belong_to_this_machine(in_process: Path) -> None:
+    with pytest.raises(ScenarioError, match="--workers goes without --scheduler"):
+        command.sweep(written(in_process, THREE), "tcp://127.0.0.1:1", 2, None, resume=False, as_json=False)
+
+
+def test_the_live_view_counts_and_says_what_failed_and_why(tmp_path: Path) -> None:
+    tasks = planned(tmp_path, THREE).tasks
+    screen = Console(file=io.StringIO(), force_terminal=True, width=100)
+    view = SweepView(10, screen)
+    view.watch(tasks[0], Done(0, {"status": "done", "reason": None}, {}), fresh=False)
+    view.watch(tasks[1], Done(1, {"status": "failed", "reason": "[bold]it diverged"}, {}), fresh=True)
+    with screen.capture() as shown:
+        screen.print(view.picture())
+    text = shown.get()
+    assert "2 of 10" in text
+    assert "rows/s" in text
+    assert "left" in text
+    assert f"{tasks[1].key} reference failed: [bold]it diverged" in text
+
+
+def test_no_live_view_where_there_is_no_terminal(tmp_path: Path) -> None:
+    file = io.StringIO()
+    with SweepView(3, Console(file=file)) as view:
+        view.watch(planned(tmp_path, THREE).tasks[0], Done(0, {"status": "done", "reason": None}, {}), fresh=True)
+    assert file.getvalue() == ""

@@ -1,0 +1,110 @@
+"""Sweep files: what they say, and one line on what is wrong with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sweeping import UPRIGHT, planned, written
+
+from scenarios.error import ScenarioError
+from scenarios.sweep.file import read_sweep
+from scenarios.sweep.plan import plan_sweep
+from scenarios.sweep.points import placed, points
+
+
+def changes(folder: Path, text: str) -> list[dict]:
+    return list(points(read_sweep(written(folder, text))[0]))
+
+
+def test_a_grid_is_every_combination_and_its_last_key_changes_fastest(tmp_path: Path) -> None:
+    found = changes(tmp_path, 'scenario = "q2"\n[grid]\nsurface.alpha = [1, 2]\n"motion.rear_rate" = [3, 4]')
+    values = [(point["surface.alpha"], point["motion.rear_rate"]) for point in found]
+    assert values == [(1, 3), (1, 4), (2, 3), (2, 4)]
+
+
+def test_rows_of_a_list_go_with_every_point_of_the_rest(tmp_path: Path) -> None:
+    text = 'scenario = "q2"\ngrid.surface.alpha = [1, 2]\n'
+    text += "[[list]]\nmotion.family = 1\n[[list]]\nmotion = { family = 2, near = { lean = 1, steer = 2 } }"
+    found = changes(tmp_path, text)
+    assert found[0] == {"motion.family": 1, "surface.alpha": 1}
+    assert found[3] == {"motion.family": 2, "motion.near.lean": 1, "motion.near.steer": 2, "surface.alpha": 2}
+    assert len(found) == 4
+
+
+def test_a_latin_hypercube_has_one_point_in_every_slice_and_is_the_same_again(tmp_path: Path) -> None:
+    text = 'scenario = "q2"\n[latin_hypercube]\ncount = 20\nseed = 5\n'
+    text += "ranges.surface.alpha = [2.0, 4.0]\nranges.motion.rear_rate = [-1, 1]"
+    found = changes(tmp_path, text)
+    for key, low, high in (("surface.alpha", 2.0, 4.0), ("motion.rear_rate", -1.0, 1.0)):
+        share = [(point[key] - low) / (high - low) for point in found]
+        assert sorted(np.floor(np.array(share) * 20)) == list(range(20))
+    assert changes(tmp_path, text) == found
+
+
+def test_changes_leave_what_they_are_made_of_alone() -> None:
+    data = {"a": {"b": 1}}
+    assert placed(data, {"a.c": 2, "d.e": 3}) == {"a": {"b": 1, "c": 2}, "d": {"e": 3}}
+    assert data == {"a": {"b": 1}}
+
+
+def test_settings_of_an_engine_multiply_its_own_runs_only(tmp_path: Path) -> None:
+    text = 'engines = ["reference", "exudyn"]\n' + UPRIGHT + '"engines.exudyn.step" = [0.01, 0.005]\n'
+    plan = planned(tmp_path, text + "perturbation.lean_rate = [0.0, 0.1, 0.2]")
+    count = {engine: sum(task.engine == engine for task in plan.tasks) for engine in ("reference", "exudyn")}
+    assert count == {"reference": 3, "exudyn": 6}
+    assert [task.index for task in plan.tasks] == list(range(9))
+    assert len({task.key for task in plan.tasks}) == 9
+    assert all("engines.exudyn.step" not in task.changes for task in plan.tasks if task.engine == "reference")
+
+
+def test_runs_that_come_out_the_same_are_one_task(tmp_path: Path) -> None:
+    assert len(planned(tmp_path, UPRIGHT + "motion.speed = [5, 5.0, 4.6]").tasks) == 2
+
+
+def test_a_scenario_may_stand_in_the_file_or_beside_it(tmp_path: Path) -> None:
+    tables = 'surface = { kind = "plane" }\nmotion = { kind = "upright", speed = 5.0 }\nsimulation = { duration = 1.0 }'
+    (tmp_path / "base.toml").write_text(f'title = "x"\n{tables}')
+    inside = planned(tmp_path, f'[scenario]\ntitle = "x"\n{tables}')
+    beside = planned(tmp_path, 'scenario = "base.toml"')
+    assert inside.tasks == beside.tasks
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("scenario = 'q2'\ngrid = 3", "grid: must be a table"),
+        ("scenario = 'q2'\n[grid]\nsurface.alpha = []", "surface.alpha"),
+        ("scenario = 'q2'\n[grid]\nsurface.alpha = 0.1", "surface.alpha"),
+        ("scenario = 'q2'\n[grid]\nsurface.alfa = [0.1]", "unknown key 'alfa'"),
+        ("scenario = 'q2'\n[grid]\nsurface.alpha = [0.1, -1]", "at surface.alpha = -1"),
+        ("scenario = 'q2'\n[grid]\nsurface.alpha = ['x']", "valid number"),
+        ("scenario = 'q2'\n[grid]\ntitle.x = [1]", "title is no table"),
+        ("scenario = 'q2'\n[grid]\nbicycle.wheels = [1]", "'wheels' is unknown"),
+        ("scenario = 'q2'\n[grid]\nengines.exudyn.step = [0.01]", "'exudyn' is not among the sweep's engines"),
+        ("scenario = 'q2'\nengines = ['adams']", "engine 'adams' is not installed"),
+        ("scenario = 'q2'\nengines = ['reference', 'reference']", "each engine once"),
+        ("scenario = 'q2'\nengines = []", "engines"),
+        ("scenario = 'q2'\n[grid]\nengines.reference.tolerance = [7]", "engines.reference.tolerance"),
+        ("scenario = 'q2'\nengines = ['exudyn']\n[grid]\nengines.exudyn.step = [0.003]", "engines.exudyn"),
+        ("scenario = 'q3'", "no scenario 'q3'"),
+        ("scenario = 'none.toml'", "cannot be read"),
+        ("grid.surface.alpha = [1]", "scenario: is missing"),
+        ("scenario = 'q2'\nworkers = 3", "unknown key 'workers'"),
+        ("scenario = 'q2'\ntime_limit = 0", "time_limit"),
+        ("scenario = 'q2'\n[latin_hypercube]\ncount = 0\nseed = 1\nranges.surface.alpha = [0, 1]", "count"),
+        ("scenario = 'q2'\n[latin_hypercube]\ncount = 3\nseed = 1\nranges.surface.alpha = [1, 1]", "low < high"),
+        ("scenario = 'q2'\n[latin_hypercube]\ncount = 3\nseed = 1\nranges.surface.alpha = [1, inf]", "finite"),
+        ("scenario = 'q2'\ngrid.surface.alpha = [1]\n[[list]]\nsurface.alpha = 2", "is changed by"),
+        ("scenario = 'q2'\ngrid.motion.near = [{lean=1,steer=1}]\n[[list]]\nmotion.near.lean = 2", "is changed by"),
+        ("scenario = 'q2'\nlist = 3", "list"),
+        ("scenario = ", "not valid TOML"),
+        ("scenario = 'q2'\n[latin_hypercube]\ncount=9999999\nseed=1\nranges.surface.alpha=[0, 1]", "at most"),
+    ],
+)
+def test_bad_files_are_told_in_one_line_with_their_name(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(ScenarioError, match=r"small\.toml") as error:
+        plan_sweep(written(tmp_path, text))
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)

@@ -1,0 +1,87 @@
+"""The journal: what is not whole is not taken for a row."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenarios.error import ScenarioError
+from scenarios.sweep.journal import Journal, finished, line_of, parsed
+
+ROWS = [(3, {"status": "done", "x": 0.1 + 0.2}, {}), (1, {"status": "fell", "reason": "é\n"}, {"cpu_time": 1e-300})]
+
+
+def kept(path: Path) -> list[list[Any]]:
+    return [found for _, *found in finished(path)]
+
+
+def test_rows_come_back_to_the_bit(tmp_path: Path) -> None:
+    path = tmp_path / "journal"
+    with Journal(path) as journal:
+        for row in ROWS:
+            journal.append(*row)
+    assert kept(path) == [list(row) for row in ROWS]
+
+
+@pytest.mark.parametrize("cut", [1, 2, 9, 30])
+def test_a_torn_last_line_is_cut_off_and_what_follows_is_whole(tmp_path: Path, cut: int) -> None:
+    path = tmp_path / "journal"
+    path.write_bytes(line_of(*ROWS[0]) + line_of(*ROWS[1])[:-cut])
+    assert kept(path) == [list(ROWS[0])]
+    with Journal(path) as journal:
+        journal.append(*ROWS[1])
+    assert kept(path) == [list(row) for row in ROWS]
+
+
+def test_a_line_without_any_end_is_no_row(tmp_path: Path) -> None:
+    path = tmp_path / "journal"
+    path.write_bytes(line_of(*ROWS[0])[:40])
+    with Journal(path):
+        pass
+    assert path.read_bytes() == b""
+
+
+@given(st.data())
+def test_no_altered_line_is_taken_for_a_row(data: st.DataObject) -> None:
+    line = line_of(*ROWS[1])
+    place = data.draw(st.integers(0, len(line) - 1))
+    bit = 1 << data.draw(st.integers(0, 7))
+    assert parsed(line[:place] + bytes([line[place] ^ bit]) + line[place + 1 :]) is None
+
+
+def test_a_damaged_line_costs_that_row_only(tmp_path: Path) -> None:
+    path = tmp_path / "journal"
+    path.write_bytes(line_of(*ROWS[0]).replace(b"done", b"gone") + line_of(*ROWS[1]))
+    assert kept(path) == [list(ROWS[1])]
+
+
+def test_one_process_writes_at_a_time(tmp_path: Path) -> None:
+    with Journal(tmp_path / "journal"), pytest.raises(ScenarioError, match="another sweep is writing"):
+        Journal(tmp_path / "journal")
+    with Journal(tmp_path / "journal"):
+        pass
+
+
+def test_a_full_disk_leaves_whole_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, write = tmp_path / "journal", os.write
+
+    def filling(file: int, data: bytes) -> int:
+        if len(data) < 50:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(file, data[: len(data) // 2])
+
+    with Journal(path) as journal:
+        journal.append(*ROWS[0])
+        monkeypatch.setattr(os, "write", filling)
+        with pytest.raises(OSError, match="No space"):
+            journal.append(*ROWS[1])
+        assert path.read_bytes() == line_of(*ROWS[0])
+        monkeypatch.undo()
+        journal.append(*ROWS[1])
+    assert kept(path) == [list(row) for row in ROWS]

@@ -1,0 +1,194 @@
+"""A sweep as a whole, done in this process: every row once, equal bits, and what stops it."""
+
+from __future__ import annotations
+
+import errno
+import json
+from collections.abc import Generator, Sequence
+from itertools import islice
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from sweeping import UPRIGHT, data_set, here, planned, rows, swept
+
+from scenarios.error import ScenarioError
+from scenarios.runner import measure_one, plan_run
+from scenarios.scenario import load_scenario
+from scenarios.sweep import rows as columns
+from scenarios.sweep.journal import finished
+from scenarios.sweep.plan import Task
+from scenarios.sweep.pool import Done
+from scenarios.sweep.run import Work
+from scenarios.sweep.store import JOURNAL, MANIFEST, RESULTS, TIMINGS
+from scenarios.sweep.summary import status_of, summary
+from scenarios.sweep.worker import Setup
+
+LEANING = UPRIGHT + "perturbation.lean_rate = [0.0, 0.1, 0.2, 0.3]\n"
+
+
+def breaking_off(after: int, error: BaseException) -> Work:
+    def work(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
+        yield from islice(here(setup, tasks), after)
+        raise error
+
+    return work
+
+
+def test_a_row_has_the_parameters_and_the_metrics_of_a_run(tmp_path: Path) -> None:
+    text = 'engines = ["reference", "mujoco-multipliers"]\n' + UPRIGHT
+    plan = planned(tmp_path, text + '"engines.mujoco-multipliers.step" = [0.01]\nperturbation.lean_rate = [0.0, 0.1]')
+    swept(plan, tmp_path / "out")
+    found = rows(tmp_path / "out", "mujoco-multipliers")
+    assert [row["perturbation.lean_rate"] for row in found] == [0.0, 0.1]
+    changes = dict(plan.tasks[-1].changes)
+    alone = plan_run(*load_scenario("iftomm-1", changes), wanted=["mujoco-multipliers"])
+    rides = {
+        name: engine.simulate(alone.start.problem, settings, lambda _: None)
+        for name, (engine, settings) in alone.engines.items()
+    }
+    measured = measure_one(alone.start, rides["mujoco-multipliers"], rides["reference"])
+    differing = set(columns.TIMING)
+    flat = {name: value for name, value in columns.flat(measured).items() if name not in differing}
+    assert set(flat) == set(columns.METRICS) - {"family", "growth_rate", "size"}
+    assert {name: found[1][name] for name in flat} == flat
+    assert (found[1]["status"], found[1]["reason"]) == ("done", None)
+
+
+def test_the_order_of_the_work_does_not_matter(tmp_path: Path) -> None:
+    def forwards(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
+        yield from here(setup, tasks[::-1])
+
+    plan = planned(tmp_path, LEANING)
+    swept(plan, tmp_path / "a")
+    swept(plan, tmp_path / "b", forwards)
+    assert data_set(tmp_path / "a") == data_set(tmp_path / "b")
+    assert pq.read_table(tmp_path / "a" / TIMINGS).num_rows == 4
+
+
+def test_a_motion_that_does_not_exist_is_a_row_of_every_engine(tmp_path: Path) -> None:
+    text = 'scenario = "q2"\nengines = ["reference", "exudyn"]\n[grid]\nmotion.rear_rate = [3.0]'
+    outcome = swept(planned(tmp_path, text), tmp_path / "out")
+    for engine in ("reference", "exudyn"):
+        (row,) = rows(tmp_path / "out", engine)
+        assert row["status"] == "no-motion"
+        assert "no circular motion" in row["reason"]
+    assert status_of(outcome) == 0
+
+
+def test_a_fall_is_a_result(tmp_path: Path) -> None:
+    text = 'scenario = "iftomm-1"\n[grid]\nmotion.speed = [1.0]\nperturbation.lean_rate = [1.0]'
+    outcome = swept(planned(tmp_path, text), tmp_path / "out")
+    (row,) = rows(tmp_path / "out")
+    assert row["status"] == "fell"
+    assert f"fell at {row['fell_at']!r} s" in row["reason"]
+    assert status_of(outcome) == 0
+
+
+def test_ground_that_an_engine_does_not_know_is_a_failed_row(tmp_path: Path) -> None:
+    text = 'scenario = "q2"\nengines = ["exudyn-builtin"]\n[grid]\nsimulation.duration = [0.1]'
+    outcome = swept(planned(tmp_path, text), tmp_path / "out")
+    (row,) = rows(tmp_path / "out", "exudyn-builtin")
+    assert row["status"] == "failed"
+    assert "level plane" in row["reason"]
+    assert status_of(outcome) == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "said", "status"),
+    [
+        (KeyboardInterrupt(), "interrupted", 130),
+        (OSError(errno.ENOSPC, "No space left on device"), "cannot write: No space left on device", 1),
+    ],
+)
+def test_what_is_done_is_kept_and_not_done_again(tmp_path: Path, error: BaseException, said: str, status: int) -> None:
+    plan, out = planned(tmp_path, LEANING), tmp_path / "out"
+    first = swept(plan, out, breaking_off(3, error))
+    assert (first.missing, first.stopped, status_of(first)) == (1, said, status)
+    assert not (out / RESULTS).exists()
+    assert json.loads((out / MANIFEST).read_text())["complete"] is False
+    asked: list[int] = []
+
+    def counting(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
+        asked.extend(task.index for task in tasks)
+        yield from here(setup, tasks)
+
+    second = swept(plan, out, counting, resume=True)
+    assert asked == [0]
+    assert second.counts == {"reference": {"done": 4}}
+    assert json.loads((out / MANIFEST).read_text())["complete"] is True
+    swept(plan, tmp_path / "undisturbed")
+    assert data_set(out) == data_set(tmp_path / "undisturbed")
+    assert len(list(finished(out / JOURNAL))) == 4
+
+
+def test_a_disk_that_fills_while_the_data_set_is_written_leaves_no_part_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, out = planned(tmp_path, LEANING), tmp_path / "out"
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(pq.ParquetWriter, "write_table", full)
+    assert swept(plan, out).stopped == "cannot write: No space left on device"
+    assert data_set(out) == {}
+    monkeypatch.undo()
+    assert swept(plan, out, resume=True).stopped is None
+    assert len(rows(out)) == 4
+
+
+def test_a_sweep_is_not_mixed_with_another(tmp_path: Path) -> None:
+    plan, out = planned(tmp_path, LEANING), tmp_path / "out"
+    swept(plan, out)
+    with pytest.raises(ScenarioError, match="holds a sweep already"):
+        swept(plan, out)
+    other = planned(tmp_path, LEANING.replace("0.3", "0.4"))
+    with pytest.raises(ScenarioError, match="is of another sweep"):
+        swept(other, out, resume=True)
+    with pytest.raises(ScenarioError, match="no sweep to resume"):
+        swept(plan, tmp_path / "nothing", resume=True)
+    manifest = json.loads((out / MANIFEST).read_text())
+    manifest["libraries"]["numpy"] = "1.0"
+    (out / MANIFEST).write_text(json.dumps(manifest))
+    with pytest.raises(ScenarioError, match=r"begun with numpy 1\.0"):
+        swept(plan, out, resume=True)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"libraries": 3}', "\x00"])
+def test_a_damaged_manifest_is_said(tmp_path: Path, text: str) -> None:
+    plan = planned(tmp_path, LEANING)
+    (tmp_path / MANIFEST).write_text(text)
+    with pytest.raises(ScenarioError, match="is not of a sweep"):
+        swept(plan, tmp_path, resume=True)
+
+
+def test_parameters_keep_their_types_and_tables_become_json(tmp_path: Path) -> None:
+    text = 'scenario = "q2"\ngrid.simulation.duration = [1, 0.5]\ngrid.motion.family = [2]\ngrid.title = ["x"]\n'
+    text += "grid.motion.near = [{ lean = 0.74, steer = 2.84 }]"
+    plan = planned(tmp_path, text)
+    schema = columns.schema(plan.tasks)
+    assert schema.field("simulation.duration").type == pa.float64()
+    assert schema.field("motion.family").type == pa.int64()
+    row = columns.record(plan.tasks[0], {}, schema)
+    assert row["motion.near"] == '{"lean": 0.74, "steer": 2.84}'
+    assert row["title"] == "x"
+
+
+def test_the_summary_counts_and_measures(tmp_path: Path) -> None:
+    text = 'engines = ["reference", "mujoco-multipliers"]\n' + LEANING + '"engines.mujoco-multipliers.step" = [0.01]'
+    plan = planned(tmp_path, text)
+    document = summary(plan, swept(plan, tmp_path / "out"))
+    json.dumps(document, allow_nan=False)
+    entry = document["engines"]["mujoco-multipliers"]
+    errors = [row["position_error_max"] for row in rows(tmp_path / "out", "mujoco-multipliers")]
+    assert entry["rows"] == {"done": 4}
+    assert entry["position_error"]["worst"] == max(errors)
+    assert document["engines"]["reference"]["position_error"] is None
+
+
+def test_a_sweep_of_one_run_needs_no_grid(tmp_path: Path) -> None:
+    plan = planned(tmp_path, 'scenario = "iftomm-1"')
+    swept(plan, tmp_path / "out")
+    assert len(rows(tmp_path / "out")) == 1
