@@ -299,8 +299,8 @@ def _field_reason(name: str, entry: Mapping[str, Any]) -> str | None:
         else f"by up to {entry['max']:.3g} {entry['unit']}".removesuffix(" 1")
     )
     return (
-        f"{what}: apart by more than round-off from {entry['exceeds_at']:.4g} s on, {far}, "
-        f"where {entry['allowed']:.2g} is allowed"
+        f"{what}: apart by more than round-off from {entry['exceeds_at']:.4g} s on, where {entry['allowed_first']:.2g} "
+        f"is allowed, {far}"
     )
 
 

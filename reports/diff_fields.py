@@ -52,8 +52,8 @@ def field_differences(
     dict
         JSON values by field. One that both rides have: the ``column`` that is furthest beyond its limit or nearest to
         it, its ``unit``, its largest difference ``max`` (None where only one has a number) at ``max_at``, what is
-        ``allowed`` there, from when on any column ``exceeds_at`` [s], and how many ``columns_beyond`` do. One that a
-        single ride has: ``only_in``, either "before" or "after". One that none has is missing.
+        ``allowed`` there, from when on it ``exceeds_at`` [s] what is ``allowed_first``, and how many ``columns_beyond``
+        do. One that a single ride has: ``only_in``, either "before" or "after". One that none has is missing.
     """
     samples = min(len(ride.time) for ride in rides)
     before, after = (ride.first(samples) for ride in rides)
@@ -131,13 +131,15 @@ def _worst(names: list[tuple[str, str]], time: np.ndarray, apart: np.ndarray, al
         share = np.where(apart > 0, apart / allowed, 0.0)
     column = int(share.max(axis=0).argmax())
     sample = int(apart[:, column].argmax())
-    most, begin = apart[sample, column], np.flatnonzero(beyond.any(axis=1))
+    most, begin = apart[sample, column], np.flatnonzero(beyond[:, column])
+    first = int(begin[0]) if len(begin) else sample
     return {
         "column": names[column][0],
         "unit": names[column][1],
         "max": float(most) if np.isfinite(most) else None,
         "max_at": float(time[sample]),
         "allowed": float(allowed[sample, column]),
-        "exceeds_at": float(time[begin[0]]) if len(begin) else None,
+        "exceeds_at": float(time[first]) if len(begin) else None,
+        "allowed_first": float(allowed[first, column]),
         "columns_beyond": int(beyond.any(axis=0).sum()),
     }
