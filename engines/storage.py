@@ -20,11 +20,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from reference.bicycle import BODIES
 from reference.kinematics import COORDINATES, WHEELS
 
+from .admission import REQUIRED, SHAPES
 from .engine import Trajectory
 from .files import whole
 
 METADATA_KEY, DIGEST_KEY = b"velodrome", b"velodrome-sha256"
-REQUIRED = ("time", "q", "qd", "body_position", "body_quaternion")
 
 
 class _Facts(BaseModel):
@@ -66,14 +66,6 @@ def columns() -> Iterator[tuple[str, list[tuple[str, str]]]]:
     yield "body_quaternion", [(f"{b}_q{a}", "1") for b in BODIES for a in "wxyz"]
 
 
-SHAPES = {
-    "contact_point": (2, 3),
-    "contact_force": (2, 3),
-    "slip": (2, 2),
-    "body_position": (4, 3),
-    "body_quaternion": (4, 4),
-}
-VECTORS = ("time", "kinetic_energy", "potential_energy")
 _LONGEST_REASON = 300  # letters of what a reader of damaged files says
 
 
@@ -188,4 +180,4 @@ def _field(table: pa.Table, name: str, names: list[tuple[str, str]], path: Path)
                 f"{path} is not a trajectory: its column {column} {what}; it must be double, without holes"
             )
     flat = np.column_stack([table.column(column).to_numpy() for column, _ in names])
-    return flat[:, 0] if name in VECTORS else flat.reshape(-1, *SHAPES.get(name, (len(names),)))
+    return flat.reshape(-1, *SHAPES[name])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import threading
 from collections.abc import Callable, Mapping
@@ -109,7 +110,8 @@ def configure(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
         raise ScenarioError(" ".join(str(error).split())) from error
     try:
         refuse_unknown(values, engine.settings.model_fields)
-        return engine, engine.settings.model_validate(dict(values), strict=True)
+        # As JSON: strictness would refuse a TOML array where a setting is a tuple.
+        return engine, engine.settings.model_validate_json(json.dumps(dict(values), default=str), strict=True)
     except ValidationError as error:
         raise ScenarioError(f"engines.{name}.{one_line(error)}") from error
     except ValueError as error:

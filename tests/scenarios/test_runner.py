@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import date
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from engines.engine import REFERENCE, EngineError, Trajectory
 from engines.storage import read_trajectory
 from scenarios.error import ScenarioError
 from scenarios.run_folder import LIBRARIES, Plan
-from scenarios.runner import Outcome, plan_run, run
+from scenarios.runner import Outcome, configure, plan_run, run
 from scenarios.scenario import load_scenario
 
 NATIVE = "mujoco-native"
@@ -256,3 +257,11 @@ def test_only_wanted_engines_run_beside_the_reference() -> None:
     assert list(plan(engine=REFERENCE).engines) == [REFERENCE]
     with pytest.raises(ScenarioError, match="'warp' is not installed"):
         plan(engine="warp")
+
+
+def test_arrays_and_dates_of_a_scenario_file_reach_an_engines_settings() -> None:
+    impedance = [0.9, 0.95, 0.001, 0.5, 2.0]
+    settings: Any = configure(NATIVE, {"impedance": impedance})[1]
+    assert settings.impedance == tuple(impedance)
+    with pytest.raises(ScenarioError, match=r"engines\.mujoco-native\.step: .*2024-01-01"):
+        configure(NATIVE, {"step": date(2024, 1, 1)})
