@@ -171,8 +171,13 @@ def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tupl
     """
     if source in library_names():
         name, text = source, (LIBRARY / f"{source}.toml").read_text(encoding="utf-8")
+    elif Path(source).suffix != ".toml":
+        raise ScenarioError(
+            f"no scenario {shown(repr(source))} in the library; there are {', '.join(library_names())}, "
+            "or give a path to a .toml file"
+        )
     else:
-        name, text = _read(source)
+        name, text = read_file(source)
     try:
         data = read_toml(text)
     except ValueError as error:
@@ -190,14 +195,15 @@ def validate(data: Mapping[str, Any], source: str) -> Scenario:
         raise ScenarioError(f"{shown(source)}: {one_line(error)}") from error
 
 
-def _read(source: str) -> tuple[str, str]:
-    """Stem and text of a scenario file."""
+def read_file(source: str) -> tuple[str, str]:
+    """Stem and text of a file that says what to run.
+
+    Raises
+    ------
+    ScenarioError
+        If it cannot be read.
+    """
     path = Path(source)
-    if path.suffix != ".toml":
-        raise ScenarioError(
-            f"no scenario {shown(repr(source))} in the library; there are {', '.join(library_names())}, "
-            "or give a path to a .toml file"
-        )
     # Folders and files of what is run bear the stem.
     if not path.stem.isprintable():
         raise ScenarioError(f"{shown(source)}: cannot be read: a scenario's file name must be printable text")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -11,8 +10,8 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from engines.engine import REFERENCE
 from scenarios.error import ScenarioError
-from scenarios.scenario import Scenario, load_scenario, validate
-from scenarios.table import Table, one_line
+from scenarios.scenario import Scenario, load_scenario, read_file, validate
+from scenarios.table import Table, one_line, read_toml, shown
 
 _Range = Annotated[tuple[float, float], Field(strict=False)]  # TOML has arrays only
 _Values = Annotated[tuple[Any, ...], Field(strict=False, min_length=1)]
@@ -109,13 +108,11 @@ def read_sweep(path: Path) -> tuple[SweepFile, dict[str, Any]]:
     ScenarioError
         With one line.
     """
+    _, text = read_file(str(path))
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
-        raise ScenarioError(f"{path}: cannot be read: {reason}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(f"{path}: not valid TOML: {error}") from error
+        data = read_toml(text)
+    except ValueError as error:
+        raise ScenarioError(f"{shown(str(path))}: not valid TOML: {shown(str(error))}") from error
     try:
         sweep = SweepFile.model_validate(data)
     except ValidationError as error:

@@ -88,7 +88,8 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_two_sweeps_do_not_write_to_one_folder(tmp_path: Path) -> None:
-    path, out = written(tmp_path, MANY), tmp_path / "out"
+    # Long rides: the first must be at work when the second has started.
+    path, out = written(tmp_path, MANY.replace("duration = [0.5]", "duration = [200.0]")), tmp_path / "out"
     process = started(path, out, resume=False)
     reached(out, 1, process)
     second = started(path, out, resume=True)
