@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache, partial
 from itertools import islice
 
 import numpy as np
@@ -215,6 +215,12 @@ def _end_exactly(equations: Steady, points: list[Point]) -> list[Point]:
     return points
 
 
+@lru_cache(maxsize=8)
+def _all_curves(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Sequence[Family]:
+    """All curves; motions of many rates on one ground are looked for on them."""
+    return trace_all(bicycle, surface)[0]
+
+
 def motions(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float) -> list[CircularMotion]:
     """All motions of a family at a rear-wheel rate, nearest to the family's anchor first.
 
@@ -237,7 +243,7 @@ def motions(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_ra
     ValueError
         If the family has no curve on this surface.
     """
-    return list(_met(bicycle, surface, family, rear_rate, lambda: trace_all(bicycle, surface)[0]))
+    return list(_met(bicycle, surface, family, rear_rate, lambda: _all_curves(bicycle, surface)))
 
 
 def _met(
@@ -318,7 +324,7 @@ def find_motion(
     if near is not None and not np.all(np.isfinite(near)):
         raise ValueError(f"near is {near!r}; it must be two finite angles, lean and steer in rad")
     found, failures = [], []
-    everything = cache(lambda: trace_all(bicycle, surface)[0])
+    everything = partial(_all_curves, bicycle, surface)
     for number in FAMILIES if family is None else (family,):
         try:
             met = _met(bicycle, surface, number, rear_rate, everything)
