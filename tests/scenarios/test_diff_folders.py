@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import shutil
 import tomllib
 from pathlib import Path
@@ -97,12 +98,13 @@ def test_document_page_and_recording_are_written(folder: Path, halved: Path, tmp
     assert json.loads(paths[0].read_text()) == found
     assert f"## {NATIVE}: differs" in paths[1].read_text()
     entities = {chunk.entity_path for chunk in RrdReader(str(paths[2])).stream()}
-    roots = {entity.split("/")[2] for entity in entities if entity.startswith("/world/")}
-    # The folders' names, with every sign that a path gives a meaning of its own escaped.
-    names = {f"{NATIVE} @ {path.name}".replace(" ", "\\ ").replace("@", "\\@") for path in (folder, halved)}
+    roots = {re.split(r"(?<!\\)/", entity)[2] for entity in entities if entity.startswith("/world/")}
+    # The runs' names, with every sign that a path gives a meaning of its own escaped. Folders that were made in the
+    # same second have their parents' names too.
+    names = [f"{NATIVE}\\ \\@\\ {run.name}".replace("/", "\\/") for run in (pair.before, pair.after)]
     assert roots == {"reference", "ground", *names}
     assert [entity for entity in entities if entity.startswith("/plots/log_position_change/")] == [
-        f"/plots/log_position_change/tested/{NATIVE}\\ \\@\\ {halved.name}"
+        f"/plots/log_position_change/tested/{names[1]}"
     ]
 
 
