@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from engines.engine import REFERENCE, Trajectory, engine_names, load_engine
+from engines.engine import REFERENCE, Trajectory, load_engine
 from reference.kinematics import REAR_ANGLE
 from reference.surface import SurfaceOfRevolution
 from reports.diff import DIFFERS, Ground, StoredRun, diff_document, diff_markdown
@@ -22,6 +22,7 @@ from reports.palette import colours
 
 from .error import ScenarioError
 from .files import make_folder, write_json, write_text
+from .installed import installed
 from .scenario import CircularTable, Scenario, load_scenario
 from .start import make_start
 from .stored import document, part, ride
@@ -166,7 +167,7 @@ def diff(pair: Pair) -> dict[str, Any]:
 
 def _step_noise(name: str, settings: Mapping[str, Any]) -> float | None:
     """Relative error that a step of an engine may add; None where the engine here does not know such settings."""
-    if name not in engine_names():
+    if name not in installed():
         return None
     engine = load_engine(name)
     try:

@@ -10,12 +10,13 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 import reports
-from engines.engine import Engine, Settings, UnsuitableProblem, engine_names
+from engines.engine import Engine, Settings, UnsuitableProblem
 from reports.drift import Verdict, judge, missing
 
 from .error import ScenarioError
 from .files import make_folder, write_json
 from .gate_sample import SHORT_HORIZON, sample
+from .installed import installed
 from .run_folder import library_versions
 from .runner import Watch, configure
 from .scenario import Scenario, library_names, load_scenario
@@ -96,44 +97,14 @@ def check(
     """
     folder = BASELINES if baselines is None else baselines
     changes = {"simulation.duration": DURATION, "simulation.output_rate": OUTPUT_RATE}
-    plans = [load_scenario(source, changes) for source in (sources or gated_names())]
-    known = {name: read_baseline(name, folder, content(scenario)) for name, scenario in plans}
-    # Engines of a baseline count too: one that is gone did not run.
-    names = [*engine_names(), *sorted({name for entries in known.values() for name in entries} - set(engine_names()))]
-    for engine in engines or []:
-        if engine not in names:
-            raise ScenarioError(f"engine {engine!r} is not installed; there are {', '.join(engine_names())}")
-    today = datetime.now(UTC).date().isoformat()
+    scenarios = [load_scenario(source, changes) for source in (sources or gated_names())]
+    known = {name: read_baseline(name, folder, content(scenario)) for name, scenario in scenarios}
+    judged = _to_judge(engines, known)
     verdicts: list[tuple[str, Verdict]] = []
     fresh: dict[str, dict[str, Any]] = {}
-    for name, scenario in plans:
-        start = make_start(scenario)
-        if start.motion is None:
-            raise ScenarioError(f"{name}: only a circular motion can be gated: its exact solution is known")
-        baseline = known[name]
-        entries: dict[str, Any] = {}
-        for engine_name in [name for name in names if not engines or name in engines]:
-            entry = baseline.get(engine_name)
-            try:
-                engine, settings = chosen(engine_name, scenario.engines.get(engine_name, {}))
-                known_noise = (entry or {}).get("step_noise")
-                found = sample(start, engine, settings, lambda t, e=engine_name: watch(e, t, DURATION), known_noise)
-            except Exception as error:  # an engine that breaks in any way did not run
-                if entry is None and not engines and isinstance(error, UnsuitableProblem):
-                    continue  # it never could, and nobody asked for it
-                verdicts.append((name, missing(engine_name, f"did not run: {' '.join(str(error).split())}")))
-                continue
-            entries[engine_name] = {
-                "created": today,
-                "version": found.version,
-                "settings": found.settings,
-                "steps": found.steps,
-                "step_noise": found.step_noise,
-                "quantities": found.values,
-            }
-            run = (found.settings, found.version, found.reasons)
-            judged = judge(engine_name, found.values, entry, found.limits, *run)
-            verdicts += [(name, verdict) for verdict in judged]
+    for name, scenario in scenarios:
+        found, entries = _held(name, scenario, judged, known[name], watch, chosen, asked=bool(engines))
+        verdicts += [(name, verdict) for verdict in found]
         fresh[name] = {
             "scenario": name,
             "duration": DURATION,
@@ -145,6 +116,58 @@ def check(
     if not verdicts:
         raise ScenarioError("nothing was judged: no engine and no scenario go together")
     return verdicts, fresh
+
+
+def _to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Names of the engines to judge; those of a baseline count too: one that is gone did not run."""
+    there = installed()
+    names = [*there, *sorted({name for entries in known.values() for name in entries} - set(there))]
+    for engine in wanted or []:
+        if engine not in names:
+            raise ScenarioError(f"engine {engine!r} is not installed; there are {', '.join(there)}")
+    return [name for name in names if not wanted or name in wanted]
+
+
+def _held(
+    name: str,
+    scenario: Scenario,
+    engines: Sequence[str],
+    baseline: Mapping[str, Any],
+    watch: Watch,
+    chosen: Chosen,
+    asked: bool,
+) -> tuple[list[Verdict], dict[str, Any]]:
+    """Verdicts on the engines on one scenario, and their entries of a new baseline.
+
+    An engine that the motion does not suit is passed over, unless it was ``asked`` for or has a baseline.
+    """
+    start = make_start(scenario)
+    if start.motion is None:
+        raise ScenarioError(f"{name}: only a circular motion can be gated: its exact solution is known")
+    verdicts: list[Verdict] = []
+    entries: dict[str, Any] = {}
+    for engine_name in engines:
+        entry = baseline.get(engine_name)
+        try:
+            engine, settings = chosen(engine_name, scenario.engines.get(engine_name, {}))
+            known_noise = (entry or {}).get("step_noise")
+            found = sample(start, engine, settings, lambda t, e=engine_name: watch(e, t, DURATION), known_noise)
+        except Exception as error:  # an engine that breaks in any way did not run
+            if entry is None and not asked and isinstance(error, UnsuitableProblem):
+                continue
+            verdicts.append(missing(engine_name, f"did not run: {' '.join(str(error).split())}"))
+            continue
+        entries[engine_name] = {
+            "created": datetime.now(UTC).date().isoformat(),
+            "version": found.version,
+            "settings": found.settings,
+            "steps": found.steps,
+            "step_noise": found.step_noise,
+            "quantities": found.values,
+        }
+        run = (found.settings, found.version, found.reasons)
+        verdicts += judge(engine_name, found.values, entry, found.limits, *run)
+    return verdicts, entries
 
 
 def content(scenario: Scenario) -> dict[str, Any]:
@@ -222,7 +245,7 @@ def update(
     paths = []
     for name, baseline in fresh.items():
         moved = [verdict for scenario, verdict in verdicts if scenario == name and verdict.status != "holds"]
-        kept = {engine: entry for engine, entry in read_baseline(name, folder).items() if engine in engine_names()}
+        kept = {engine: entry for engine, entry in read_baseline(name, folder).items() if engine in installed()}
         words = reason or "; ".join(f"{v.engine}: {v.quantity}: {v.status}" for v in moved) or "nothing moved"
         paths.append(folder / f"{name}.json")
         write_json(paths[-1], {**baseline, "reason": words, "engines": kept | baseline["engines"]})

@@ -110,7 +110,9 @@ def sample(
     if standing.not_finite():
         raise EngineError(f"not finite in some samples: {', '.join(standing.not_finite())}")
     scale = replace(_scale(start), duration=float(standing.time[-1]))
-    values = _ride_values(start, trajectory, standing, scale)
+    # As many steps as the part that is measured took.
+    steps = trajectory.steps * scale.duration / float(trajectory.time[-1])
+    values = _ride_values(start, standing, scale) | {"fell_at": fall, "steps": steps}
     limits: dict[str, float | None] = dict(
         ride_limits(scale, noise(scale, step_noise, trajectory.steps, fall is not None))
     )
@@ -126,25 +128,20 @@ def sample(
     return Sample(values, limits, reasons, trajectory.steps, own_noise, engine.version, shown)
 
 
-def _ride_values(start: Start, trajectory: Trajectory, standing: Trajectory, scale: Scale) -> dict[str, float | None]:
-    """Quantities of a ride, of the part of it that is ``standing``."""
+def _ride_values(start: Start, standing: Trajectory, scale: Scale) -> dict[str, float | None]:
+    """Quantities of the part of a ride that is standing, with gaps and slip as they follow from its coordinates."""
     problem, motion = start.problem, start.motion
     assert motion is not None
     exact = steady_trajectory(problem.bicycle, motion, problem.times)
-    measured = measure_one(start, trajectory, exact)
-    errors = position_errors(standing, exact)
     seen = observe(problem.bicycle, problem.surface, standing.q, standing.qd)
-    slip = np.linalg.norm(seen.slip, axis=2)
+    gap, slip = (seen.gap, seen.slip) if seen.found else (None, None)
+    measured = measure_one(start, replace(standing, gap=gap, slip=slip), exact)
+    errors = position_errors(standing, exact)
     found = measured | {
         "short_error": float(errors[min(int(np.searchsorted(problem.times, SHORT_HORIZON)), len(errors) - 1)]),
-        "position_error": float(errors.max()),
+        "position_error": measured["position_error"]["max"],
         "state_error": state_error(standing, exact, scale),
-        "max_gap": float(np.abs(seen.gap).max()) if seen.found else None,
-        "max_slip": float(slip.max()) if seen.found else None,
-        "mean_slip": float(slip.mean()) if seen.found else None,
         "report_mismatch": report_mismatch(standing, seen, problem.bicycle, scale) if seen.found else None,
-        # As many as the part that is measured took.
-        "steps": trajectory.steps * scale.duration / float(trajectory.time[-1]),
     }
     return {name: found[name] for name in RIDE_QUANTITIES}
 

@@ -12,7 +12,6 @@ from typing import Any
 
 from engines.engine import Engine, Settings, Trajectory, packages
 from reference.surface import SurfaceOfRevolution
-from reports.fall import as_shown
 from reports.summary import summary
 
 from .error import ScenarioError
@@ -127,19 +126,18 @@ def library_versions() -> dict[str, str]:
 def record(
     folder: Path,
     plan: Plan,
-    trajectories: Mapping[str, Trajectory],
+    shown: Mapping[str, Trajectory],
     measured: Mapping[str, Mapping[str, Any]],
     failures: Mapping[str, str],
     verdicts: Sequence[Mapping[str, Any]],
 ) -> None:
-    """Write the recording, where there is anything to record."""
-    if not trajectories:
+    """Write the recording of the rides as they are to be shown, where there are any."""
+    if not shown:
         return
     # rerun takes a second to load; only a run needs it.
     from reports.recording import write_recording
 
     problem = plan.start.problem
-    shown = {name: as_shown(run, problem.bicycle, problem.surface) for name, run in trajectories.items()}
     steady = isinstance(problem.surface, SurfaceOfRevolution)
     facts = (plan.start.growth_rate, plan.scenario.simulation.duration, steady)
     text = summary(plan.scenario.title, measured, failures, verdicts, *facts)
@@ -151,14 +149,13 @@ def record(
 def write_page(
     folder: Path,
     plan: Plan,
-    trajectories: Mapping[str, Trajectory],
+    shown: Mapping[str, Trajectory],
     measured: Mapping[str, Mapping[str, Any]],
     manifest: Mapping[str, Any],
 ) -> None:
-    """Write the report page; see `reports.page`."""
+    """Write the report page of the rides as they are to be shown; see `reports.page`."""
     from reports.page import page
 
-    problem = plan.start.problem
-    shown = {name: as_shown(run, problem.bicycle, problem.surface) for name, run in trajectories.items()}
-    text = page(manifest, plan.scenario.model_dump(), measured, manifest["verdicts"], shown, problem.surface)
+    surface = plan.start.problem.surface
+    text = page(manifest, plan.scenario.model_dump(), measured, manifest["verdicts"], shown, surface)
     write_text(folder / "report.html", text)

@@ -22,14 +22,15 @@ from engines.engine import (
     Settings,
     Trajectory,
     UnsuitableProblem,
-    engine_names,
     load_engine,
 )
 from engines.storage import write_trajectory
+from reports.fall import as_shown
 from reports.metrics import metrics
 
 from .error import ScenarioError
 from .files import write_json, write_text
+from .installed import installed
 from .run_folder import Plan, new_folder, record, write_manifest, write_page
 from .scenario import Scenario
 from .start import Start, make_start
@@ -77,11 +78,11 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
     ScenarioError
         If an engine is not installed, a setting is wrong, or the motion does not exist.
     """
-    installed = engine_names()
+    there = installed()
     for engine in [*(wanted or []), *scenario.engines]:
-        if engine not in installed:
-            raise ScenarioError(f"engine {engine!r} is not installed; there are {', '.join(installed)}")
-    names = [engine for engine in installed if engine == REFERENCE or not wanted or engine in wanted]
+        if engine not in there:
+            raise ScenarioError(f"engine {engine!r} is not installed; there are {', '.join(there)}")
+    names = [engine for engine in there if engine == REFERENCE or not wanted or engine in wanted]
     chosen = {engine: configure(engine, scenario.engines.get(engine, {})) for engine in names}
     start = make_start(scenario)
     left_out: dict[str, str] = {}
@@ -150,7 +151,7 @@ def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None]) -> Out
             try:
                 trajectory = ride(engine, problem, settings, lambda t, name=name: watch(name, t, duration))
             except Exception as error:  # whatever an engine raises must not cost the others' results
-                failures[name] = _reason(error)
+                failures[name] = why_failed(error)
                 note(f"{name}: {failures[name]}")
             else:
                 write_trajectory(trajectory, folder / f"{name}.parquet")
@@ -163,13 +164,14 @@ def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None]) -> Out
         measured = measure(plan, trajectories)
         verdicts = judge(plan, measured)
         write_json(folder / "metrics.json", measured)
-        record(folder, plan, trajectories, measured, failures, verdicts)
+        shown = {name: as_shown(one, problem.bicycle, problem.surface) for name, one in trajectories.items()}
+        record(folder, plan, shown, measured, failures, verdicts)
         found = write_manifest(folder, plan, trajectories, failures, verdicts, complete=not interrupted)
-        write_page(folder, plan, trajectories, measured, found)
+        write_page(folder, plan, shown, measured, found)
     return Outcome(folder, measured, failures, verdicts, interrupted)
 
 
-def _reason(error: Exception) -> str:
+def why_failed(error: Exception) -> str:
     """One line on why an engine failed; its own words where it chose them."""
     words = str(error) if isinstance(error, EngineError) else f"{type(error).__name__}: {error}"
     return " ".join(words.split())

@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 
 from ..error import ScenarioError
-from .installed import installed
 from .options import Json, print_json
 
 
@@ -38,6 +37,7 @@ def check_command(
 
     from .. import gate, present
     from ..files import write_text
+    from ..installed import installed
 
     if reason is not None and not update:
         raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
@@ -45,7 +45,6 @@ def check_command(
     for option, path in (("--junit", junit), ("--markdown", markdown)):
         if path is not None:
             _check_path(option, path)
-    engines = installed()
     console = Console(stderr=as_json)
     with present.Progress() as progress:
         verdicts, fresh = gate.check(progress.watch, scenario, engine, baselines)
@@ -58,7 +57,7 @@ def check_command(
         absent = [
             verdict
             for _, verdict in verdicts
-            if verdict.engine in engines and verdict.quantity == "run" and verdict.reason.startswith("did not")
+            if verdict.engine in installed() and verdict.quantity == "run" and verdict.reason.startswith("did not")
         ]
         if absent:
             raise ScenarioError(f"no baseline written: {absent[0].engine} {absent[0].reason}")

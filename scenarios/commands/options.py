@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -78,6 +80,14 @@ def ground_of(alpha: float | None, surface: str | None) -> Surface | float:
     from ..surfaces import parse_surface
 
     return parse_surface(surface)
+
+
+def show_written(paths: Iterable[Path]) -> None:
+    """Say which files were written, a line each."""
+    from rich.console import Console
+
+    for path in paths:
+        Console().print(f"written: {path}", markup=False, highlight=False, soft_wrap=True)
 
 
 def print_json(data: Any) -> None:

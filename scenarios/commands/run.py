@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..error import ScenarioError
-from .installed import installed
 from .options import STARTING, Changes, Duration, Json, changed, print_json
 
 if TYPE_CHECKING:
@@ -23,6 +22,7 @@ def list_command(as_json: Json = False) -> None:
 
     from engines.engine import load_engine
 
+    from ..installed import installed
     from ..scenario import library_names, load_scenario
 
     scenarios = []
@@ -68,13 +68,14 @@ def run_command(
     from rich.console import Console
 
     from .. import present
+    from ..installed import installed
     from ..runner import run
 
     sources = [*(scenario or []), *(_tagged(tag) if tag is not None else [])]
     if not sources:
         raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
     changes = changed(change, duration)
-    installed()  # whether each has a name of its own
+    installed()  # an engine that two packages announce is no scenario's fault
     with present.working(STARTING):
         plans = [_plan(source, changes, engine) for source in dict.fromkeys(sources)]
     console = Console(stderr=as_json)

@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 
 from ..error import ScenarioError
-from .installed import installed
-from .options import Json, print_json
+from .options import Json, print_json, show_written
 
 
 def diff_command(
@@ -26,9 +25,10 @@ def diff_command(
     from rich.console import Console
 
     from ..diff import diff, read_pair, write_diff
+    from ..installed import installed
     from ..present_diff import show_diff
 
-    installed()  # whether each has a name of its own
+    installed()  # an engine that two packages announce is no fault of either run
     pair = read_pair(before, after, engine)
     found = diff(pair)
     written = [] if out is None else write_diff(pair, found, out)
@@ -36,8 +36,7 @@ def diff_command(
         print_json(found)
     else:
         show_diff(Console(), found)
-        for path in written:
-            Console().print(f"written: {path}", markup=False, highlight=False, soft_wrap=True)
+        show_written(written)
     if not found["same"]:
         raise typer.Exit(1)
 

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .installed import installed
-from .options import Changes, Duration, Json, changed, print_json
+from .options import Changes, Duration, Json, changed, print_json, show_written
 
 
 def paper_command(
@@ -36,8 +35,7 @@ def paper_command(
         print_json(found)
     else:
         show_ledger(Console(), lines)
-        for path in written:
-            Console().print(f"written: {path}", markup=False, highlight=False, soft_wrap=True)
+        show_written(written)
     if not found["holds"]:
         raise typer.Exit(1)
 
@@ -70,7 +68,6 @@ def precision_command(
 
     changes = changed(change, duration)
     name, loaded = load_scenario(scenario, changes)
-    installed()  # whether each has a name of its own
     if out is not None:
         make_folder(out)  # before the work
     with present.Progress() as progress:
@@ -80,5 +77,4 @@ def precision_command(
         print_json(document)
         return
     present.show_precision(Console(), document)
-    for path in written:
-        Console().print(f"written: {path}", markup=False, highlight=False, soft_wrap=True)
+    show_written(written)

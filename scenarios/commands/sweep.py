@@ -26,9 +26,7 @@ def sweep_command(
 ) -> None:
     """Many runs over a grid, a list or a Latin hypercube, on local processes or a Dask cluster."""
     from ..sweep.command import sweep
-    from .installed import installed
 
-    installed()
     status = sweep(file, scheduler, workers, out, resume, as_json)
     if status:
         raise typer.Exit(status)

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from engines.engine import REFERENCE, UnsuitableProblem, engine_names, load_engine
+from engines.engine import REFERENCE, UnsuitableProblem, load_engine
 from scenarios.error import ScenarioError
+from scenarios.installed import installed
 from scenarios.run_folder import library_versions
 from scenarios.runner import configure
 from scenarios.scenario import Scenario, validate
@@ -90,10 +91,10 @@ def plan_sweep(path: Path) -> Plan:
         With one line.
     """
     sweep, base = read_sweep(path)
-    installed = engine_names()
+    names = installed()
     for engine in sweep.engines:
-        if engine not in installed:
-            raise ScenarioError(f"{path}: engine {engine!r} is not installed; there are {', '.join(installed)}")
+        if engine not in names:
+            raise ScenarioError(f"{path}: engine {engine!r} is not installed; there are {', '.join(names)}")
     if count(sweep) * len(sweep.engines) > MOST:
         raise ScenarioError(f"{path}: {count(sweep) * len(sweep.engines)} runs; at most {MOST} fit one sweep")
     checker = _Checker(path)

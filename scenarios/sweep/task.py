@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from engines.admission import ride
-from engines.engine import REFERENCE, Engine, EngineError, Settings, Trajectory
+from engines.engine import REFERENCE, Engine, Settings, Trajectory
 from scenarios.error import ScenarioError
-from scenarios.runner import configure, measure_one
+from scenarios.runner import configure, measure_one, why_failed
 from scenarios.scenario import Scenario, validate
 from scenarios.start import Start, make_start
 
@@ -112,7 +112,7 @@ class Tasks:
             except MemoryError:
                 raise
             except Exception as error:
-                found = _reason(error)
+                found = one_line(why_failed(error))
             self._references = {text: found}
         return self._references[text]
 
@@ -151,12 +151,7 @@ def _broken(error: Exception) -> dict[str, Any]:
     """A failed run; C++ and the system say in their own ways that there is no memory."""
     if "bad_alloc" in str(error) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
         return {"status": "memory", "reason": "more memory than the sweep's memory_limit, or than there is"}
-    return {"status": "failed", "reason": _reason(error)}
-
-
-def _reason(error: Exception) -> str:
-    """One line on why an engine failed; its own words where it chose them."""
-    return one_line(str(error) if isinstance(error, EngineError) else f"{type(error).__name__}: {error}")
+    return {"status": "failed", "reason": one_line(why_failed(error))}
 
 
 def one_line(text: str) -> str:

@@ -101,10 +101,10 @@ def test_a_clean_repeat_passes_in_every_quantity(scenario: str, name: str) -> No
 def test_an_engine_that_no_gated_motion_suits_fails_only_if_it_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     ((_, verdict),) = gate.check(lambda *_: None, ["q2"], ["exudyn-builtin"])[0]
     assert (verdict.status, "rolls on the level plane only" in verdict.reason) == ("missing", True)
-    monkeypatch.setattr(gate, "engine_names", lambda: ["reference", "exudyn-builtin"])
+    monkeypatch.setattr(gate, "installed", lambda: ["reference", "exudyn-builtin"])
     monkeypatch.setattr(gate, "read_baseline", lambda *_: {})
     assert {verdict.engine for _, verdict in gate.check(lambda *_: None, ["q2"])[0]} == {"reference"}
-    monkeypatch.setattr(gate, "engine_names", lambda: ["exudyn-builtin"])
+    monkeypatch.setattr(gate, "installed", lambda: ["exudyn-builtin"])
     with pytest.raises(ScenarioError, match="nothing was judged"):
         gate.check(lambda *_: None, ["q2"])
 

@@ -1,8 +1,10 @@
-"""Installed engines, as a command needs them: their names, or one line that says why they have none."""
+"""Installed engines: their names, or one line that says why they have none."""
 
 from __future__ import annotations
 
-from ..error import ScenarioError
+from engines.engine import engine_names
+
+from .error import ScenarioError
 
 
 def installed() -> list[str]:
@@ -13,8 +15,6 @@ def installed() -> list[str]:
     ScenarioError
         If two packages announce an engine of one name.
     """
-    from engines.engine import engine_names
-
     try:
         return engine_names()
     except ValueError as error:
