@@ -20,7 +20,6 @@ from rich.console import Console
 from rich.table import Table
 
 from engines.engine import Problem
-from engines.files import whole
 from engines.mujoco.laws import CreepRow, EnergyRow, creep_study, energy_study
 from engines.mujoco.study import LADDER, DriftRow, Rate, Row, drift_study, plain_step_cost, settings_study
 from reference.bicycle import Bicycle
@@ -28,6 +27,7 @@ from reference.families import find_motion
 from reference.surface import Paraboloid, Plane, SurfaceOfRevolution
 from reports.creep_figure import creep_figure
 from reports.settings_advice import advice, markdown_table
+from scenarios.files import write_text
 
 # Time constants of the contacts over more than two decades [s].
 TIME_CONSTANTS = (0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02)
@@ -145,8 +145,7 @@ def write(folder: Path, document: dict[str, Any]) -> None:
     tables = [f"On {name}\n\n{markdown_table(rows)}" for name, rows in document["settings"].items()]
     texts = {"settings.json": json.dumps(document, indent=1), "settings.md": "\n".join(tables)}
     for name, text in texts.items():
-        with whole(folder / name) as partial:
-            partial.write_text(text, encoding="utf-8")
+        write_text(folder / name, text)
     for ending in (".png", ".svg"):
         creep_figure(folder / f"settings{ending}", document)
 

@@ -8,23 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .engine import Engine, EngineError, Problem, Progress, Settings, Trajectory
-
-# Shapes of what is sampled, but for the number of samples; the first five must be given.
-SHAPES: dict[str, tuple[int, ...]] = {
-    "time": (),
-    "q": (9,),
-    "qd": (9,),
-    "body_position": (4, 3),
-    "body_quaternion": (4, 4),
-    "contact_point": (2, 3),
-    "contact_force": (2, 3),
-    "gap": (2,),
-    "slip": (2, 2),
-    "kinetic_energy": (),
-    "potential_energy": (),
-}
-REQUIRED = tuple(SHAPES)[:5]
+from .engine import REQUIRED, SHAPES, Engine, EngineError, Problem, Progress, Settings, Trajectory
 
 
 def ride(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:

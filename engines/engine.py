@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from importlib.metadata import EntryPoint, entry_points
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points, version
 from typing import Any, Protocol, Self
 
 import numpy as np
@@ -43,6 +44,23 @@ class Problem:
     q: np.ndarray
     qd: np.ndarray
     times: np.ndarray
+
+
+# Shapes of what a trajectory samples, but for the number of samples; the first five must be given.
+SHAPES: dict[str, tuple[int, ...]] = {
+    "time": (),
+    "q": (9,),
+    "qd": (9,),
+    "body_position": (4, 3),
+    "body_quaternion": (4, 4),
+    "contact_point": (2, 3),
+    "contact_force": (2, 3),
+    "gap": (2,),
+    "slip": (2, 2),
+    "kinetic_energy": (),
+    "potential_energy": (),
+}
+REQUIRED = tuple(SHAPES)[:5]
 
 
 @dataclass(frozen=True)
@@ -104,16 +122,13 @@ class Trajectory:
 
     def first(self, samples: int) -> Self:
         """The ride up to a number of samples; steps and CPU time stay those of the whole."""
-        cut = {name: value[:samples] for name in _SAMPLED if (value := getattr(self, name)) is not None}
+        cut = {name: value[:samples] for name in SHAPES if (value := getattr(self, name)) is not None}
         return replace(self, **cut)
 
     def not_finite(self) -> list[str]:
         """Names of what is given and is not finite in some samples."""
-        given = ((name, getattr(self, name)) for name in _SAMPLED)
+        given = ((name, getattr(self, name)) for name in SHAPES)
         return [name for name, value in given if value is not None and not np.all(np.isfinite(value))]
-
-
-_SAMPLED = tuple(field.name for field in fields(Trajectory) if "ndarray" in str(field.type))
 
 
 class Settings(BaseModel):
@@ -231,7 +246,7 @@ def _announced() -> dict[str, EntryPoint]:
             continue
         other = found.setdefault(point.name, point)
         # One package may stand on the path twice, as with an editable install.
-        if _package(other) != _package(point):
+        if other is not point and _package(other) != _package(point):
             raise ValueError(
                 f"engine {point.name!r} is announced by two packages, {_package(other)} and {_package(point)}; "
                 "uninstall one of them"
@@ -278,6 +293,12 @@ def load_engine(name: str) -> Engine:
     if engine.name != name:
         raise ValueError(f"{where} calls itself {engine.name!r}; both names must be the same")
     return engine
+
+
+@cache
+def package_version(name: str) -> str:
+    """Version of an installed package; to look it up each time would take longer than a short ride."""
+    return version(name)
 
 
 def packages() -> dict[str, str]:

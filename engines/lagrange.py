@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import time
-from functools import cache
-from importlib.metadata import version
 from typing import Literal, Self
 
 from pydantic import Field
@@ -13,15 +11,9 @@ from reference.contact import observe
 from reference.kinematics import body_positions, quaternions, rotations
 from reference.simulate import simulate, simulate_modified_euler, steps_per_output
 
-from .engine import REFERENCE, EngineError, Problem, Progress, Settings, Trajectory
+from .engine import REFERENCE, EngineError, Problem, Progress, Settings, Trajectory, package_version
 
 ORDER = 8  # of dop853: a step's error goes with this power of it
-
-
-@cache
-def _version() -> str:
-    # Looked up in the packages' metadata it would take longer than a short ride.
-    return version("velodrome")
 
 
 class LagrangeSettings(Settings):
@@ -52,7 +44,7 @@ class LagrangeEngine:
     @property
     def version(self) -> str:
         """Version of this suite."""
-        return _version()
+        return package_version("velodrome")
 
     def check(self, problem: Problem, settings: LagrangeSettings) -> None:
         """Refuse output times that the fixed step does not meet; see `engines.engine.Engine`."""

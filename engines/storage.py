@@ -20,8 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from reference.bicycle import BODIES
 from reference.kinematics import COORDINATES, WHEELS
 
-from .admission import REQUIRED, SHAPES
-from .engine import Trajectory
+from .engine import REQUIRED, SHAPES, Trajectory
 from .files import whole
 
 METADATA_KEY, DIGEST_KEY = b"velodrome", b"velodrome-sha256"

@@ -312,10 +312,14 @@ def static_equilibria(equations: Steady) -> list[np.ndarray]:
     """
     found: list[np.ndarray] = []
     for steer in _STEERS:
+        try:
+            level = start_on_plane(equations.bicycle, 0.0, float(steer))
+        except ValueError:
+            continue
         for pitch in _PITCHES:
+            start = level.copy()
+            start[[PITCH, SIGMA]] = pitch, 0.0
             try:
-                start = start_on_plane(equations.bicycle, 0.0, float(steer))
-                start[[PITCH, SIGMA]] = pitch, 0.0
                 u, _ = newton(equations, start, unknown_condition(SIGMA, 0.0), most=25)
             except ValueError:
                 continue
@@ -326,7 +330,12 @@ def static_equilibria(equations: Steady) -> list[np.ndarray]:
 
 def _stands(equations: Steady, unknowns: np.ndarray) -> bool:
     """Whether a bicycle stands on its wheels, above the ground and steered to the left: one that is no root alone."""
-    if np.abs(unknowns[[LEAN, PITCH]]).max() > LARGEST_LEAN or not 0 < unknowns[STEER] < np.pi:
+    return bool(0 < unknowns[STEER] < np.pi) and above_ground(equations, unknowns)
+
+
+def above_ground(equations: Steady, unknowns: np.ndarray) -> bool:
+    """Whether a solution (22,) is of a bicycle above its ground that leans and pitches as one can."""
+    if np.abs(unknowns[[LEAN, PITCH]]).max() > LARGEST_LEAN:
         return False
     q = np.zeros((1, 9))
     q[0, :3], q[0, 4:7] = unknowns[:3], unknowns[3:6]

@@ -7,9 +7,9 @@ family that it was a part of.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from itertools import islice
 
 import numpy as np
@@ -243,17 +243,11 @@ def motions(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_ra
     ValueError
         If the family has no curve on this surface.
     """
-    return list(_met(bicycle, surface, family, rear_rate, lambda: _all_curves(bicycle, surface)))
+    return list(_met(bicycle, surface, family, rear_rate))
 
 
-def _met(
-    bicycle: Bicycle,
-    surface: SurfaceOfRevolution,
-    family: int,
-    rear_rate: float,
-    everything: Callable[[], Sequence[Family]],
-) -> Iterator[CircularMotion]:
-    """The motions as they are met; ``everything``, all curves, is asked for after those of the family's anchors."""
+def _met(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float) -> Iterator[CircularMotion]:
+    """The motions as they are met; all curves are followed only after those of the family's anchors."""
     found: list[CircularMotion] = []
     anchors, failures = [], []
     for anchor_rate in ANCHORS[family]:
@@ -266,7 +260,8 @@ def _met(
         for towards in start.directions:
             points = _to_an_end(follow(start.equations, start.unknowns, towards))
             yield from _new(found, start.equations, points, rear_rate)
-    others = [c for c in everything() if c.number == family and not any(_passes(c, start) for start in anchors)]
+    every = _all_curves(bicycle, surface)
+    others = [c for c in every if c.number == family and not any(_passes(c, start) for start in anchors)]
     for curve in others:
         yield from _new(found, curve.equations, curve.points, rear_rate)
     if not anchors and not others:
@@ -324,10 +319,9 @@ def find_motion(
     if near is not None and not np.all(np.isfinite(near)):
         raise ValueError(f"near is {near!r}; it must be two finite angles, lean and steer in rad")
     found, failures = [], []
-    everything = partial(_all_curves, bicycle, surface)
     for number in FAMILIES if family is None else (family,):
         try:
-            met = _met(bicycle, surface, number, rear_rate, everything)
+            met = _met(bicycle, surface, number, rear_rate)
             found += [(number, motion) for motion in (islice(met, 1) if near is None else met)]
         except ValueError as error:
             failures.append(f"family {number}: {error}")

@@ -13,7 +13,6 @@ from .kernels.spline import DEGREE, tensor, uniform_cell
 from .surface import SurfaceFunction, is_number, surface_function
 
 _FEWEST = DEGREE + 1
-_HEADER = 5
 
 
 @surface_function

@@ -28,7 +28,7 @@ from .diff_fields import field_differences
 from .fall import until_fall
 from .limits import Scale, noise, ride_limits
 from .markdown import escaped
-from .metrics import position_errors
+from .metrics import number, position_errors
 
 TO_THE_BIT, WITHIN_ROUND_OFF, DIFFERS = "same to the bit", "same within round-off", "differs"
 
@@ -192,7 +192,7 @@ def _noise(scale: Scale, noise_rate: float, fell: bool, time: float) -> float:
 
 def _reach(scale: Scale, noise_rate: float, fell: bool, time: float) -> float:
     """How far two rides may be apart after a time [s], in radii."""
-    return _noise(scale, noise_rate, fell, time) * (1 + scale.speed * time / scale.radius)
+    return _noise(scale, noise_rate, fell, time) * scale.away(time)
 
 
 def _position_difference(rides: Sequence[Trajectory], radius: float, reach: Callable[[float], float]) -> dict[str, Any]:
@@ -214,20 +214,15 @@ def _position_difference(rides: Sequence[Trajectory], radius: float, reach: Call
     most = int(distance.argmax())
     return {
         "samples": telling,
-        "max": _number(distance[most]),
+        "max": number(distance[most]),
         "max_at": float(time[most]),
-        "end": _number(distance[-1]),
+        "end": number(distance[-1]),
         "end_limit": float(allowed[-1]),
         "compared_until": float(time[-1]),
         "horizon": float(time[-1]) if cut else None,
         "begins_at": float(time[apart[0]]) if len(apart) else None,
         "exceeds_at": float(time[beyond[0]]) if len(beyond) else None,
     }
-
-
-def _number(value: float) -> float | None:
-    """What JSON can carry: a number that is none becomes None."""
-    return float(value) if np.isfinite(value) else None
 
 
 def _metrics(

@@ -25,6 +25,7 @@ from reference.bicycle import BODIES
 from reference.kinematics import FRONT_ANGLE, REAR_ANGLE
 
 from .limits import Scale
+from .metrics import number
 
 Growth = Callable[[float], float]
 
@@ -90,13 +91,13 @@ def _apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def _allowed(field: str, ride: Trajectory, scale: Scale, growth: np.ndarray) -> np.ndarray:
     """What the columns of a field may differ by, shape (n, columns), in their units."""
     noise, reach = growth[:, :1], growth[:, 1:]
-    turned = noise * max(1.0, scale.rear_rate * scale.duration)
+    turned = noise * scale.turned
     if field == "q":
         allowed = np.repeat(reach, 9, axis=1)
         allowed[:, [REAR_ANGLE, FRONT_ANGLE]] = np.maximum(reach, turned)
         return allowed
     if field == "qd":
-        return reach * np.array([scale.speed] * 3 + [scale.rear_rate] * 6)
+        return reach * scale.rates
     if field == "body_quaternion":
         wheels = np.repeat(["wheel" in body for body in BODIES], 4)
         return np.where(wheels, np.maximum(reach, turned), reach)
@@ -136,7 +137,7 @@ def _worst(names: list[tuple[str, str]], time: np.ndarray, apart: np.ndarray, al
     return {
         "column": names[column][0],
         "unit": names[column][1],
-        "max": float(most) if np.isfinite(most) else None,
+        "max": number(most),
         "max_at": float(time[sample]),
         "allowed": float(allowed[sample, column]),
         "exceeds_at": float(time[first]) if len(begin) else None,

@@ -72,6 +72,11 @@ class Verdict:
         return self.status in ("holds", "better")
 
     @property
+    def told(self) -> bool:
+        """Whether a reader is told of it in words: of what moved, and of other settings or another version."""
+        return self.status != "holds" or self.quantity == CHANGES
+
+    @property
     def share(self) -> float | None:
         """How far the value moved, in limits; None where there is nothing to compare."""
         if self.value is None or self.baseline is None or not self.limit:

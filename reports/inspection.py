@@ -31,10 +31,8 @@ def state_error(trajectory: Trajectory, exact: Trajectory, scale: Scale) -> floa
     n = len(trajectory.time)
     apart = trajectory.q - exact.q[:n]
     apart[:, _TURNING] -= 2 * np.pi * np.round(apart[:, _TURNING] / (2 * np.pi))
-    turned = max(1.0, scale.rear_rate * scale.duration)
-    sizes = np.array([*3 * [scale.radius], *4 * [1.0], turned, turned])
-    rates = np.array([*3 * [scale.speed], *6 * [scale.rear_rate]])
-    return float(np.sqrt(np.mean([(apart / sizes) ** 2, ((trajectory.qd - exact.qd[:n]) / rates) ** 2])))
+    sizes = np.array([*3 * [scale.radius], *4 * [1.0], *2 * [scale.turned]])
+    return float(np.sqrt(np.mean([(apart / sizes) ** 2, ((trajectory.qd - exact.qd[:n]) / scale.rates) ** 2])))
 
 
 def report_mismatch(trajectory: Trajectory, seen: Observation, bicycle: Bicycle, scale: Scale) -> float:

@@ -16,6 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reference.bicycle import Bicycle
+from reference.kinematics import REAR_ANGLE
+
 # A bounded disturbance |e| <= b over a duration T tilts a least-squares line by 3 b / T at the most.
 _SLOPE = 3.0
 
@@ -55,6 +58,26 @@ class Scale:
     gravity: float
     height: float
 
+    @classmethod
+    def of(cls, bicycle: Bicycle, qd: np.ndarray, radius: float, growth_rate: float, duration: float) -> Scale:
+        """Sizes of a ride from its rates (9,) at the start."""
+        speed, rear_rate = float(np.hypot(qd[0], qd[1])), float(abs(qd[REAR_ANGLE]))
+        return cls(radius, speed, rear_rate, growth_rate, duration, bicycle.gravity, bicycle.rear_frame_z)
+
+    @property
+    def turned(self) -> float:
+        """What a wheel turns in the ride, or a radian [rad]."""
+        return max(1.0, self.rear_rate * self.duration)
+
+    @property
+    def rates(self) -> np.ndarray:
+        """Sizes of the nine rates, shape (9,)."""
+        return np.array([*3 * [self.speed], *6 * [self.rear_rate]])
+
+    def away(self, time: float) -> float:
+        """How far an error of the state carries D away in a time [s], in radii: one of the speed all the way."""
+        return 1 + self.speed * time / self.radius
+
     @property
     def falling_rate(self) -> float:
         """Rate at which an inverted pendulum of the bicycle's height leaves the upright [1/s]."""
@@ -92,8 +115,7 @@ def ride_limits(scale: Scale, noise: float) -> dict[str, float]:
     dict
         Limit by quantity, in the quantity's unit.
     """
-    # An error of the speed carries D away from where it should be.
-    away = 1 + scale.speed * scale.duration / scale.radius
+    away = scale.away(scale.duration)
     force = noise * scale.rear_rate**2 * scale.radius / scale.gravity
     return {
         "short_error": noise * scale.radius * away,

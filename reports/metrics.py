@@ -70,11 +70,16 @@ def metrics(
     return {name: _finite(value) for name, value in result.items()}
 
 
+def number(value: float) -> float | None:
+    """What JSON can carry of a number: None if it is none."""
+    return float(value) if np.isfinite(value) else None
+
+
 def _finite(value: Any) -> Any:
     """Replace what JSON cannot carry: a number that is none becomes None."""
     if isinstance(value, dict):
         return {name: _finite(part) for name, part in value.items()}
-    return None if isinstance(value, float) and not np.isfinite(value) else value
+    return number(value) if isinstance(value, float) else value
 
 
 def position_errors(trajectory: Trajectory, reference: Trajectory) -> np.ndarray:

@@ -20,6 +20,7 @@ import numpy as np
 
 from engines.engine import Trajectory
 from reference.bicycle import Bicycle
+from reference.kinematics import YAW
 from reference.stability import independent, linearise
 from reference.surface import Surface, is_level
 
@@ -104,7 +105,7 @@ def modes_of(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) 
     values = np.where(np.abs(np.imag(values)) > _REAL, values, np.real(values))
     upper = [k for k in np.argsort(values) if np.imag(values[k]) >= 0]
     zero = min(upper, key=lambda k: abs(values[k]))
-    names = _names(values[upper], upper.index(zero), 0.0 if first else abs(float(qd[3])))
+    names = _names(values[upper], upper.index(zero), 0.0 if first else abs(float(qd[YAW])))
     modes = []
     for k, name in zip(upper, names, strict=True):
         share = right[_RATE, k] if k == zero else max(right[_ANGLES, k], key=abs)

@@ -79,6 +79,16 @@ class Plot:
     expected: Callable[[Ride], Curve | None] = lambda _: None
 
 
+def drawable(ride: Ride, plot: Plot) -> dict[str, np.ndarray]:
+    """Values of a plot by engine; what an engine does not give, or gives no number of, has no entry."""
+    found = {}
+    for name, run in ride.trajectories.items():
+        values = plot.values(ride, run)
+        if values is not None and np.isfinite(values).any():
+            found[name] = values
+    return found
+
+
 def nanoseconds(time: np.ndarray) -> np.ndarray:
     """Times [s] rounded to whole nanoseconds, int64."""
     return np.round(np.asarray(time, float) * NANOSECONDS).astype(np.int64)

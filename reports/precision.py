@@ -12,7 +12,7 @@ from engines.convergence import extrapolate, observed_orders
 from engines.engine import Trajectory
 from engines.identify import Identified
 
-from .metrics import position_errors
+from .metrics import number, position_errors
 
 SMALL = 0.1  # of the motion's size: what nonlinearity adds to an error up to here, the next powers of the step take
 
@@ -114,8 +114,8 @@ def engine_document(
     return {
         "points": [_point(level, reference, horizon) for level in levels],
         "failures": list(failures),
-        "observed_order": _number(orders[-1]) if orders else None,
-        "orders": [_number(order) for order in orders],
+        "observed_order": number(orders[-1]) if orders else None,
+        "orders": [number(order) for order in orders],
         "richardson_error": None if found is None else found.limit_error,
         "richardson_uncertainty": None if found is None else found.uncertainty,
         "window": None if found is None else found.window,
@@ -136,10 +136,6 @@ def _point(level: Level, reference: Trajectory, horizon: float | None) -> dict[s
         "cpu_time": level.trajectory.cpu_time,
         "horizon": measured["horizon"],
     }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def eigenvalue_document(identified: Identified, reference: np.ndarray) -> dict[str, Any]:
@@ -164,7 +160,7 @@ def eigenvalue_document(identified: Identified, reference: np.ndarray) -> dict[s
         "reference": [[value.real, value.imag] for value in reference],
         "errors": errors.tolist(),
         "error": float(errors.max()),
-        "order": _number(identified.order),
+        "order": number(identified.order),
         "uncertainty": identified.uncertainty,
     }
 

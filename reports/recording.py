@@ -20,7 +20,7 @@ from .blueprint import NEWTONS_PER_METRE, blueprint, world
 from .ground import LINE_LIFT, Ground, ground_of_ride
 from .modes import modes_of
 from .palette import Colour, colours
-from .plots import PLOTS, Curve, Plot, Ride, mode_plots, nanoseconds
+from .plots import PLOTS, Curve, Plot, Ride, drawable, mode_plots, nanoseconds
 
 APPLICATION = "velodrome"
 TRAIL_PIECES = 400  # the viewer queries a trail piece by piece: more would make playing stutter
@@ -163,12 +163,9 @@ def _curves(ride: Ride, plots: Iterable[Plot]) -> dict[str, dict[str, Curve]]:
     curves: dict[str, dict[str, Curve]] = {}
     for plot in plots:
         found: dict[str, Curve] = {}
-        for name, run in ride.trajectories.items():
-            values = plot.values(ride, run)
-            if values is None or not np.isfinite(values).any():
-                continue
+        for name, values in drawable(ride, plot).items():
             kept = np.isfinite(values)
-            found[name] = run.time[kept], values[kept]
+            found[name] = ride.trajectories[name].time[kept], values[kept]
         law = plot.expected(ride)
         if law is not None and found:
             # What decays below all that is measured would only stretch the axis.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from xml.etree import ElementTree
 
-from .drift import CHANGES, Verdict
+from .drift import Verdict
 from .markdown import escaped, printable
 
 Verdicts = Sequence[tuple[str, Verdict]]
@@ -60,7 +60,7 @@ def markdown_page(verdicts: Verdicts) -> str:
     held = sum(verdict.status == "holds" for _, verdict in verdicts)
     lines = [f"# Drift gate: {'holds' if passes else 'fails'}", "", f"{held} of {len(verdicts)} quantities hold.", ""]
     ordered = sorted(verdicts, key=lambda item: _WORST_FIRST.index(item[1].status))
-    moved = [(name, one) for name, one in ordered if one.status != "holds" or one.quantity == CHANGES]
+    moved = [(name, one) for name, one in ordered if one.told]
     for name, verdict in moved:
         reason = escaped(verdict.reason)
         who = escaped(f"{name}, {verdict.engine}")

@@ -13,7 +13,6 @@ import numpy as np
 from pydantic import ValidationError
 
 from engines.engine import REFERENCE, Trajectory, load_engine
-from reference.kinematics import REAR_ANGLE
 from reference.surface import SurfaceOfRevolution
 from reports.diff import DIFFERS, Ground, StoredRun, diff_document, diff_markdown
 from reports.fall import as_shown
@@ -23,13 +22,11 @@ from reports.palette import colours
 from .error import ScenarioError
 from .files import make_folder, write_json, write_text
 from .installed import installed
-from .scenario import CircularTable, Scenario, load_scenario
+from .scenario import OF_THE_MOTION, CircularTable, Scenario, load_scenario
 from .start import make_start
 from .stored import document, part, ride
 
 ROUND_OFF = 2.0**-52
-# What makes two scenarios one: an engine's settings may well differ.
-_SAME = ("surface", "motion", "perturbation", "bicycle")
 
 
 @dataclass(frozen=True)
@@ -81,7 +78,7 @@ def read_pair(first: Path, second: Path, engines: Sequence[str] | None = None) -
 
 
 def _same_scenario(before: Scenario, after: Scenario, first: Path, second: Path) -> None:
-    for name in (*_SAME, "simulation"):
+    for name in (*OF_THE_MOTION, "simulation"):
         tables = [scenario.model_dump(include={name})[name] for scenario in (before, after)]
         for key in dict.fromkeys(table_key for table in tables for table_key in table):
             values = [table.get(key) for table in tables]
@@ -139,15 +136,9 @@ def _same_start(before: StoredRun, after: StoredRun, first: Path, second: Path) 
 def _ground(scenario: Scenario, run: StoredRun) -> Ground:
     bicycle, (q, qd) = scenario.make_bicycle(), _state(run.manifest)
     circular = isinstance(scenario.motion, CircularTable)
-    scale = Scale(
-        radius=float(np.hypot(q[0], q[1])) if circular else bicycle.wheelbase,
-        speed=float(np.hypot(qd[0], qd[1])),
-        rear_rate=float(abs(qd[REAR_ANGLE])),
-        growth_rate=float(run.manifest["start"]["growth_rate"]),
-        duration=scenario.simulation.duration,
-        gravity=bicycle.gravity,
-        height=bicycle.rear_frame_z,
-    )
+    radius = float(np.hypot(q[0], q[1])) if circular else bicycle.wheelbase
+    growth_rate = float(run.manifest["start"]["growth_rate"])
+    scale = Scale.of(bicycle, qd, radius, growth_rate, scenario.simulation.duration)
     return Ground(bicycle, scenario.surface.make(), scale)
 
 

@@ -19,7 +19,7 @@ from .gate_sample import SHORT_HORIZON, sample
 from .installed import installed
 from .run_folder import library_versions
 from .runner import Watch, configure
-from .scenario import Scenario, library_names, load_scenario
+from .scenario import OF_THE_MOTION, Scenario, library_names, load_scenario
 from .start import make_start
 from .stored import read_json
 from .table import one_line, shown
@@ -172,7 +172,7 @@ def _held(
 
 def content(scenario: Scenario) -> dict[str, Any]:
     """What of a scenario its motion depends on, as JSON values."""
-    return scenario.model_dump(mode="json", exclude_none=True, include={"surface", "motion", "perturbation", "bicycle"})
+    return scenario.model_dump(mode="json", exclude_none=True, include={*OF_THE_MOTION})
 
 
 def read_baseline(scenario: str, folder: Path | None = None, motion: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -242,10 +242,10 @@ def update(
     """
     folder = BASELINES if baselines is None else baselines
     make_folder(folder)
-    paths = []
+    paths, there = [], installed()
     for name, baseline in fresh.items():
         moved = [verdict for scenario, verdict in verdicts if scenario == name and verdict.status != "holds"]
-        kept = {engine: entry for engine, entry in read_baseline(name, folder).items() if engine in installed()}
+        kept = {engine: entry for engine, entry in read_baseline(name, folder).items() if engine in there}
         words = reason or "; ".join(f"{v.engine}: {v.quantity}: {v.status}" for v in moved) or "nothing moved"
         paths.append(folder / f"{name}.json")
         write_json(paths[-1], {**baseline, "reason": words, "engines": kept | baseline["engines"]})

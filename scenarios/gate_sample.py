@@ -16,7 +16,7 @@ from engines.engine import Engine, EngineError, Problem, Settings, Trajectory
 from engines.identify import DISTURBANCES, STENCIL_WEIGHT, interval_of, jacobian_at
 from engines.steady import steady_trajectory
 from reference.contact import observe
-from reference.kinematics import REAR_ANGLE, YAW
+from reference.kinematics import YAW
 from reference.stability import growth_rate, linearise, sorted_eigenvalues
 from reports.drift import BELOW_NOISE, RIDE_QUANTITIES
 from reports.fall import fell_at, until_fall
@@ -148,16 +148,7 @@ def _ride_values(start: Start, standing: Trajectory, scale: Scale) -> dict[str, 
 
 def _scale(start: Start) -> Scale:
     problem = start.problem
-    qd = problem.qd
-    return Scale(
-        radius=start.size,
-        speed=float(np.hypot(qd[0], qd[1])),
-        rear_rate=float(abs(qd[REAR_ANGLE])),
-        growth_rate=start.growth_rate,
-        duration=float(problem.times[-1]),
-        gravity=problem.bicycle.gravity,
-        height=problem.bicycle.rear_frame_z,
-    )
+    return Scale.of(problem.bicycle, problem.qd, start.size, start.growth_rate, float(problem.times[-1]))
 
 
 Found = dict[str, tuple[float | None, float | None]]

@@ -322,9 +322,6 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed
 
     Of baselines that are ``renewed`` at once there is nothing to pass or fail.
     """
-    # Here, since the other commands' tables need none of what it imports.
-    from reports.drift import CHANGES
-
     for name, group in groupby(verdicts, key=lambda item: item[0]):
         console.print(name, style="bold", markup=False)
         table = Table("engine", box=None, pad_edge=False)
@@ -334,7 +331,7 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed
             table.add_row(*_engine_row(engine, list(rows)))
         console.print(table)
     for name, verdict in verdicts:
-        if verdict.status != "holds" or verdict.quantity == CHANGES:
+        if verdict.told:
             line = f"{name}: {verdict.engine}: {verdict.quantity}: {verdict.status}: {verdict.reason}"
             console.print(line, style=STATUS_STYLES[verdict.status], markup=False, highlight=False, soft_wrap=True)
     if renewed:

@@ -13,9 +13,11 @@ from reference.bicycle import Bicycle
 
 from .error import ScenarioError
 from .surfaces import SurfaceTable
-from .table import Table, one_line, read_toml, shown
+from .table import Table, one_line, placed, read_toml, shown
 
 LIBRARY = files("scenarios") / "library"
+# The tables that the motion depends on.
+OF_THE_MOTION = ("surface", "motion", "perturbation", "bicycle")
 
 
 # Far beyond any bicycle, and far from where products of such numbers overflow.
@@ -182,8 +184,10 @@ def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tupl
         data = read_toml(text)
     except ValueError as error:
         raise ScenarioError(f"{shown(source)}: not valid TOML: {shown(str(error))}") from error
-    for key, value in (changes or {}).items():
-        _put(data, key, value)
+    try:
+        data = placed(data, changes or {})
+    except ValueError as error:
+        raise ScenarioError(f"--set {error}") from error
     return name, validate(data, source)
 
 
@@ -216,12 +220,3 @@ def read_file(source: str) -> tuple[str, str]:
             raise
         reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
         raise ScenarioError(f"{shown(source)}: cannot be read: {reason}") from error
-
-
-def _put(data: dict[str, Any], key: str, value: Any) -> None:
-    *tables, last = key.split(".")
-    for table in tables:
-        data = data.setdefault(table, {})
-        if not isinstance(data, dict):
-            raise ScenarioError(f"--set {shown(key)}: {shown(table)} is no table")
-    data[last] = value

@@ -34,6 +34,35 @@ def read_toml(text: str) -> dict[str, Any]:
         raise ValueError("it is nested too deeply") from None
 
 
+def placed(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy of nested tables with dotted keys set.
+
+    Parameters
+    ----------
+    data : mapping
+        Stays as it is.
+    changes : mapping
+        Dotted key to value.
+
+    Raises
+    ------
+    ValueError
+        If a key leads through something that is no table.
+    """
+    result = dict(data)
+    for key, value in changes.items():
+        *tables, last = key.split(".")
+        here = result
+        for table in tables:
+            inner = here.get(table, {})
+            if not isinstance(inner, Mapping):
+                raise ValueError(f"{shown(key)}: {shown(table)} is no table")
+            here[table] = dict(inner)
+            here = here[table]
+        here[last] = value
+    return result
+
+
 class Table(BaseModel):
     """Base of all tables: unknown keys are refused with the known ones, values are checked, nothing changes later."""
 

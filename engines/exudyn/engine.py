@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from engines.engine import EngineError, Problem, Progress, Trajectory, UnsuitableProblem
+from engines.engine import EngineError, Problem, Progress, Trajectory, UnsuitableProblem, package_version
 from reference.kinematics import quaternions
 from reference.simulate import steps_per_output
 from reference.surface import is_level
@@ -50,7 +49,7 @@ class ExudynEngine:
     @property
     def version(self) -> str:
         """Version of the library."""
-        return version("exudyn")
+        return package_version("exudyn")
 
     def check(self, problem: Problem, settings: SolverSettings) -> None:
         """Refuse output times that the step does not meet, and ground; see `engines.engine.Engine`."""

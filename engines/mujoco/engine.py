@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
-from engines.engine import Problem, Progress, Trajectory
+from engines.engine import Problem, Progress, Trajectory, package_version
 from engines.mujoco.settings import StepSettings
 from engines.mujoco.state import from_mujoco
 from reference.contact import observe
@@ -64,7 +63,7 @@ class MujocoEngine(Generic[S]):
     @property
     def version(self) -> str:
         """Version of MuJoCo."""
-        return version("mujoco")
+        return package_version("mujoco")
 
     def check(self, problem: Problem, settings: Any) -> None:
         """Refuse output times that the step does not meet; see `engines.engine.Engine`."""

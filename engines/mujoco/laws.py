@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import get_args
 
 import numpy as np
 
@@ -15,12 +15,11 @@ from engines.engine import EngineError, Problem
 from engines.mujoco import exact_contact, native
 from engines.mujoco.creep import contact_acceleration, settled_slip
 from engines.mujoco.ride import start
-from engines.mujoco.settings import ExactContactSettings, NativeSettings
+from engines.mujoco.settings import ExactContactSettings, Integrator, NativeSettings
 from engines.mujoco.study import drift_rate, is_settled, slip_power
 from reference.kinematics import WHEELS
 
-Integrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
-INTEGRATORS: tuple[Integrator, ...] = ("Euler", "implicit", "implicitfast", "RK4")
+INTEGRATORS: tuple[Integrator, ...] = get_args(Integrator)
 Pair = tuple[float, float]
 
 

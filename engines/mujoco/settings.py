@@ -24,11 +24,14 @@ ROUND_OFF = 2.0**-52
 FORCE_NOISE = 0.01  # the largest share of round-off that a contact force may have
 
 
+Integrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
+
+
 class StepSettings(Settings):
     """How MuJoCo steps through time."""
 
     step: float = Field(default=0.002, ge=1e-6, le=0.02, description="time step [s]; must divide the output interval")
-    integrator: Literal["Euler", "implicit", "implicitfast", "RK4"] = Field(
+    integrator: Integrator = Field(
         default="RK4", description="MuJoCo's integrator; RK4 is of order 4, the others are of order 1"
     )
 
@@ -117,15 +120,13 @@ _ON_PLANES = "MuJoCo's integrator; on a curved surface RK4's stages see the grou
 class NativeSettings(ContactSettings):
     """A careful user's: stiff contacts, hard friction, the elliptic cone."""
 
-    integrator: Literal["Euler", "implicit", "implicitfast", "RK4"] = Field(
-        default="implicitfast", description=_ON_PLANES
-    )
+    integrator: Integrator = Field(default="implicitfast", description=_ON_PLANES)
 
 
 class DefaultSettings(ContactSettings):
     """MuJoCo's own defaults, all of them."""
 
-    integrator: Literal["Euler", "implicit", "implicitfast", "RK4"] = Field(default="Euler", description=_ON_PLANES)
+    integrator: Integrator = Field(default="Euler", description=_ON_PLANES)
     time_constant: float | None = Field(
         default=0.02, gt=0, le=1, description="time constant of the contacts (solref) [s], at least twice the step"
     )
@@ -183,12 +184,12 @@ class ExactContactSettings(ContactSettings):
         end before its bottom. What is missing there, divided by the softness, is a force up to thousands of times too
         large. 200 find what 500 find.
         """
-        return 200 if self.cone == "elliptic" and self.impratio > 10 else 50
+        return 200 if self.cone == "elliptic" and self.impratio > 10 else super().line_search
 
     @model_validator(mode="after")
     def _forces_have_digits(self) -> Self:
         if ROUND_OFF * self.condition > FORCE_NOISE:
-            least = ROUND_OFF * max(self.impratio, 1.0) / ((1 - self.impedance[1]) * FORCE_NOISE)
+            least = self.softness * ROUND_OFF * self.condition / FORCE_NOISE
             raise ValueError(
                 f"softness is {self.softness!r}; with impratio {self.impratio!r} it must be at least {least:.2g}, "
                 "or contact forces drown in round-off"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..plots import PLOTS, RADIUS, Plot, Ride
+from ..plots import PLOTS, RADIUS, Plot, Ride, drawable
 
 MOST = 1000  # points of a curve: as many as pixels side by side
 ALL = 40_000  # points of all curves together: under a megabyte of page
@@ -207,7 +207,7 @@ def drawn(ride: Ride, circular: bool) -> list[tuple[str, list[Drawn]]]:
         Title of the group and its panels; groups without a panel are left out.
     """
     found = [
-        (title, panel, _values(ride, panel))
+        (title, panel, drawable(ride, panel.plot))
         for title, panels in GROUPS
         for panel in panels
         if circular or panel.key != RADIUS.key
@@ -222,16 +222,6 @@ def drawn(ride: Ride, circular: bool) -> list[tuple[str, list[Drawn]]]:
         extremes = {name: _extremes(series, panel.log) for name, series in values.items()}
         groups.setdefault(title, []).append(Drawn(panel, curves, extremes))
     return list(groups.items())
-
-
-def _values(ride: Ride, panel: Panel) -> dict[str, np.ndarray]:
-    """Values of a panel by engine; what an engine does not give has no entry."""
-    found = {}
-    for name, run in ride.trajectories.items():
-        values = panel.plot.values(ride, run)
-        if values is not None and np.isfinite(values).any():
-            found[name] = values
-    return found
 
 
 def _extremes(values: np.ndarray, log: bool) -> tuple[float, float, float]:

@@ -54,10 +54,11 @@ def check_command(
     written = []
     if update:
         # An engine that is not installed any more leaves the baselines; one that broke must not.
+        there = installed()
         absent = [
             verdict
             for _, verdict in verdicts
-            if verdict.engine in installed() and verdict.quantity == "run" and verdict.reason.startswith("did not")
+            if verdict.engine in there and verdict.quantity == "run" and verdict.reason.startswith("did not")
         ]
         if absent:
             raise ScenarioError(f"no baseline written: {absent[0].engine} {absent[0].reason}")

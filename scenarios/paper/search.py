@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference.anchors import start_on_plane
+from reference.anchors import above_ground, start_on_plane
 from reference.circular import (
     LEAN,
     PITCH,
@@ -21,13 +21,10 @@ from reference.circular import (
 )
 from reference.continuation import follow
 from reference.kernels.steady import UNKNOWNS
-from reference.kinematics import body_positions
-from reference.surface import evaluate
 
 # Starts: angles on a grid, at rest, pivoting and at some rear rates that curves of benchmark size pass.
 _LEANS, _STEERS, _RATES = np.linspace(-1.2, 1.2, 7), np.linspace(0.05, 3.09, 7), (4.0, 12.0, 18.0, 24.0)
 _MOST = 25  # Newton steps
-_LARGEST_ANGLE = 1.5  # of lean and pitch; beyond, roots are spurious
 _SAME = 1e-5  # two solutions of one start's condition; each is known to round-off
 _ON_CURVE = 0.1  # from a followed curve's nearest point: curves are followed in steps of as much
 # Unknowns that mirroring left and right turns about: y, lean, steer, yaw speed, and at both contacts the
@@ -113,13 +110,7 @@ def _solutions(equations: Steady, condition: Callable) -> Iterator[np.ndarray]:
 
 def _possible(equations: Steady, unknowns: np.ndarray) -> bool:
     """Whether a solution is a motion of a bicycle that stands on its wheels, above the ground."""
-    if unknowns[SIGMA] < -1e-9 or np.abs(unknowns[[LEAN, PITCH]]).max() > _LARGEST_ANGLE:
-        return False
-    q = np.zeros((1, 9))
-    q[0, :3], q[0, 4:7] = unknowns[:3], unknowns[3:6]
-    centres = body_positions(equations.bicycle, q)[0]
-    # The wheels touch the ground from below just as well.
-    return bool(np.all(centres[:, 2] > evaluate(equations.surface, centres[:, 0], centres[:, 1])[:, 0]))
+    return bool(unknowns[SIGMA] >= -1e-9) and above_ground(equations, unknowns)
 
 
 def _distinct(solutions: Iterator[np.ndarray]) -> Iterator[np.ndarray]:

@@ -16,9 +16,10 @@ from scenarios.run_folder import library_versions
 from scenarios.runner import configure
 from scenarios.scenario import Scenario, validate
 from scenarios.start import make_start
+from scenarios.table import placed
 
 from .file import SweepFile, read_sweep
-from .points import count, placed, points
+from .points import count, points
 
 MOST = 5_000_000  # tasks; some 2 GB in the planning process
 _CHECKED = 50  # kinds of runs whose engine is asked beforehand; each may need a motion, a tenth of a second
@@ -101,9 +102,9 @@ def plan_sweep(path: Path) -> Plan:
     tasks: list[Task] = []
     seen: set[tuple[str, str]] = set()
     for changes in points(sweep):
+        _refuse_other_engines(path, sweep, changes)
         for engine in sweep.engines:
             own = concerning(engine, changes)
-            _refuse_other_engines(path, sweep, changes)
             digest = checker.resolved(engine, base, own)
             if (engine, digest) not in seen:
                 seen.add((engine, digest))

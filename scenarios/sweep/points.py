@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import product
 from typing import Any
 
@@ -37,32 +37,3 @@ def _sampled(cube: Hypercube) -> Iterator[dict[str, float]]:
     low, high = np.array(list(cube.ranges.values())).T
     for row in low + (high - low) * unit:
         yield dict(zip(cube.ranges, row.tolist(), strict=True))
-
-
-def placed(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """A copy of nested tables with dotted keys set.
-
-    Parameters
-    ----------
-    data : mapping
-        Stays as it is.
-    changes : mapping
-        Dotted key to value.
-
-    Raises
-    ------
-    ValueError
-        If a key leads through something that is no table.
-    """
-    result = dict(data)
-    for key, value in changes.items():
-        *tables, last = key.split(".")
-        here = result
-        for table in tables:
-            inner = here.get(table, {})
-            if not isinstance(inner, Mapping):
-                raise ValueError(f"{key}: {table} is no table")
-            here[table] = dict(inner)
-            here = here[table]
-        here[last] = value
-    return result

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from itertools import islice
 from pathlib import Path
@@ -15,6 +14,7 @@ import pyarrow.parquet as pq
 from engines.files import whole
 from scenarios.error import ScenarioError
 from scenarios.files import make_folder, write_json
+from scenarios.stored import read_json
 
 from .journal import finished, row_at
 from .plan import Plan
@@ -44,7 +44,7 @@ def open_folder(out: Path, plan: Plan, resume: bool) -> None:
 
 def _manifest(path: Path) -> dict[str, Any]:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = read_json(path)
     except FileNotFoundError as error:
         raise ScenarioError(f"{path.parent}: there is no sweep to resume") from error
     except (OSError, ValueError) as error:
@@ -70,6 +70,11 @@ def _same(path: Path, then: Mapping[str, Any], now: Mapping[str, Any]) -> None:
         raise ScenarioError(f"{path.parent}: is of another sweep, or the file has changed; --out names another folder")
 
 
+def part_of(out: Path, engine: str) -> Path:
+    """The part of the data set that holds an engine's rows."""
+    return out / RESULTS / f"engine={quote(engine, safe='')}" / "part-0.parquet"
+
+
 def write_results(out: Path, plan: Plan) -> None:
     """Make the data set of a complete journal, sorted by key, a part an engine; and say that it is complete.
 
@@ -84,12 +89,12 @@ def write_results(out: Path, plan: Plan) -> None:
     with (out / JOURNAL).open("rb") as journal:
         done = [(task, offsets[task.index]) for task in plan.tasks if task.index in offsets]
         for engine, version in facts["engines"].items():
-            folder = out / RESULTS / f"engine={quote(engine, safe='')}"
-            folder.mkdir(parents=True, exist_ok=True)
+            part = part_of(out, engine)
+            part.parent.mkdir(parents=True, exist_ok=True)
             own = ((task, row_at(journal, offset)) for task, offset in done if task.engine == engine)
             # A run that was killed could not say its version.
             found = ({"version": version} | record(task, row, columns) for task, (_, row, _) in own)
-            _write(folder / "part-0.parquet", columns, found)
+            _write(part, columns, found)
         every = ((task, row_at(journal, offset)) for task, offset in done)
         clocks = ({"key": task.key, "index": task.index, "engine": task.engine, **time} for task, (_, _, time) in every)
         _write(out / TIMINGS, pa.schema(list(TIMING.items())), clocks)

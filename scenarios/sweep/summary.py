@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
-from urllib.parse import quote
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -15,7 +14,7 @@ from .live import STYLES
 from .plan import Plan
 from .rows import BROKEN
 from .run import Outcome
-from .store import RESULTS, TIMINGS
+from .store import RESULTS, TIMINGS, part_of
 
 _REASONS = 5
 
@@ -53,9 +52,8 @@ def summary(plan: Plan, outcome: Outcome) -> dict[str, Any]:
 
 
 def _of_results(outcome: Outcome, engine: str) -> dict[str, Any]:
-    path = outcome.folder / RESULTS / f"engine={quote(engine, safe='')}" / "part-0.parquet"
     columns = ["status", "reason", "position_error_max"]
-    table = pq.ParquetFile(path).read(columns=columns)
+    table = pq.ParquetFile(part_of(outcome.folder, engine)).read(columns=columns)
     errors = table.column("position_error_max").drop_null().to_numpy()
     error = {"median": float(np.median(errors)), "worst": float(errors.max())} if len(errors) else None
     timing = pq.read_table(outcome.folder / TIMINGS, filters=[("engine", "=", engine)], columns=["task_time"])

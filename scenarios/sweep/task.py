@@ -16,11 +16,11 @@ from engines.admission import ride
 from engines.engine import REFERENCE, Engine, Settings, Trajectory
 from scenarios.error import ScenarioError
 from scenarios.runner import configure, measure_one, why_failed
-from scenarios.scenario import Scenario, validate
+from scenarios.scenario import OF_THE_MOTION, Scenario, validate
 from scenarios.start import Start, make_start
+from scenarios.table import placed
 
 from .plan import canonical, pruned
-from .points import placed
 from .rows import METRICS, flat
 
 _LONGEST_REASON = 500
@@ -60,8 +60,6 @@ class Tasks:
         timing: dict[str, Any] = {}
         try:
             row = self._ride(engine, changes, timing)
-        except MemoryError:
-            row = {"status": "memory", "reason": "more memory than the sweep's memory_limit, or than there is"}
         except Exception as error:  # whatever an engine raises is one row that says so
             row = _broken(error)
         timing["task_time"] = time.process_time() - begin
@@ -119,9 +117,7 @@ class Tasks:
 
 def _what_starts(scenario: Scenario) -> str:
     """What of a scenario its start depends on."""
-    return canonical(
-        scenario.model_dump(mode="json", exclude_none=True, exclude={"title", "tags", "criterion", "engines"})
-    )
+    return canonical(scenario.model_dump(mode="json", exclude_none=True, include={*OF_THE_MOTION, "simulation"}))
 
 
 def _start(text: str) -> Start | str:
@@ -148,8 +144,9 @@ def _outcome(measured: Mapping[str, Any], reason: str | None) -> dict[str, Any]:
 
 
 def _broken(error: Exception) -> dict[str, Any]:
-    """A failed run; C++ and the system say in their own ways that there is no memory."""
-    if "bad_alloc" in str(error) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
+    """A failed run; Python, C++ and the system say in their own ways that there is no memory."""
+    short = isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM)
+    if short or "bad_alloc" in str(error):
         return {"status": "memory", "reason": "more memory than the sweep's memory_limit, or than there is"}
     return {"status": "failed", "reason": one_line(why_failed(error))}
 

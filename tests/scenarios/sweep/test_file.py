@@ -11,7 +11,8 @@ from sweeping import UPRIGHT, planned, written
 from scenarios.error import ScenarioError
 from scenarios.sweep.file import read_sweep
 from scenarios.sweep.plan import plan_sweep
-from scenarios.sweep.points import placed, points
+from scenarios.sweep.points import points
+from scenarios.table import placed
 
 
 def changes(folder: Path, text: str) -> list[dict]:
