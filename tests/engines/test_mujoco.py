@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from ripples import Ripples
 from scipy.optimize import root
 
 from engines.engine import EngineError, Problem, Trajectory
@@ -26,7 +27,7 @@ from reference.contact import observe
 from reference.dae import consistent_state, dynamics
 from reference.kernels import dynamics as kernel
 from reference.kinematics import body_positions, constants, quaternions, rotations
-from reference.surface import Paraboloid, Plane, Surface, surface_function
+from reference.surface import Paraboloid, Plane, Surface
 
 BOWL = Paraboloid(1 / 200)
 # Q2's spectrum: the fastest mode decays at 12.3 1/s, the weave turns at 6.7 rad/s; the wheels spin at 18 rad/s.
@@ -164,21 +165,7 @@ def test_turns_at_the_start_are_kept(q2):
 # -------------------------------------------------------------------------------------------- the ground
 
 
-@surface_function
-def _ripples(x, y, parameters):
-    a, k = parameters[0], parameters[1]
-    s, c = np.sin(k * x), np.cos(k * x)
-    return a * s * y, a * k * c * y, a * s, -a * k * k * s * y, a * k * c, 0 * x
-
-
-class Ripples:
-    """z = a sin(k x) y: no surface of revolution, curved both ways."""
-
-    function = _ripples
-    parameters = np.array([0.05, 0.8])
-
-
-@pytest.mark.parametrize("surface", [BOWL, Paraboloid(0.2), Ripples()])
+@pytest.mark.parametrize("surface", [BOWL, Paraboloid(0.2), Ripples(0.05)])
 def test_contact_is_the_closest_approach_on_any_surface(surface):
     """MuJoCo's distance, normal and point on the moving planes are those of the true surface."""
     bicycle = Bicycle()

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from ripples import Ripples
 
 from engines.engine import EngineError, Problem, Trajectory
 from engines.friction import cone_is_left, required_friction
@@ -27,7 +28,7 @@ from reference.families import find_motion
 from reference.kernels.dynamics import energies
 from reference.kinematics import constants
 from reference.stability import growth_rate, linearise
-from reference.surface import Paraboloid, Plane, Surface, surface_function
+from reference.surface import Paraboloid, Plane, Surface
 
 ROUND_OFF = 2.0**-52
 # Circular motions: (alpha, rear rate, family, near). At 1/200 stable, at 1/20 and 1/5 unstable.
@@ -242,21 +243,7 @@ def test_exact_contact_repeats_bitwise_and_does_not_depend_on_output():
             np.testing.assert_array_equal(getattr(often, name)[::10], getattr(seldom, name))
 
 
-@surface_function
-def _ripples(x, y, parameters):
-    a, k = parameters[0], parameters[1]
-    s, c = np.sin(k * x), np.cos(k * x)
-    return a * s * y, a * k * c * y, a * s, -a * k * k * s * y, a * k * c, 0 * x
-
-
-class Ripples:
-    """z = a sin(k x) y: no surface of revolution, curved both ways."""
-
-    function = _ripples
-    parameters = np.array([0.02, 0.8])
-
-
-@pytest.mark.parametrize("surface", [Plane(), Ripples()])
+@pytest.mark.parametrize("surface", [Plane(), Ripples(0.02)])
 def test_any_surface(surface: Surface):
     """Two seconds of an uncontrolled ride: the same as the reference's to RK4's error and the rows' softness."""
     q, qd = consistent_state(Bicycle(), surface, (1.0, 0.5), 0.1, 0.05, (0.1, 0.0, 15.0), yaw=0.7)

@@ -8,11 +8,18 @@ from pathlib import Path
 from typing import Any, Literal
 
 import pytest
+from sweeping import UPRIGHT
 
 from engines.engine import Problem, Progress, Settings, Trajectory
 from engines.lagrange import ENGINE as INNER
 
 NAME = "planted"
+# A sweep file with every fault, on a short ride.
+SWEEP = (
+    f'engines = ["{NAME}"]\nmemory_limit = 300\n'
+    + UPRIGHT.replace("60.0", "5.0")
+    + f'"engines.{NAME}.fault" = ["hang", "crash", "none", "hog", "raise", "abort"]\n'
+)
 
 
 class PlantedSettings(Settings):

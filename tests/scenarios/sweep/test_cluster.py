@@ -91,8 +91,7 @@ def test_a_scheduler_that_is_lost_stops_the_sweep_and_it_goes_on_elsewhere(clust
 
 def test_faults_on_a_cluster_are_the_rows_they_are_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     planted.announce(tmp_path / "site", monkeypatch)
-    text = 'engines = ["planted"]\nmemory_limit = 300\n' + UPRIGHT.replace("60.0", "5.0")
-    plan = planned(tmp_path, text + '"engines.planted.fault" = ["hang", "crash", "none", "hog", "raise", "abort"]')
+    plan = planned(tmp_path, planted.SWEEP)
     # Its processes must find the engine.
     with two_workers() as cluster:
         outcome = swept(plan, tmp_path / "cluster", on_cluster(cluster.scheduler_address))

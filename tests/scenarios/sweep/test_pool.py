@@ -26,9 +26,7 @@ def test_one_worker_two_workers_and_this_process_give_equal_bits(tmp_path: Path)
 
 def test_each_fault_is_one_row_and_the_others_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     planted.announce(tmp_path / "site", monkeypatch)
-    text = 'engines = ["planted"]\nmemory_limit = 300\n' + UPRIGHT.replace("60.0", "5.0")
-    text += '"engines.planted.fault" = ["hang", "crash", "none", "hog", "raise", "abort"]\n'
-    plan = planned(tmp_path, text)
+    plan = planned(tmp_path, planted.SWEEP)
     outcome = swept(plan, tmp_path / "out", 2)
     found = {(row["engines.planted.fault"], row["status"]): row["reason"] for row in rows(tmp_path / "out", "planted")}
     assert found == {
