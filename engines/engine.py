@@ -74,7 +74,8 @@ class Trajectory:
     settings : dict
         The settings it ran with, JSON values.
     time : ndarray, shape (n,)
-        Output times [s]: those of the problem, or fewer where the run ended early.
+        Times of the samples by the engine's own clock [s], one for each of the problem's, or fewer where the run
+        ended early. `engines.admission.ride` holds them against the problem's.
     q, qd : ndarray, shape (n, 9)
         Generalised coordinates and rates.
     body_position : ndarray, shape (n, 4, 3)
@@ -104,8 +105,8 @@ class Trajectory:
         tolerance; 0 where nothing iterates, None where the engine does not say.
     largest_residual : float or None
         Largest relative residual that an iteration left in any step: of a contact problem the residual of the
-        forces over the largest force, of Newton's method the residual over the scale that its relative tolerance
-        multiplies. None where the engine does not say.
+        forces over the largest force, of Newton's method the residual over the forces that it brings into balance,
+        such as the weights. None where the engine does not say.
     """
 
     engine: str

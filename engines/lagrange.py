@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import Literal, Self
 
+import numpy as np
 from pydantic import Field
 
 from reference.contact import observe
@@ -64,8 +65,11 @@ class LagrangeEngine:
         begin = time.process_time()
         if settings.integrator == "dop853":
             motion = simulate(*where, *state, tolerance=settings.tolerance, progress=progress)
+            clock = motion.time
         else:
             motion = simulate_modified_euler(*where, *state, step=settings.step)
+            stride = steps_per_output(problem.times, settings.step)
+            clock = settings.step * (stride * np.arange(len(motion.time)))
         cpu_time = time.process_time() - begin
         if len(motion.time) == 0:
             raise EngineError(motion.ended)
@@ -74,7 +78,7 @@ class LagrangeEngine:
             engine=self.name,
             version=self.version,
             settings=settings.model_dump(),
-            time=motion.time,
+            time=clock,
             q=motion.q,
             qd=motion.qd,
             body_position=body_positions(problem.bicycle, motion.q),
@@ -88,6 +92,8 @@ class LagrangeEngine:
             steps=motion.steps,
             cpu_time=cpu_time,
             ended=motion.ended,
+            # A step that cannot be brought back to contact ends the ride.
+            unconverged_steps=0,
         )
 
 

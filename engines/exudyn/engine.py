@@ -58,7 +58,11 @@ class ExudynEngine:
         steps_per_output(problem.times, settings.step)
 
     def step_noise(self, settings: SolverSettings) -> float:
-        """What Newton's method may leave unconverged in a step; see `engines.engine.Engine`."""
+        """What Newton's method may leave unconverged in a step; see `engines.engine.Engine`.
+
+        Its residual falls by the tolerance from the bodies' weights, which are some 1 kN: it leaves the tolerance of
+        the forces, and as many metres of gaps and of slip in a step, on a motion of some metres.
+        """
         return settings.newton_relative_tolerance
 
     def simulate(self, problem: Problem, settings: SolverSettings, progress: Progress) -> Trajectory:
@@ -84,7 +88,7 @@ class ExudynEngine:
 
     def _trajectory(self, problem: Problem, settings: SolverSettings, model: Model, outcome: Outcome) -> Trajectory:
         from .model import read_motion
-        from .results import coordinates, energies, measure_contacts
+        from .results import coordinates, energies, measure_contacts, weights
 
         motion = read_motion(model)
         contacts = measure_contacts(problem, model, motion)
@@ -96,7 +100,7 @@ class ExudynEngine:
             engine=self.name,
             version=self.version,
             settings=settings.model_dump(mode="json"),
-            time=problem.times[: len(motion.time)].copy(),
+            time=motion.time,
             q=q,
             qd=qd,
             body_position=motion.position,
@@ -110,6 +114,8 @@ class ExudynEngine:
             steps=outcome.steps,
             cpu_time=outcome.cpu_time,
             ended=outcome.ended,
+            unconverged_steps=outcome.unconverged_steps,
+            largest_residual=outcome.largest_residual / float(np.linalg.norm(weights(problem.bicycle))),
         )
 
 

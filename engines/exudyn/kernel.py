@@ -137,13 +137,16 @@ def probe(state, centre, triad, radius, function, parameters, point, frame, slip
 
 @jit
 def normals(coordinates, centres, triads, radii, function, parameters, out):
-    """Fill ``out`` (k, 3) with the surface's normals at the contacts of k wheels, again at every `next`."""
+    """Fill ``out`` (k, 3) with the surface's normals at the contacts of k wheels, again at every `next`.
+
+    A wheel without contact gets NaN, on which the engine ends: any other normal would be taken for the true one.
+    """
     while True:
         for wheel in range(radii.size):
             where = (coordinates[wheel], centres[wheel], triads[wheel], radii[wheel])
-            _, _, frame = wheel_contact(where[0], where[1], where[2], where[3], function, parameters)
+            gap, _, frame = wheel_contact(where[0], where[1], where[2], where[3], function, parameters)
             for i in range(3):
-                out[wheel, i] = frame[2][i]
+                out[wheel, i] = frame[2][i] if gap == gap else np.nan
         yield True
 
 

@@ -15,7 +15,7 @@ from reference.bicycle import BODIES, Bicycle
 from reference.kinematics import angular_velocities, body_positions, body_velocities, rotations
 
 from .settings import SolverSettings
-from .wheels import LEFT, PutOnGround, Rolling
+from .wheels import LEFT, MASS_UNIT, PutOnGround, Rolling
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ def _add_bodies(system: exu.MainSystem, problem: Problem) -> list[dict[str, Any]
     velocity, spin = body_velocities(bicycle, q, qd)[0], angular_velocities(bicycle, q, qd)[0]
     bodies = []
     for i, body in enumerate(BODIES):
-        mass: Any = bicycle.body_mass(body)
-        inertia = RigidBodyInertia(mass=mass, inertiaTensor=bicycle.inertia(body))
+        mass: Any = bicycle.body_mass(body) / MASS_UNIT
+        inertia = RigidBodyInertia(mass=mass, inertiaTensor=bicycle.inertia(body) / MASS_UNIT)
         bodies.append(
             system.CreateRigidBody(
                 name=body,
@@ -111,7 +111,7 @@ class Motion:
     Attributes
     ----------
     time : ndarray, shape (n,)
-        Sampling times [s].
+        Sampling times by the engine's own clock [s].
     position, velocity, spin : ndarray, shape (n, 4, 3)
         Of the centres of mass [m, m/s] and angular velocities [rad/s].
     rotation : ndarray, shape (n, 4, 3, 3)
@@ -125,6 +125,9 @@ class Motion:
     spin: np.ndarray
 
 
+_SIZES = {"position": 3, "velocity": 3, "rotation": 9, "spin": 3}  # of a body's sensors
+
+
 def stored(model: Model, sensor: Any) -> np.ndarray:
     """Samples of a sensor after a run, shape (n, 1 + k): time and values."""
     return np.atleast_2d(model.system.GetSensorStoredData(sensor))
@@ -132,10 +135,10 @@ def stored(model: Model, sensor: Any) -> np.ndarray:
 
 def read_motion(model: Model) -> Motion:
     """Collect the samples of the bodies' sensors after a run."""
-    values = {
-        name: np.stack([stored(model, sensors[name])[:, 1:] for sensors in model.sensors], axis=1)
-        for name in ("position", "velocity", "rotation", "spin")
-    }
-    time = stored(model, model.sensors[0]["position"])[:, 0]
-    rotation = np.ascontiguousarray(values["rotation"].reshape(len(time), 4, 3, 3))
+    time = stored(model, model.sensors[0]["position"])[:, 0].copy()
+    values = {name: np.empty((len(time), 4, size)) for name, size in _SIZES.items()}
+    for body, sensors in enumerate(model.sensors):
+        for name, where in values.items():  # one sensor's copy at a time: a long ride has many samples
+            where[:, body] = stored(model, sensors[name])[:, 1:]
+    rotation = values["rotation"].reshape(len(time), 4, 3, 3)
     return Motion(time, values["position"], values["velocity"], rotation, values["spin"])

@@ -12,7 +12,7 @@ from reference.kinematics import YAW, coordinates_from_bodies
 
 from . import kernel
 from .model import Model, Motion
-from .wheels import wheel_radii
+from .wheels import MASS_UNIT, wheel_radii
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,11 @@ def measure_contacts(problem: Problem, model: Model, motion: Motion) -> Contacts
         )
         force[:, wheel] = np.einsum("ni,nij->nj", local_forces[:, wheel], frames)
     return Contacts(point, force, gap, slip)
+
+
+def weights(bicycle: Bicycle) -> np.ndarray:
+    """Weights of the four bodies in the model's unit of force, shape (4,)."""
+    return bicycle.gravity / MASS_UNIT * np.array([bicycle.body_mass(body) for body in BODIES])
 
 
 def energies(bicycle: Bicycle, motion: Motion) -> tuple[np.ndarray, np.ndarray]:

@@ -37,11 +37,64 @@ class Integration:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Steps done, process CPU time [s], and why the integration ended early (None if it did not)."""
+    """What an integration came to.
+
+    Attributes
+    ----------
+    steps : int
+        Steps done.
+    cpu_time : float
+        Process CPU time [s].
+    ended : str or None
+        Why it ended early; None if it did not.
+    unconverged_steps : int
+        Steps done whose Newton iteration did not converge by the engine's own word.
+    largest_residual : float
+        That Newton's method left in a step done: a norm of forces and lengths, in the model's units.
+    """
 
     steps: int
     cpu_time: float
     ended: str | None
+    unconverged_steps: int
+    largest_residual: float
+
+
+class _Steps:
+    """The steps of a run, as the engine's call before every step sees them.
+
+    The call also tells the engine which steps' ends are samples. By its own period it would leave some out: it adds
+    the period up, and skips a sample once the sum is 1e-10 s too large.
+
+    Attributes
+    ----------
+    taken : int
+        Steps begun.
+    unconverged : int
+        Of those done.
+    residual : float
+        Largest that Newton's method left in a step done.
+    """
+
+    def __init__(self, solver: Any, integration: Integration) -> None:
+        self.taken, self.unconverged, self.residual = 0, 0, 0.0
+        self._convergence, self._output = solver.conv, solver.output
+        self._stride = integration.steps // integration.samples
+
+    def end(self) -> None:
+        """Take down how the step at work converged, once it is done."""
+        self.unconverged += not self._convergence.newtonConverged
+        self.residual = max(self.residual, self._convergence.residual)
+
+    def begin(self, time: float) -> None:
+        """Begin a step that leads to a time."""
+        self.taken += 1
+        if self.taken % self._stride == 0:
+            self._output.lastSensorsWritten = time
+
+    def outcome(self, done: int, cpu_time: float, ended: str | None) -> Outcome:
+        """Outcome of a run."""
+        return Outcome(done, cpu_time, ended, self.unconverged, self.residual)
 
 
 def integrate(system: exu.MainSystem, integration: Integration, progress: Progress) -> Outcome:
@@ -61,26 +114,27 @@ def integrate(system: exu.MainSystem, integration: Integration, progress: Progre
         If the engine did not come to the first step.
     """
     raised: list[BaseException] = []
-    taken = 0
     step = integration.end / integration.steps
     start: Start | None = None
+    solver: Any = exu.MainSolverImplicitSecondOrder()
+    steps = _Steps(solver, integration)
 
     with _interruptible() as interrupted:
 
-        def before_step(_system, _time):
-            nonlocal taken
+        def before_step(_system, time):
             try:
-                if taken == 0 and start is not None:
+                if steps.taken > 0:
+                    steps.end()
+                elif start is not None:
                     correct(system, start)
-                elif taken > 0 and taken % PROGRESS_STEPS == 0:
-                    progress(taken * step)
+                if steps.taken > 0 and steps.taken % PROGRESS_STEPS == 0:
+                    progress(steps.taken * step)
+                steps.begin(time)
             except BaseException as error:  # an exception must not cross the engine, which would swallow it
                 raised.append(error)
-            taken += 1
             return not (raised or interrupted.is_set())
 
         system.SetPreStepUserFunction(before_step)
-        solver: Any = exu.MainSolverImplicitSecondOrder()
         settings = simulation_settings(integration)
         cpu_time = -time.process_time()
         success = False
@@ -95,13 +149,14 @@ def integrate(system: exu.MainSystem, integration: Integration, progress: Progre
     if raised:
         raise raised[0]
     if interrupted.is_set():  # by a signal that the caller has made harmless
-        return Outcome(taken, cpu_time, "interrupted")
+        return steps.outcome(steps.taken, cpu_time, "interrupted")
     if success:
-        return Outcome(taken, cpu_time, None)
+        steps.end()
+        return steps.outcome(steps.taken, cpu_time, None)
     failure = "the Jacobian is singular" if solver.conv.linearSolverFailed else "Newton's method did not converge"
-    if taken == 0:
+    if steps.taken == 0:
         raise EngineError(f"exudyn could not start: {failure}")
-    return Outcome(max(taken - 1, 0), cpu_time, f"{failure} at t = {taken * step:.6g} s")
+    return steps.outcome(max(steps.taken - 1, 0), cpu_time, f"{failure} at t = {steps.taken * step:.6g} s")
 
 
 def simulation_settings(integration: Integration) -> exu.SimulationSettings:
@@ -109,7 +164,8 @@ def simulation_settings(integration: Integration) -> exu.SimulationSettings:
     chosen = integration.settings
     settings = exu.SimulationSettings()
     settings.solution.file.write = False
-    settings.solution.sensors.writePeriod = integration.end / integration.samples
+    # Beyond the end: after the start, no step's end is a sample but those that `_Steps` names, and the last.
+    settings.solution.sensors.writePeriod = 2 * integration.end
     # The default inverts the matrix of some fifty unknowns, which takes nearly as long as the rest of the step.
     settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
     method: Any = settings.timeIntegration
@@ -125,6 +181,8 @@ def simulation_settings(integration: Integration) -> exu.SimulationSettings:
     method.newton.modifiedNewtonJacUpdatePerStep = chosen.jacobian == "step"
     method.newton.relativeTolerance = chosen.newton_relative_tolerance
     method.newton.absoluteTolerance = chosen.newton_absolute_tolerance
+    # Else a first iterate that is worse than the start would loosen the relative tolerance.
+    method.newton.adaptInitialResidual = False
     return settings
 
 

@@ -17,6 +17,10 @@ from .joint import CreateRollingJointOnSurface, RollingJoint, slip_equations
 from .method import generalized_alpha
 from .settings import SolverSettings
 
+# Of the models, in kilograms, and so of their forces in newtons. Newton's residual is one norm of forces and of
+# lengths, measured against the bodies' weights: in kilograms it would let go of lengths a thousand times too soon.
+MASS_UNIT = 1000.0
+
 LEFT = np.array([0.0, 1.0, 0.0])
 
 Wheel = dict[str, Any]
@@ -149,4 +153,4 @@ def _watch(system: exu.MainSystem, item: Any, kind: Any) -> Any:
 
 
 def _samples(system: exu.MainSystem, sensor: Any) -> np.ndarray:
-    return np.atleast_2d(system.GetSensorStoredData(sensor))[:, 1:]
+    return MASS_UNIT * np.atleast_2d(system.GetSensorStoredData(sensor))[:, 1:]

@@ -102,14 +102,13 @@ class MujocoEngine(Generic[S]):
         module, name = self.builder.split(":")
         build: Callable[[Problem, Any], Rig] = getattr(import_module(module), name)
         recording, steps, cpu_time, ended = ride(build(problem, settings), settings.step, counts, progress)
-        time = problem.times[: len(recording.qpos)]
-        q, qd = from_mujoco(time, recording.qpos, recording.qvel, problem.q)
+        q, qd = from_mujoco(recording.time, recording.qpos, recording.qvel, problem.q)
         seen = observe(problem.bicycle, problem.surface, q, qd)
         return Trajectory(
             engine=self.name,
             version=self.version,
             settings=settings.model_dump(mode="json"),
-            time=time,
+            time=recording.time,
             q=q,
             qd=qd,
             body_position=recording.position,

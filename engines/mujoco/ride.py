@@ -36,6 +36,8 @@ class Recording:
 
     Attributes
     ----------
+    time : ndarray, shape (n,)
+        By MuJoCo's clock [s].
     qpos, qvel : ndarray, shapes (n, 10), (n, 9)
         MuJoCo's state.
     position, quaternion : ndarray, shapes (n, 4, 3), (n, 4, 4)
@@ -46,6 +48,7 @@ class Recording:
         Potential and kinetic energy [J].
     """
 
+    time: np.ndarray
     qpos: np.ndarray
     qvel: np.ndarray
     position: np.ndarray
@@ -56,7 +59,7 @@ class Recording:
     @classmethod
     def empty(cls, n: int) -> Recording:
         """Room for n samples."""
-        shapes = ((n, 10), (n, 9), (n, 4, 3), (n, 4, 4), (n, 2, 3), (n, 2))
+        shapes = ((n,), (n, 10), (n, 9), (n, 4, 3), (n, 4, 4), (n, 2, 3), (n, 2))
         return cls(*(np.zeros(shape) for shape in shapes))
 
     def first(self, n: int) -> Recording:
@@ -149,7 +152,7 @@ def record(rig: Rig, recording: Recording, k: int) -> None:
     mujoco.mj_forward(rig.model, data)
     mujoco.mj_energyPos(rig.model, data)
     mujoco.mj_energyVel(rig.model, data)
-    recording.qpos[k], recording.qvel[k] = data.qpos, data.qvel
+    recording.time[k], recording.qpos[k], recording.qvel[k] = data.time, data.qpos, data.qvel
     recording.position[k], recording.quaternion[k] = data.xipos[rig.bodies], data.xquat[rig.bodies]
     recording.energy[k] = data.energy
     rig.forces(recording.force[k])

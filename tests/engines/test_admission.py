@@ -12,7 +12,7 @@ import pytest
 
 from engines import engine as registry
 from engines.admission import ride
-from engines.engine import EngineError, Problem, Settings, Trajectory, load_engine
+from engines.engine import SHAPES, EngineError, Problem, Settings, Trajectory, load_engine
 from engines.lagrange import ENGINE, LagrangeEngine
 from reference.bicycle import Bicycle
 from reference.families import find_motion
@@ -61,7 +61,13 @@ def test_a_whole_trajectory_is_taken_as_it_is() -> None:
         ({"q": np.zeros((11, 9), complex)}, "its q is no array of floats"),
         ({"body_position": None}, "its body_position is missing"),
         ({"slip": np.zeros((11, 2))}, "its slip has shape"),
-        ({"time": np.arange(11) / 50}, "its times are not the problem's"),
+        ({"time": np.arange(11) / 50}, "its sample 1 is at 0.02 s by its own clock, not at the 0.01 s asked for: 0.01"),
+        (
+            {"time": np.arange(11) / 100 + 1e-3 * (np.arange(11) > 6)},
+            "its sample 7 is at 0.071 s by its own clock, not at the 0.07 s asked for: 0.001 s off",
+        ),
+        ({"time": np.arange(11) / 100 + 1e-12}, "its sample 0 is at 1e-12 s by its own clock"),
+        ({"time": np.where(np.arange(11) == 3, np.nan, np.arange(11) / 100)}, "its sample 3 is at nan s"),
         ({"cpu_time": float("nan")}, "its cpu_time is nan"),
         ({"unconverged_steps": -1}, "its unconverged_steps is -1; it must be a number of its "),
         ({"unconverged_steps": 10**9}, "its unconverged_steps is 1000000000; it must be a number of its "),
@@ -74,6 +80,21 @@ def test_what_is_no_trajectory_of_the_problem_is_refused(changes: dict[str, Any]
     with pytest.raises(EngineError) as caught:
         taken(replace(ridden(), **changes))
     assert words in str(caught.value)
+
+
+def test_a_clock_that_is_right_up_to_its_round_off_is_set_to_the_times_asked_for() -> None:
+    """MuJoCo adds its step up: in a hundred seconds of 1 ms that errs by some 1e-12 of them."""
+    sums = np.concatenate([[0.0], np.cumsum(np.full(100, 1e-3))])[::10]
+    assert not np.array_equal(sums, problem().times)
+    assert np.array_equal(taken(replace(ridden(), time=sums)).time, problem().times)
+
+
+def test_more_samples_than_asked_for_are_refused() -> None:
+    longer = {
+        name: np.concatenate([value, value[-1:]]) for name in SHAPES if (value := getattr(ridden(), name)) is not None
+    }
+    with pytest.raises(EngineError, match="it gives 12 samples; 11 are asked for"):
+        taken(replace(ridden(), **longer))
 
 
 def test_other_things_are_refused() -> None:
