@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 import reports
-from engines.engine import Engine, Settings, UnsuitableProblem
-from reports.drift import Verdict, judge, missing
+from engines.engine import Engine, Settings, UnsuitableProblem, why_failed
+from engines.guard import call_engine
+from reports.drift import CHANGES, Verdict, judge, missing
 
 from .error import ScenarioError
 from .files import make_folder, write_json
 from .gate_sample import SHORT_HORIZON, sample
 from .installed import installed
 from .run_folder import library_versions
-from .runner import Watch, configure
+from .runner import Trace, Watch, configure
 from .scenario import OF_THE_MOTION, Scenario, library_names, load_scenario
 from .start import make_start
 from .stored import read_json
@@ -68,8 +71,12 @@ def check(
     engines: Sequence[str] | None = None,
     baselines: Path | None = None,
     chosen: Chosen = configure,
+    trace: Trace | None = None,
 ) -> tuple[list[tuple[str, Verdict]], dict[str, dict[str, Any]]]:
     """Run the gate.
+
+    Every engine has a verdict on every scenario, but for engines that were not asked for, have no baseline and are
+    not made for the motion: one that exits, breaks or is not judged for any other reason did not run, and fails.
 
     Parameters
     ----------
@@ -83,6 +90,8 @@ def check(
         Folder of the baselines; the suite's own if not given.
     chosen : callable
         Maps an engine's name and its settings in the scenario to the engine and its settings.
+    trace : callable, optional
+        Called with an engine that broke and what it raised.
 
     Returns
     -------
@@ -103,15 +112,15 @@ def check(
     verdicts: list[tuple[str, Verdict]] = []
     fresh: dict[str, dict[str, Any]] = {}
     for name, scenario in scenarios:
-        found, entries = _held(name, scenario, judged, known[name], watch, chosen, asked=bool(engines))
-        verdicts += [(name, verdict) for verdict in found]
+        held = _hold(name, scenario, judged, known[name], watch, chosen, trace, asked=bool(engines))
+        verdicts += [(name, verdict) for verdict in [*held.verdicts, *_without_verdict(judged, held)]]
         fresh[name] = {
             "scenario": name,
             "duration": DURATION,
             "short_horizon": SHORT_HORIZON,
             "content": content(scenario),
             "libraries": library_versions(),
-            "engines": entries,
+            "engines": held.entries,
         }
     if not verdicts:
         raise ScenarioError("nothing was judged: no engine and no scenario go together")
@@ -128,36 +137,51 @@ def _to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[str, Any
     return [name for name in names if not wanted or name in wanted]
 
 
-def _held(
+@dataclass(frozen=True)
+class _Held:
+    """What came of all engines on one scenario: verdicts, entries of a new baseline, engines that were passed over."""
+
+    verdicts: list[Verdict]
+    entries: dict[str, Any]
+    passed_over: list[str]
+
+
+def _hold(
     name: str,
     scenario: Scenario,
     engines: Sequence[str],
     baseline: Mapping[str, Any],
     watch: Watch,
     chosen: Chosen,
+    trace: Trace | None,
     asked: bool,
-) -> tuple[list[Verdict], dict[str, Any]]:
-    """Verdicts on the engines on one scenario, and their entries of a new baseline.
+) -> _Held:
+    """Hold the engines on one scenario against the baseline.
 
     An engine that the motion does not suit is passed over, unless it was ``asked`` for or has a baseline.
     """
     start = make_start(scenario)
     if start.motion is None:
         raise ScenarioError(f"{name}: only a circular motion can be gated: its exact solution is known")
-    verdicts: list[Verdict] = []
-    entries: dict[str, Any] = {}
+    held = _Held([], {}, [])
     for engine_name in engines:
         entry = baseline.get(engine_name)
         try:
             engine, settings = chosen(engine_name, scenario.engines.get(engine_name, {}))
             known_noise = (entry or {}).get("step_noise")
-            found = sample(start, engine, settings, lambda t, e=engine_name: watch(e, t, DURATION), known_noise)
+            progress = partial(_report, watch, engine_name)
+            found = call_engine(sample, start, engine, settings, progress, known_noise)
         except Exception as error:  # an engine that breaks in any way did not run
             if entry is None and not asked and isinstance(error, UnsuitableProblem):
+                held.passed_over.append(engine_name)
                 continue
-            verdicts.append(missing(engine_name, f"did not run: {' '.join(str(error).split())}"))
+            own_words = isinstance(error, ScenarioError | UnsuitableProblem)
+            why = " ".join(str(error).split()) if own_words else why_failed(error)
+            held.verdicts.append(missing(engine_name, f"did not run: {why}"))
+            if trace is not None:
+                trace(engine_name, error)
             continue
-        entries[engine_name] = {
+        held.entries[engine_name] = {
             "created": datetime.now(UTC).date().isoformat(),
             "version": found.version,
             "settings": found.settings,
@@ -166,8 +190,19 @@ def _held(
             "quantities": found.values,
         }
         run = (found.settings, found.version, found.reasons)
-        verdicts += judge(engine_name, found.values, entry, found.limits, *run)
-    return verdicts, entries
+        held.verdicts.extend(judge(engine_name, found.values, entry, found.limits, *run))
+    return held
+
+
+def _report(watch: Watch, engine: str, time: float) -> None:
+    watch(engine, time, DURATION)
+
+
+def _without_verdict(engines: Sequence[str], held: _Held) -> list[Verdict]:
+    """Verdicts on engines that should have been judged and were not: nothing that is known of them holds."""
+    judged = {verdict.engine for verdict in held.verdicts if verdict.quantity != CHANGES}
+    expected = [name for name in engines if name not in held.passed_over]
+    return [missing(name, "did not run: none of its quantities was judged") for name in expected if name not in judged]
 
 
 def content(scenario: Scenario) -> dict[str, Any]:

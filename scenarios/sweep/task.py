@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from engines.admission import ride
-from engines.engine import REFERENCE, Engine, Settings, Trajectory
+from engines.engine import REFERENCE, Engine, Settings, Trajectory, why_failed
+from engines.guard import call_engine
 from scenarios.error import ScenarioError
-from scenarios.runner import configure, measure_one, why_failed
+from scenarios.runner import configure, measure_one
 from scenarios.scenario import OF_THE_MOTION, Scenario, validate
 from scenarios.start import Start, make_start
 from scenarios.table import placed
@@ -59,7 +60,7 @@ class Tasks:
         begin = time.process_time()
         timing: dict[str, Any] = {}
         try:
-            row = self._ride(engine, changes, timing)
+            row = call_engine(self._ride, engine, changes, timing)
         except Exception as error:  # whatever an engine raises is one row that says so
             row = _broken(error)
         timing["task_time"] = time.process_time() - begin

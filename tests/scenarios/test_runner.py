@@ -134,7 +134,7 @@ def test_an_older_run_is_never_touched(tmp_path: Path) -> None:
     ("error", "words"),
     [
         (EngineError("no contact at the start"), "no contact at the start"),
-        (ZeroDivisionError("division by\nzero"), "ZeroDivisionError: division by zero"),
+        (ZeroDivisionError("division by\nzero"), "ZeroDivisionError: division by zero (altered.py:59)"),
         (MemoryError(), "MemoryError:"),
     ],
 )
