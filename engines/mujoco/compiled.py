@@ -56,13 +56,38 @@ BLACKBOARD = np.dtype(
         ("qvel", _ADDRESS),
         ("geom_xpos", _ADDRESS),
         ("geom_xmat", _ADDRESS),
+        ("qacc", _ADDRESS),
+        ("qacc_smooth", _ADDRESS),
+        ("qacc_warmstart", _ADDRESS),
         ("qfrc_bias", _ADDRESS),
         ("qfrc_passive", _ADDRESS),
         ("qfrc_applied", _ADDRESS),
+        ("qfrc_smooth", _ADDRESS),
+        ("qfrc_constraint", _ADDRESS),
+        ("M", _ADDRESS),
+        ("M_rownnz", _ADDRESS),
+        ("M_rowadr", _ADDRESS),
+        ("M_colind", _ADDRESS),
+        ("M_entries", np.int64),
+        # The inertia of the last evaluation, whose solution is judged when the next one begins.
+        ("kept_M", _ADDRESS),
+        ("pending", np.int64),
+        # What the judge counts: evaluations since a step that Python knows, and the steps that were left unconverged.
+        ("evaluations", np.int64),
+        ("evaluations_per_step", np.int64),
+        ("since_step", np.int64),
+        ("converged_below", np.float64),
+        ("wrong_above", np.float64),
+        ("unconverged", np.int64),
+        ("last_unconverged", np.int64),
+        ("largest_residual", np.float64),
+        ("wrong_step", np.int64),  # -1 if there is none
+        ("wrong_residual", np.float64),
         # Where the state keeps what does move, and where a contact keeps its parts.
         ("ncon_at", np.int64),
         ("contact_at", np.int64),
         ("efc_aref_at", np.int64),
+        ("efc_R_at", np.int64),
         ("efc_KBIP_at", np.int64),
         ("contact_size", np.int64),
         ("frame_at", np.int64),
@@ -98,7 +123,7 @@ def _where_the_board_is():
 
 
 llvm.add_symbol(_WHERE, _where_the_board_is.address)
-announce("mj_jac", "mj_jacDot", "mj_solveM")
+announce("mj_jac", "mj_jacDot", "mj_solveM", "mj_fwdActuation", "mj_fwdAcceleration")
 
 _pointer = types.voidptr
 _numbers = types.CPointer(types.float64)
@@ -108,6 +133,8 @@ _jac_dot = types.ExternalFunction(
     "mj_jacDot", types.void(_pointer, _pointer, _numbers, _numbers, _numbers, types.int32)
 )
 _solve_mass = types.ExternalFunction("mj_solveM", types.void(_pointer, _pointer, _numbers, _numbers, types.int32))
+_actuation = types.ExternalFunction("mj_fwdActuation", types.void(_pointer, _pointer))
+_acceleration = types.ExternalFunction("mj_fwdAcceleration", types.void(_pointer, _pointer))
 _SURFACE = types.FunctionType(
     types.UniTuple(types.float64, 6)(types.float64, types.float64, types.Array(types.float64, 1, "C"))
 )
@@ -154,6 +181,11 @@ def _address_of(typing, pointer):
 @jit
 def _reals(address, count):
     return carray(_pointer_at(address), (count,), np.float64)
+
+
+@jit
+def _integers(address, count):
+    return carray(_pointer_at(address), (count,), np.int32)
 
 
 @jit
@@ -283,51 +315,196 @@ def _wheel_of(board, geom, ground):
 
 
 @jit
-def _correct_rows(board, contact_at, first_row, aref, kbip, gamma):
-    """Subtract gamma from the reference accelerations of one contact, and the margin from its distance."""
-    frame = _reals(contact_at + board.frame_at, 9)
+def _row_axes(board, contact_at):
+    """Directions (3 or 4, 3) of MuJoCo's rows of one contact: normal and tangents, or the edges of a pyramid."""
+    frame, friction = _reals(contact_at + board.frame_at, 9), _reals(contact_at + board.friction_at, 2)
+    axes = np.empty((4 if board.pyramidal else 3, 3))
+    for j in range(3):
+        if board.pyramidal:
+            for i in range(2):
+                for side in range(2):
+                    axes[2 * i + side, j] = frame[j] + (1 - 2 * side) * friction[i] * frame[3 * (i + 1) + j]
+        else:
+            for i in range(3):
+                axes[i, j] = frame[3 * i + j]
+    return axes
+
+
+@jit
+def _correct_rows(board, contact_at, first_row, aref, kbip, along):
+    """Subtract gamma along each row from one contact's reference accelerations, and the margin from its distance."""
     margin = _reals(contact_at + board.margin_at, 1)[0]
-    along = np.zeros(3)
-    for i in range(3):
-        for j in range(3):
-            along[i] += frame[3 * i + j] * gamma[j]
     # MuJoCo holds a wheel at its margin; it shall touch.
     stiffness = kbip[4 * first_row] * kbip[4 * first_row + 2]
-    if board.pyramidal:
-        friction = _reals(contact_at + board.friction_at, 2)
-        for i in range(2):
-            for side in range(2):
-                sign = 1 - 2 * side
-                aref[first_row + 2 * i + side] -= along[0] + sign * friction[i] * along[1 + i] + stiffness * margin
+    for i in range(len(along)):
+        aref[first_row + i] -= along[i]
+        if i == 0 or board.pyramidal:
+            aref[first_row + i] -= stiffness * margin
+
+
+@jit
+def _kept_mass(board):
+    """Inertia (n, n) of the last evaluation."""
+    n = board.speeds
+    stored, column = _reals(board.kept_M, board.M_entries), _integers(board.M_colind, board.M_entries)
+    count, first = _integers(board.M_rownnz, n), _integers(board.M_rowadr, n)
+    mass = np.zeros((n, n))
+    for i in range(n):
+        for at in range(first[i], first[i] + count[i]):
+            mass[i, column[at]] = mass[column[at], i] = stored[at]
+    return mass
+
+
+@jit
+def _size(factors, force, n):
+    """f^T M^-1 f of a force (n,) from the factors of M; the force is overwritten."""
+    total = 0.0
+    for i in range(n):
+        for k in range(i):
+            force[i] -= factors[i, k] * force[k]
+        total += force[i] * force[i] / factors[i, i]
+    return total
+
+
+@jit
+def _left(board, mass, factors, acceleration):
+    """Size of the gradient M (a - a_smooth) - qfrc_constraint at an acceleration (n,)."""
+    n = board.speeds
+    smooth, force, left = _reals(board.qacc_smooth, n), _reals(board.qfrc_constraint, n), np.empty(n)
+    for i in range(n):
+        left[i] = -force[i]
+        for j in range(n):
+            left[i] += mass[i, j] * (acceleration[j] - smooth[j])
+    return _size(factors, left, n)
+
+
+@jit
+def _residual(board):
+    """What MuJoCo's solver left of the last evaluation, relative to the forces."""
+    n = board.speeds
+    mass = _kept_mass(board)
+    factors = mass.copy()
+    factorise(factors, n)
+    smooth, free, pushed = _reals(board.qacc_smooth, n), _reals(board.qfrc_smooth, n), np.empty(n)
+    scale = 0.0
+    for i in range(n):
+        pushed[i] = _reals(board.qfrc_constraint, n)[i]
+        scale += smooth[i] * free[i]
+    scale = max(scale, _size(factors, pushed, n))
+    if not scale > 0:
+        return 0.0
+    left = _left(board, mass, factors, _reals(board.qacc, n))
+    if not left <= board.converged_below**2 * scale:
+        # After a step of RK4 qacc is the mean of its stages; the last stage's own is where the warm start comes from.
+        left = min(left, _left(board, mass, factors, _reals(board.qacc_warmstart, n)))
+    return np.sqrt(left / scale)
+
+
+@jit
+def _judge(board):
+    """Judge what the solver made of the last evaluation, if nobody has; what is infinite is judged elsewhere."""
+    if board.pending == 0:
         return
-    aref[first_row] -= along[0] + stiffness * margin
-    aref[first_row + 1] -= along[1]
-    aref[first_row + 2] -= along[2]
+    board.pending = 0
+    step = board.since_step + board.evaluations // board.evaluations_per_step
+    board.evaluations += 1
+    residual = _residual(board)
+    if not np.isfinite(residual):
+        return
+    board.largest_residual = max(board.largest_residual, residual)
+    if residual > board.converged_below and step != board.last_unconverged:
+        board.unconverged += 1
+        board.last_unconverged = step
+    if residual > board.wrong_above and board.wrong_step < 0:
+        board.wrong_step, board.wrong_residual = step, residual
+
+
+@jit
+def _keep(board):
+    """Keep of this evaluation what the judge needs and MuJoCo will overwrite."""
+    now, kept = _reals(board.M, board.M_entries), _reals(board.kept_M, board.M_entries)
+    for i in range(board.M_entries):
+        kept[i] = now[i]
+    board.pending = 1
+
+
+@jit
+def judge(boards):
+    """Judge the last evaluation on a blackboard (1,) if no later one has."""
+    _judge(boards[0])
+
+
+@cfunc(CONTROL, cache=True, error_model="numpy")
+def watch(model, data):
+    """Control callback: look at what MuJoCo's solver leaves unconverged, and change nothing."""
+    board = _blackboard()
+    if _is_for(board, model, data):
+        _judge(board)
+        _keep(board)
+
+
+@jit
+def _start_sticking(board, model, data, rows, softness, target):
+    """Let MuJoCo's solver start where all these rows (k, n) act, as on wheels that neither slide nor lift off.
+
+    The start's forces are those of the rows' own softness (k,) and reference accelerations (k,):
+
+        (J M^-1 J^T + R) F = aref - J a,    M a = all forces but the contacts'
+    """
+    n, size = board.speeds, len(target)
+    # MuJoCo computes the same again after this callback.
+    _actuation(model, data)
+    _acceleration(model, data)
+    smooth, start = _reals(board.qacc_smooth, n), _reals(board.qacc_warmstart, n)
+    spread, force = np.empty((size, n)), target.copy()
+    _solve_mass(model, data, spread.ctypes, rows.ctypes, types.int32(size))
+    schur = rows @ spread.T
+    for i in range(size):
+        schur[i, i] += softness[i]
+        for j in range(n):
+            force[i] -= rows[i, j] * smooth[j]
+    factorise(schur, size)
+    solve_factorised(schur, force, size)
+    for j in range(n):
+        start[j] = smooth[j]
+        for i in range(size):
+            start[j] += spread[i, j] * force[i]
 
 
 @cfunc(CONTROL, cache=True, error_model="numpy")
 def correct(model, data):
-    """Control callback: bring the contacts' own acceleration into MuJoCo's reference accelerations."""
+    """Control callback: bring the contacts' own acceleration into MuJoCo's reference accelerations.
+
+    It also gives MuJoCo's solver its start, and judges how the last evaluation's solution turned out.
+    """
     board = _blackboard()
     if not _is_for(board, model, data):
         return
-    base = _address_of(data)
-    count = _integer(base + types.uintp(board.ncon_at))
-    if count == 0:
-        return
+    _judge(board)
+    _keep(board)
+    base, n = _address_of(data), board.speeds
+    each, used = 4 if board.pyramidal else 3, 0
     contacts = _stored(base + types.uintp(board.contact_at))
-    rows, turning = np.empty((3, board.speeds)), np.empty((3, board.speeds))
-    for i in range(count):
+    velocities, turning = np.empty((3, n)), np.empty((3, n))
+    rows, numbers = np.empty((each * board.wheels, n)), np.empty((2, each * board.wheels))
+    for i in range(_integer(base + types.uintp(board.ncon_at))):
         contact_at = contacts + types.uintp(i * board.contact_size)
         pair = contact_at + types.uintp(board.geom_at)
         k = _wheel_of(board, _integer(pair + types.uintp(4)), _integer(pair))
-        first_row = _integer(contact_at + types.uintp(board.row_at))
-        if k < 0 or first_row < 0:
+        first = _integer(contact_at + types.uintp(board.row_at))
+        if k < 0 or first < 0:
             continue
-        aref = _reals(_stored(base + types.uintp(board.efc_aref_at)), first_row + 4)
-        kbip = _reals(_stored(base + types.uintp(board.efc_KBIP_at)), 4 * first_row + 4)
-        _, _, gamma = _motion(board, k, model, data, rows, turning)
-        _correct_rows(board, contact_at, first_row, aref, kbip, gamma)
+        aref = _reals(_stored(base + types.uintp(board.efc_aref_at)), first + each)
+        kbip = _reals(_stored(base + types.uintp(board.efc_KBIP_at)), 4 * first + 4)
+        softness = _reals(_stored(base + types.uintp(board.efc_R_at)), first + each)
+        _, _, gamma = _motion(board, k, model, data, velocities, turning)
+        axes = _row_axes(board, contact_at)
+        _correct_rows(board, contact_at, first, aref, kbip, axes @ np.array(gamma))
+        rows[used : used + each] = axes @ velocities
+        numbers[0, used : used + each], numbers[1, used : used + each] = softness[first:], aref[first:]
+        used += each
+    if used > 0:
+        _start_sticking(board, model, data, rows[:used], numbers[0, :used], numbers[1, :used])
 
 
 @cfunc(CONTROL, cache=True, error_model="numpy")

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from engines.engine import Problem
-from engines.mujoco.knife_edge import knife_edges, pressing_forces, rolling_forces, standing, stiffen
+from engines.mujoco.knife_edge import pressing_forces, rolling_forces, standing, stiffen, watched_edges
 from engines.mujoco.ride import Rig, bodies, contact_forces, look_stride, start, wheel_geoms
 from engines.mujoco.settings import ExactContactSettings, MultiplierSettings
 from reference.kinematics import WHEELS
@@ -37,7 +37,8 @@ def build_contacts(problem: Problem, settings: ExactContactSettings) -> Rig:
         follow=standing,
         stride=look_stride(settings.step),
         forces=partial(contact_forces, model, data, wheels),
-        callbacks=lambda: knife_edges(model, data, problem.surface, GROUNDS),
+        callbacks=lambda: watched_edges(model, data, problem.surface, GROUNDS, settings.converged_below),
+        judged=settings.noslip_iterations == 0,
     )
 
 

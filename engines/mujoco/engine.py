@@ -101,7 +101,8 @@ class MujocoEngine(Generic[S]):
 
         module, name = self.builder.split(":")
         build: Callable[[Problem, Any], Rig] = getattr(import_module(module), name)
-        recording, steps, cpu_time, ended = ride(build(problem, settings), settings.step, counts, progress)
+        ridden = ride(build(problem, settings), settings.step, counts, progress)
+        recording = ridden.recording
         q, qd = from_mujoco(recording.time, recording.qpos, recording.qvel, problem.q)
         seen = observe(problem.bicycle, problem.surface, q, qd)
         return Trajectory(
@@ -119,8 +120,10 @@ class MujocoEngine(Generic[S]):
             slip=seen.slip if seen.found else None,
             kinetic_energy=recording.energy[:, 1],
             potential_energy=recording.energy[:, 0],
-            steps=steps,
-            cpu_time=cpu_time,
-            ended=ended,
+            steps=ridden.steps,
+            cpu_time=ridden.cpu_time,
+            ended=ridden.ended,
             friction=settings.least_friction,
+            unconverged_steps=ridden.unconverged_steps,
+            largest_residual=ridden.largest_residual,
         )

@@ -35,13 +35,14 @@ import numpy as np
 from engines.engine import EngineError
 from engines.mujoco import compiled, layout
 from engines.mujoco.callbacks import installed
+from engines.mujoco.convergence import WRONG, Convergence, judged, share
 from reference.surface import Surface
 
 
 @contextmanager
 def knife_edges(
     model: mujoco.MjModel, data: mujoco.MjData, surface: Surface, wheels: Mapping[str, str]
-) -> Iterator[None]:
+) -> Iterator[Convergence]:
     """Let wheels touch a surface as knife edges do.
 
     Parameters
@@ -54,26 +55,60 @@ def knife_edges(
     wheels : mapping
         Name of each wheel's geom to the name of its plane.
 
+    Yields
+    ------
+    Convergence
+        What MuJoCo's solver has left unconverged so far. With ``noslip_iterations`` it cannot be known.
+
     Raises
     ------
     ValueError
         If a geom or pair is missing or of the wrong kind.
     EngineError
-        If callbacks are in use already, or this version of MuJoCo is built otherwise.
+        If callbacks are in use already, or this version of MuJoCo is built otherwise; at the end of the block, if
+        MuJoCo's solver ever gave forces that are wrong by more than `convergence.WRONG`.
+    """
+    with watched_edges(model, data, surface, wheels, WRONG) as convergence:
+        yield convergence
+        convergence.look()
+        if convergence.wrong is not None:
+            raise EngineError(f"MuJoCo's contact solver stopped unconverged: {share(convergence.wrong[1])}")
+
+
+@contextmanager
+def watched_edges(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    surface: Surface,
+    wheels: Mapping[str, str],
+    converged_below: float,
+) -> Iterator[Convergence]:
+    """Let wheels touch as in `knife_edges`, and leave it to the caller to look at what the solver left.
+
+    Parameters
+    ----------
+    model, data, surface, wheels
+        As in `knife_edges`.
+    converged_below : float
+        Relative residual up to which a step counts as converged.
     """
     _check_pairs(model, wheels)
-    with installed(compiled.correct, compiled.touch), _written(model, data, surface, wheels, 0.0):
-        yield
+    with (
+        installed(compiled.correct, compiled.touch),
+        _written(model, surface, wheels),
+        judged(model, data, converged_below) as convergence,
+    ):
+        yield convergence
 
 
 @contextmanager
 def rolling_forces(
     model: mujoco.MjModel, data: mujoco.MjData, surface: Surface, wheels: Mapping[str, str], stabilisation: float
-) -> Iterator[None]:
+) -> Iterator[Convergence]:
     """Let the exact forces of rolling without slip act on wheels, instead of MuJoCo's contacts.
 
     They are solved from MuJoCo's own mass matrix and bias forces in every evaluation of the dynamics, and
-    put into ``qfrc_applied``. Ground and wheel are bilateral: nothing lifts off or slides.
+    put into ``qfrc_applied``. Ground and wheel are bilateral: nothing lifts off or slides, and nothing iterates.
 
     Parameters
     ----------
@@ -82,8 +117,12 @@ def rolling_forces(
     stabilisation : float
         Rate at which gaps and slip are brought back to zero [1/s].
     """
-    with installed(compiled.press), _written(model, data, surface, wheels, stabilisation):
-        yield
+    with (
+        installed(compiled.press),
+        _written(model, surface, wheels, stabilisation),
+        judged(model, data, WRONG) as convergence,
+    ):
+        yield convergence
 
 
 def standing() -> bool:
@@ -131,9 +170,9 @@ def _check_pairs(model: mujoco.MjModel, wheels: Mapping[str, str]) -> None:
 
 @contextmanager
 def _written(
-    model: mujoco.MjModel, data: mujoco.MjData, surface: Surface, wheels: Mapping[str, str], stabilisation: float
+    model: mujoco.MjModel, surface: Surface, wheels: Mapping[str, str], stabilisation: float = 0.0
 ) -> Iterator[None]:
-    """Write the blackboard, and wipe it at the end; what it points to lives as long as the block."""
+    """Write wheels and ground on the blackboard; what it points to lives as long as the block."""
     if not 0 < len(wheels) <= compiled.WHEELS:
         raise ValueError(f"there are {len(wheels)} wheels; there must be 1 to {compiled.WHEELS}")
     found, function, parameters = layout.find(), surface.function.real, np.ascontiguousarray(surface.parameters, float)
@@ -143,9 +182,7 @@ def _written(
         parameters.ctypes.data,
         len(parameters),
     )
-    for name in ("qvel", "geom_xpos", "geom_xmat", "qfrc_bias", "qfrc_passive", "qfrc_applied"):
-        board[name] = getattr(data, name).ctypes.data
-    for name in ("ncon", "contact", "efc_aref", "efc_KBIP"):
+    for name in ("ncon", "contact", "efc_aref", "efc_KBIP", "efc_R"):
         board[f"{name}_at"] = found.data[name]
     for name, field in (
         ("frame", "frame"),
@@ -155,14 +192,10 @@ def _written(
         ("row", "efc_address"),
     ):
         board[f"{name}_at"] = found.contact[field]
-    board["contact_size"], board["speeds"], board["stabilisation"] = found.contact_size, model.nv, stabilisation
+    board["contact_size"], board["stabilisation"] = found.contact_size, stabilisation
     board["pyramidal"] = model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
     _write_wheels(board, model, wheels)
-    board["model"], board["data"] = model._address, data._address
-    try:
-        yield
-    finally:
-        board["model"] = board["data"] = 0
+    yield
 
 
 def _write_wheels(board: np.void, model: mujoco.MjModel, wheels: Mapping[str, str]) -> None:

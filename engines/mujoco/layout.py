@@ -39,6 +39,8 @@ _CALLED = {
     "mj_jac": "const mjModel * | const mjData * | mjtNum * | mjtNum * | const mjtNum [3] | int",
     "mj_jacDot": "const mjModel * | const mjData * | mjtNum * | mjtNum * | const mjtNum [3] | int",
     "mj_solveM": "const mjModel * | mjData * | mjtNum * | const mjtNum * | int",
+    "mj_fwdActuation": "const mjModel * | mjData *",
+    "mj_fwdAcceleration": "const mjModel * | mjData *",
 }
 _PRE_CONTACT = {"dist": 0, "pos": 8, "normal": 32, "tangent": 56}
 # Two spheres sunk into a plane, and far from it: with contacts and without.
@@ -120,7 +122,12 @@ def _check_state(layout: Layout, data: mujoco.MjData) -> None:
             raise _moved(name)
     views = {"qpos": data.qpos, "qvel": data.qvel, "geom_xpos": data.geom_xpos}
     if data.nefc:
-        views |= {"efc_aref": data.efc_aref, "efc_KBIP": data.efc_KBIP, "contact": data.contact.dist}
+        views |= {
+            "efc_aref": data.efc_aref,
+            "efc_KBIP": data.efc_KBIP,
+            "efc_R": data.efc_R,
+            "contact": data.contact.dist,
+        }
     for name, view in views.items():
         if ctypes.c_void_p.from_address(base + layout.data[name]).value != view.ctypes.data:
             raise _moved(name)

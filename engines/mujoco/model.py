@@ -91,8 +91,7 @@ def _options(root: Element, bicycle: Bicycle, settings: StepSettings) -> None:
             "impratio": _text(settings.impratio),
             "tolerance": _text(settings.tolerance),
             "noslip_iterations": str(settings.noslip_iterations),
-            "ls_iterations": str(settings.line_search),
-        }
+        } | {name: str(value) for name, value in settings.solver_options.items()}
     option = SubElement(root, "option", options)
     # An unstable run must end as one, not start again from the model's initial state.
     SubElement(option, "flag", autoreset="disable")

@@ -11,6 +11,7 @@ import numpy as np
 from numba import typeof
 
 from engines.engine import EngineError, Problem
+from engines.mujoco.convergence import watched
 from engines.mujoco.ride import Rig, bodies, contact_forces, look_stride, start, wheel_geoms
 from engines.mujoco.settings import ContactSettings
 from engines.mujoco.tangent import place
@@ -49,4 +50,6 @@ def build(problem: Problem, settings: ContactSettings) -> Rig:
         follow=follow,
         stride=1 if moving else look_stride(settings.step),
         forces=partial(contact_forces, model, data, wheels),
+        callbacks=lambda: watched(model, data, settings.converged_below),
+        judged=settings.noslip_iterations == 0,
     )

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from time import process_time
 
@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from engines.engine import EngineError, Problem, Progress
+from engines.mujoco.convergence import Convergence, share
 from engines.mujoco.model import Touching, mjcf
 from engines.mujoco.settings import StepSettings
 from engines.mujoco.state import to_mujoco
@@ -86,7 +87,9 @@ class Rig:
     forces : callable
         Fills an array (2, 3) with the contact forces of the last evaluation, inertial axes [N].
     callbacks : callable
-        Gives the context in which the model may be stepped.
+        Gives the context in which the model may be stepped, with what is seen of the solver's convergence.
+    judged : bool
+        Whether that is all there is to see: after MuJoCo's noslip pass nobody can tell.
     """
 
     model: mujoco.MjModel
@@ -96,7 +99,35 @@ class Rig:
     follow: Callable[[], bool]
     stride: int
     forces: Callable[[np.ndarray], None]
-    callbacks: Callable[[], AbstractContextManager[None]] = nullcontext
+    callbacks: Callable[[], AbstractContextManager[Convergence]]
+    judged: bool = True
+
+
+@dataclass(frozen=True)
+class Ride:
+    """What became of a ride.
+
+    Attributes
+    ----------
+    recording : Recording
+        As many samples as were reached.
+    steps : int
+    cpu_time : float
+        Process CPU time of the steps [s].
+    ended : str or None
+        Why the ride ended early.
+    unconverged_steps : int or None
+        Steps in which MuJoCo's contact solver stopped before it had converged; None where nobody can tell.
+    largest_residual : float or None
+        The most that it left, relative to the forces; None also where there is no solver.
+    """
+
+    recording: Recording
+    steps: int
+    cpu_time: float
+    ended: str | None
+    unconverged_steps: int | None
+    largest_residual: float | None
 
 
 def start(problem: Problem, settings: StepSettings, touching: Touching) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -166,6 +197,15 @@ def trouble(data: mujoco.MjData, standing: bool) -> str | None:
     return None if standing else "a wheel lies flat or has no contact point with the surface"
 
 
+def unconverged(convergence: Convergence, step: float) -> str | None:
+    """Where MuJoCo's contact solver gave forces that are none; None if it did not."""
+    convergence.look()
+    if convergence.wrong is None:
+        return None
+    steps, residual = convergence.wrong
+    return f"MuJoCo's contact solver stopped unconverged at {steps * step:.6g} s: {share(residual)}"
+
+
 def advance(rig: Rig, steps: int, until: int) -> tuple[int, bool]:
     """Go on from ``steps`` to ``until`` steps, or as far as there is ground; returns the steps and whether there is."""
     while steps < until:
@@ -188,7 +228,7 @@ def silent() -> Iterator[None]:
         mujoco.set_mju_user_warning(previous)
 
 
-def ride(rig: Rig, step: float, counts: list[int], progress: Progress) -> tuple[Recording, int, float, str | None]:
+def ride(rig: Rig, step: float, counts: list[int], progress: Progress) -> Ride:
     """Integrate from the state that a rig is in.
 
     Parameters
@@ -200,39 +240,55 @@ def ride(rig: Rig, step: float, counts: list[int], progress: Progress) -> tuple[
         Steps from the start to each output time.
     progress : callable
 
-    Returns
-    -------
-    Recording
-        As many samples as were reached.
-    steps : int
-    cpu_time : float
-        Process CPU time of the steps [s].
-    ended : str or None
-        Why the ride ended early.
-
     Raises
     ------
     EngineError
-        If a wheel stands nowhere at the start.
+        If a wheel stands nowhere at the start, or MuJoCo's contact solver fails there.
     """
     recording = Recording.empty(len(counts))
-    steps, cpu_time, reported = 0, 0.0, 0
-    most = max(1, int(REPORT_INTERVAL / step))
-    with silent(), rig.callbacks():
+    with silent(), rig.callbacks() as convergence:
         mujoco.mj_forward(rig.model, rig.data)
         if not rig.follow():
             raise EngineError("a wheel has no contact point with the surface at the start")
         record(rig, recording, 0)
-        for k in range(1, len(counts)):
-            while steps < counts[k]:
-                begun = process_time()
-                steps, standing = advance(rig, steps, min(steps + most, counts[k]))
-                cpu_time += process_time() - begun
-                ended = trouble(rig.data, standing)
-                if ended is not None:
-                    return recording.first(k), steps, cpu_time, f"{ended} at {steps * step:.6g} s"
-                if steps - reported >= most:
-                    reported = steps
-                    progress(steps * step)
-            record(rig, recording, k)
-    return recording, steps, cpu_time, None
+        ended = unconverged(convergence, step)
+        if ended is not None:
+            raise EngineError(ended)
+        samples, steps, cpu_time, ended = _go_on(rig, step, counts, progress, recording, convergence)
+        return Ride(
+            recording=recording.first(samples),
+            steps=steps,
+            cpu_time=cpu_time,
+            ended=ended,
+            # The last sample is evaluated too, and begins a step that is not taken.
+            unconverged_steps=min(convergence.unconverged, steps) if rig.judged else None,
+            largest_residual=convergence.largest if rig.judged else None,
+        )
+
+
+def _go_on(
+    rig: Rig, step: float, counts: list[int], progress: Progress, recording: Recording, convergence: Convergence
+) -> tuple[int, int, float, str | None]:
+    """Ride on from the first sample; return the samples, the steps, their CPU time [s] and why it ended early."""
+    steps, cpu_time, reported = 0, 0.0, 0
+    most = max(1, int(REPORT_INTERVAL / step))
+    for k in range(1, len(counts)):
+        while steps < counts[k]:
+            convergence.begin(steps)
+            begun = process_time()
+            steps, standing = advance(rig, steps, min(steps + most, counts[k]))
+            cpu_time += process_time() - begun
+            ended = trouble(rig.data, standing)
+            # A solver that has failed may be why the state is as it is.
+            if (stopped := unconverged(convergence, step)) is not None:
+                return k, steps, cpu_time, stopped
+            if ended is not None:
+                return k, steps, cpu_time, f"{ended} at {steps * step:.6g} s"
+            if steps - reported >= most:
+                reported = steps
+                progress(steps * step)
+        convergence.begin(steps)
+        record(rig, recording, k)
+        if (stopped := unconverged(convergence, step)) is not None:
+            return k, steps, cpu_time, stopped
+    return len(counts), steps, cpu_time, None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -22,6 +23,10 @@ IMPEDANCES = (0.9, 0.95, 0.001, 0.5, 2.0)
 LARGEST_IMPEDANCE = 0.9999
 ROUND_OFF = 2.0**-52
 FORCE_NOISE = 0.01  # the largest share of round-off that a contact force may have
+# Contact forces that may be off by more than this share of themselves are none.
+WRONG = 0.01
+# Where a line search stops: of the mean inertia, which forces some 2 times of, a few roundings.
+SLOPE = 1e-14
 
 
 Integrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
@@ -83,6 +88,22 @@ class ContactSettings(StepSettings):
         return max(self.tolerance, ROUND_OFF)
 
     @property
+    def condition(self) -> float:
+        """How much stiffer the contact rows are than the bicycle, the condition of the solver's matrix M + J^T D J."""
+        largest = max(self.impedance[:2])
+        return max(self.impratio, 1.0) * largest / (1 - largest)
+
+    @property
+    def converged_below(self) -> float:
+        """Largest relative residual (`convergence`) that a solver may leave which has met its tolerance.
+
+        MuJoCo's tolerance is one of its cost, a square of accelerations in which stiff rows count by their
+        stiffness: a residual r of the forces costs r^2 / condition. Round-off leaves some of that of an
+        acceleration, times the condition.
+        """
+        return min(sqrt(self.tolerance * self.condition) + 10 * ROUND_OFF * self.condition, WRONG)
+
+    @property
     def least_friction(self) -> float:
         """Coefficient of friction that there is in every direction: half-way between a pyramid's edges it is less."""
         return self.friction / (2**0.5 if self.cone == "pyramidal" else 1)
@@ -98,9 +119,9 @@ class ContactSettings(StepSettings):
         return 2 / (self.impedance[1] * self.contact_time)
 
     @property
-    def line_search(self) -> int:
-        """Iterations that MuJoCo's contact solver may spend on one line search; 50 are its own default."""
-        return 50
+    def solver_options(self) -> dict[str, float]:
+        """Options of MuJoCo's contact solver beside its tolerance; none: MuJoCo's own."""
+        return {}
 
     @model_validator(mode="after")
     def _contacts_are_resolved(self) -> Self:
@@ -163,28 +184,26 @@ class ExactContactSettings(ContactSettings):
         description="factor on the softness that MuJoCo gives a contact row; what is left of it makes wheels slip",
     )
     tolerance: float = Field(
-        default=1e-14, gt=0, le=1e-2, description="relative tolerance at which MuJoCo's contact solver stops"
+        default=1e-22, gt=0, le=1e-2, description="relative tolerance at which MuJoCo's contact solver stops"
     )
 
     @property
     def condition(self) -> float:
-        """Condition of the solver's matrix M + J^T D J, by which round-off grows in a contact force."""
-        return max(self.impratio, 1.0) / ((1 - self.impedance[1]) * self.softness)
+        """How much stiffer the contact rows are than the bicycle, the condition of the solver's matrix M + J^T D J."""
+        return super().condition / self.softness
 
     @property
-    def noise(self) -> float:
-        """Relative error that a step may add beyond its method: round-off in an acceleration, times the step."""
-        return max(self.tolerance, ROUND_OFF, ROUND_OFF * self.condition * self.step)
+    def solver_options(self) -> dict[str, float]:
+        """Options of MuJoCo's contact solver beside its tolerance, for rows as stiff as these.
 
-    @property
-    def line_search(self) -> int:
-        """Iterations of a line search, more where friction is much harder than the normal direction.
-
-        Between sliding and sticking the cone's cost then bends within so short a stretch that 50 iterations can
-        end before its bottom. What is missing there, divided by the softness, is a force up to thousands of times too
-        large. 200 find what 500 find.
+        Wheels that roll need one iteration from the start that `compiled.correct` gives. One that slides is found
+        along the curved edge of the cone, on which a step gets the shorter the stiffer the rows: by some hundred
+        iterations, where MuJoCo's own limit is 100. Between sliding and sticking the cost bends within so short a
+        stretch that a line search must halve its way there to the last digit, 52 times with up to three
+        evaluations each, where MuJoCo's own limit is 50 evaluations; one that ends before moves nothing, and the
+        solver stops at a force that may be anything. A line search stops at a slope of round-off in the forces.
         """
-        return 200 if self.cone == "elliptic" and self.impratio > 10 else super().line_search
+        return {"iterations": 1000, "ls_iterations": 200, "ls_tolerance": max(0.01, SLOPE / self.tolerance)}
 
     @model_validator(mode="after")
     def _forces_have_digits(self) -> Self:
