@@ -36,10 +36,10 @@ class SolverSettings(Settings):
         default=1e-11,
         gt=0,
         le=1e-4,
-        description="Newton's method stops when its residual has fallen by this factor. The residual is one norm of the "
-        "forces' imbalance [kN] and of the constraints' violation [m; of slip, m in a step]. The library starts every "
-        "step without constraint forces, so it falls from the bodies' weights, 0.84 kN for the benchmark bicycle: "
-        "1e-11 lets go of 8e-12 m, and of a slip of some 2e-8 m/s at a step of 1 ms.",
+        description="Newton's method stops when its residual has fallen by this factor. The residual is one norm of "
+        "the forces' imbalance [kN] and of the constraints' violation [m; of slip, m in a step]. The library starts "
+        "every step without constraint forces, so it falls from the bodies' weights, 0.84 kN for the benchmark "
+        "bicycle: 1e-11 lets go of 8e-12 m, and of a slip of some 2e-8 m/s at a step of 1 ms.",
     )
     newton_absolute_tolerance: float = Field(
         default=1e-12, gt=0, le=1e-4, description="Newton's method stops below this residual [kN and m, one norm]."

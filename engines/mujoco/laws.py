@@ -11,6 +11,7 @@ from typing import get_args
 
 import numpy as np
 
+from engines.admission import ride
 from engines.engine import EngineError, Problem
 from engines.mujoco import exact_contact, native
 from engines.mujoco.creep import contact_acceleration, settled_slip
@@ -81,7 +82,7 @@ def creep_row(problem: Problem, settings: NativeSettings) -> CreepRow:
     EngineError
         If it fell before its contacts had settled.
     """
-    trajectory = native.ENGINE.simulate(problem, settings, lambda _: None)
+    trajectory = ride(native.ENGINE, problem, settings, lambda _: None)
     settled = is_settled(trajectory, settings)
     if trajectory.slip is None or not settled.any():
         raise EngineError(f"the wheels did not settle within {trajectory.time[-1]:g} s")
@@ -143,7 +144,7 @@ def creep_study(
 def energy_row(problem: Problem, integrator: Integrator, step: float) -> EnergyRow:
     """Measure the energy that an integrator adds on a circular motion, with exact contacts."""
     settings = ExactContactSettings(integrator=integrator, step=step)
-    trajectory = exact_contact.ENGINE.simulate(problem, settings, lambda _: None)
+    trajectory = ride(exact_contact.ENGINE, problem, settings, lambda _: None)
     settled = is_settled(trajectory, settings)
     assert trajectory.kinetic_energy is not None
     assert trajectory.potential_energy is not None

@@ -19,6 +19,7 @@ import mujoco
 import numpy as np
 from scipy.stats import t as student
 
+from engines.admission import ride
 from engines.engine import Problem, Trajectory
 from engines.mujoco import default, exact_contact, multipliers, native
 from engines.mujoco.creep import contact_acceleration
@@ -192,8 +193,8 @@ def _on_circle(trajectory: Trajectory) -> Trajectory:
 
 def _quickest(engine: MujocoEngine[Any], problem: Problem, settings: StepSettings) -> tuple[Trajectory, float]:
     """The ride, and the least CPU time of a step [s] over `_REPEATS` rides: what the machine does else only adds."""
-    rides = [engine.simulate(problem, settings, _quiet) for _ in range(_REPEATS)]
-    return rides[0], min(ride.cpu_time / ride.steps for ride in rides)
+    rides = [ride(engine, problem, settings, _quiet) for _ in range(_REPEATS)]
+    return rides[0], min(one.cpu_time / one.steps for one in rides)
 
 
 def ride_row(engine: MujocoEngine[Any], changed: dict[str, Any], problem: Problem) -> Row:
@@ -266,7 +267,7 @@ def settings_study(
 def drift_row(engine: MujocoEngine[Any], changed: dict[str, Any], problem: Problem) -> DriftRow:
     """Ride a circular motion for long; drifts are measured while it is still on its circle."""
     settings = engine.settings(**changed)
-    whole = engine.simulate(problem, settings, _quiet)
+    whole = ride(engine, problem, settings, _quiet)
     part = _on_circle(whole)
     chosen = is_settled(part, settings)
     if chosen.sum() < 3 * _BLOCKS:

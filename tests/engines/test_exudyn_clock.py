@@ -51,7 +51,8 @@ def falling_point(write_period: float | None = None) -> np.ndarray:
             settings.solution.sensors.writePeriod = write_period
             settings.timeIntegration.numberOfSteps, settings.timeIntegration.endTime = STEPS, STEPS * STEP
             settings.timeIntegration.adaptiveStep, settings.timeIntegration.verboseMode = False, 0
-            exu.MainSolverImplicitSecondOrder().SolveSystem(system, settings)
+            solver: Any = exu.MainSolverImplicitSecondOrder()
+            solver.SolveSystem(system, settings)
     return np.array(system.GetSensorStoredData(sensor))
 
 
@@ -66,7 +67,7 @@ def test_every_sample_of_a_long_ride_is_where_its_time_says():
 
 def test_the_library_s_own_sensors_leave_out_a_sample():
     """As long as this passes, `engines.exudyn.solve` has to tell the samples."""
-    assert len(falling_point(STEP)) == STEPS, f"Exudyn {exu.__version__} has mended this"  # pyright: ignore
+    assert len(falling_point(STEP)) == STEPS, f"Exudyn {exu.__version__} has mended this"
 
 
 def upright(speed: float, duration: float, rate: float, surface: Surface | None = None) -> Problem:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engines.admission import ride
 from engines.engine import REFERENCE, load_engine
 from reports.metrics import position_errors
 from scenarios.error import ScenarioError
@@ -53,8 +54,8 @@ def test_an_error_is_that_of_a_single_run() -> None:
     engine = load_engine("mujoco-native")
     settings = engine.settings.model_validate({"step": 0.002})
     reference = load_engine(REFERENCE)
-    yardstick = reference.simulate(problem, reference.settings(), lambda _: None)
-    errors = position_errors(engine.simulate(problem, settings, lambda _: None), yardstick)
+    yardstick = ride(reference, problem, reference.settings(), lambda _: None)
+    errors = position_errors(ride(engine, problem, settings, lambda _: None), yardstick)
     # The study is sampled at every eighth millisecond that both grids share; the error grows smoothly, to its
     # largest at the end, which both have.
     assert point["position_error"] == pytest.approx(errors.max(), rel=1e-6)

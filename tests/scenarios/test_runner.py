@@ -196,6 +196,26 @@ def cut(trajectory: Trajectory) -> Trajectory:
     return replace(trajectory, ended="Newton failed at 0.05 s", **arrays)
 
 
+def test_an_engine_whose_clock_is_late_by_a_step_did_not_run(tmp_path: Path) -> None:
+    def late(trajectory: Trajectory) -> Trajectory:
+        skipped = np.arange(len(trajectory.time)) > 5
+        return replace(trajectory, time=trajectory.time + 1e-3 * skipped)
+
+    outcome, _ = ridden(with_engine(plain(), NATIVE, late), tmp_path)
+    assert NATIVE not in outcome.metrics
+    assert outcome.failures[NATIVE].startswith("its sample 6 is at 0.061 s by its own clock, not at the 0.06 s asked")
+
+
+def test_steps_that_did_not_converge_are_told(tmp_path: Path) -> None:
+    def unconverged(trajectory: Trajectory) -> Trajectory:
+        return replace(trajectory, unconverged_steps=3, largest_residual=0.5)
+
+    outcome, _ = ridden(with_engine(plain(), NATIVE, unconverged), tmp_path)
+    assert outcome.metrics[NATIVE]["unconverged_steps"] == 3
+    page = (outcome.folder / "report.html").read_text()
+    assert f"{NATIVE}: its iterations did not converge in 3 of" in page
+
+
 def test_an_engine_that_ended_early_is_compared_as_far_as_it_came(tmp_path: Path) -> None:
     what = with_engine(plan("iftomm-2"), NATIVE, cut)
     outcome, _ = ridden(what, tmp_path)

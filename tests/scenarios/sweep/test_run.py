@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 from sweeping import UPRIGHT, data_set, here, planned, rows, swept
 
+from engines.admission import ride
 from scenarios.error import ScenarioError
 from scenarios.runner import measure_one, plan_run
 from scenarios.scenario import load_scenario
@@ -45,7 +46,7 @@ def test_a_row_has_the_parameters_and_the_metrics_of_a_run(tmp_path: Path) -> No
     changes = dict(plan.tasks[-1].changes)
     alone = plan_run(*load_scenario("iftomm-1", changes), wanted=["mujoco-multipliers"])
     rides = {
-        name: engine.simulate(alone.start.problem, settings, lambda _: None)
+        name: ride(engine, alone.start.problem, settings, lambda _: None)
         for name, (engine, settings) in alone.engines.items()
     }
     measured = measure_one(alone.start, rides["mujoco-multipliers"], rides["reference"])
