@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 if TYPE_CHECKING:
     from .engine import Engine, Problem, Progress, Settings, Trajectory
 
-_P, _T = ParamSpec("_P"), TypeVar("_T")
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
 _LONGEST = 200  # letters of what an engine says as it exits
 # Packages that stand between a call and the engine's own code: none of their lines is where an engine is wrong.
 _BETWEEN = (

@@ -170,19 +170,24 @@ def _sampled(plan: Plan, ladders: Mapping[str, list[Settings]]) -> Problem:
             continue
         times = np.arange(samples // merged + 1) * merged / simulation.output_rate
         problem = replace(plan.start.problem, times=times)
-        try:
-            for name, ladder in ladders.items():
-                for settings in ladder:
-                    plan.engines[name][0].check(problem, settings)
-        except ValueError:
-            continue
-        except Exception as error:  # an engine may break here as well
-            raise ScenarioError(f"engines.{name}: its check failed: {why_failed(error)}") from error
-        return problem
+        if all(_fits(name, plan.engines[name][0], ladder, problem) for name, ladder in ladders.items()):
+            return problem
     raise ScenarioError(
         f"{plan.name}: no output interval up to {_LONGEST_INTERVAL / simulation.output_rate:g} s is a multiple of all "
         "engines' steps; steps and a duration that are multiples of one another would do"
     )
+
+
+def _fits(name: str, engine: Engine, ladder: list[Settings], problem: Problem) -> bool:
+    """Whether an engine takes a problem with the settings of all levels."""
+    try:
+        for settings in ladder:
+            engine.check(problem, settings)
+    except ValueError:
+        return False
+    except Exception as error:  # an engine may break here as well
+        raise ScenarioError(f"engines.{name}: its check failed: {why_failed(error)}") from error
+    return True
 
 
 def _runs(

@@ -41,6 +41,7 @@ def check_command(
     from .. import gate, present
     from ..files import write_text
     from ..installed import installed
+    from ..runner import configure
 
     if reason is not None and not update:
         raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
@@ -52,7 +53,7 @@ def check_command(
     unfinished = _unfinished({junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN})
     with showing_traceback(traceback), unfinished, present.Progress() as progress:
         trace = print_traceback if traceback else None
-        verdicts, fresh = gate.check(progress.watch, scenario, engine, baselines, trace=trace)
+        verdicts, fresh = gate.check(progress.watch, scenario, engine, baselines, configure, trace)
     for path, page in files:
         if path is not None:
             write_text(path, page(verdicts))
