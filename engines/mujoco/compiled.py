@@ -393,10 +393,10 @@ def _residual(board):
     scale = max(scale, _size(factors, pushed, n))
     if not scale > 0:
         return 0.0
-    left = _left(board, mass, factors, _reals(board.qacc, n))
-    if not left <= board.converged_below**2 * scale:
-        # After a step of RK4 qacc is the mean of its stages; the last stage's own is where the warm start comes from.
-        left = min(left, _left(board, mass, factors, _reals(board.qacc_warmstart, n)))
+    # After a step of RK4 qacc is the mean of its stages; the last stage's own is where the warm start comes from.
+    left = min(
+        _left(board, mass, factors, _reals(board.qacc, n)), _left(board, mass, factors, _reals(board.qacc_warmstart, n))
+    )
     return np.sqrt(left / scale)
 
 

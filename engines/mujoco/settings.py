@@ -203,7 +203,7 @@ class ExactContactSettings(ContactSettings):
         evaluations each, where MuJoCo's own limit is 50 evaluations; one that ends before moves nothing, and the
         solver stops at a force that may be anything. A line search stops at a slope of round-off in the forces.
         """
-        return {"iterations": 1000, "ls_iterations": 200, "ls_tolerance": max(0.01, SLOPE / self.tolerance)}
+        return {"iterations": 10_000, "ls_iterations": 200, "ls_tolerance": max(0.01, SLOPE / self.tolerance)}
 
     @model_validator(mode="after")
     def _forces_have_digits(self) -> Self:
