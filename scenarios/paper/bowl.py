@@ -12,7 +12,6 @@ from reference.special import SpecialPoint
 from reports.paper.ledger import Check, Line, words
 
 from .evidence import Evidence
-from .named import front_rate
 from .profile import abscissa, apart, figure_coordinates, nearest
 
 _PLANE, _SMALL, _AFTER, _DEEP = 0.0, 0.005, 0.05, 0.2
@@ -73,7 +72,7 @@ def _small_curvature(evidence: Evidence) -> Iterator[Line]:
     before = evidence.found(_PLANE)
     changes = [abs(float(found.static[0][STEER] - before.static[0][STEER]))]
     changes += [abs(float(found.pivoting[0][k] - before.pivoting[0][k])) for k in (3, STEER)]
-    rates = [abs(front_rate(one.pivoting[0])) for one in (before, found)]
+    rates = [abs(one.equations.motion(one.pivoting[0]).front_rate) for one in (before, found)]
     changes.append(float(np.ptp(abscissa(evidence.bicycle, np.array(rates)))))
     yield words(
         *("3.3", "at alpha = 1/200 A and G have changed little from the plane", max(changes) < _LITTLE),

@@ -19,8 +19,8 @@ from reference.circular import (
     rear_rate_condition,
     unknown_condition,
 )
-from reference.continuation import follow
-from reference.kernels.steady import UNKNOWNS
+from reference.continuation import follow, sign_changes
+from reference.kernels.steady import STANDING, UNKNOWNS
 
 # Starts: angles on a grid, at rest, pivoting and at some rear rates that curves of benchmark size pass.
 _LEANS, _STEERS, _RATES = np.linspace(-1.2, 1.2, 7), np.linspace(0.05, 3.09, 7), (4.0, 12.0, 18.0, 24.0)
@@ -90,7 +90,7 @@ def distance(curve: np.ndarray, unknowns: np.ndarray) -> float:
 
 
 def _pivots(curve: np.ndarray) -> int:
-    return int(np.sum(curve[:-1, REAR_SPEED] * curve[1:, REAR_SPEED] < 0))
+    return len(sign_changes(curve[:, REAR_SPEED], STANDING))
 
 
 def _solutions(equations: Steady, condition: Callable) -> Iterator[np.ndarray]:
