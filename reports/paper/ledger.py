@@ -1,17 +1,26 @@
-"""Lines of the ledger: a claim, what was measured, the verdict, and whose fault it is where it does not hold."""
+"""Lines of the ledger: a claim, what was measured and how, the verdict and the threshold that it rests on."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from decimal import ROUND_DOWN, Decimal
+from decimal import Decimal
 from typing import Any
 
 KINDS = ("structure", "number", "stability", "simulation")
-REPRODUCED, ROUNDS, TRUNCATED = "reproduced", "rounds to the print", "truncated"
+REPRODUCED, ROUNDS, TRUNCATED, DEPENDS = "reproduced", "rounds to the print", "truncated", "depends on the cut"
 FAILS, UNTESTABLE = "does not hold", "not testable"
-VERDICTS = (REPRODUCED, ROUNDS, TRUNCATED, FAILS, UNTESTABLE)
+VERDICTS = (REPRODUCED, ROUNDS, TRUNCATED, DEPENDS, FAILS, UNTESTABLE)
+COMMAND = "velodrome paper"  # which computes every line again
+
+_RELATIONS: dict[str, Callable[[float, float], bool]] = {
+    "<": lambda value, limit: value < limit,
+    "<=": lambda value, limit: value <= limit,
+    ">": lambda value, limit: value > limit,
+    ">=": lambda value, limit: value >= limit,
+    "=": lambda value, limit: value == limit,
+}
 
 
 @dataclass(frozen=True)
@@ -35,6 +44,91 @@ class Check:
 
 
 @dataclass(frozen=True)
+class Threshold:
+    """A condition on a measured number that a verdict rests on.
+
+    Attributes
+    ----------
+    what : str
+        The measured number.
+    value : float
+    relation : str
+        ``<``, ``<=``, ``>``, ``>=`` or ``=``, for counts.
+    limit : float
+    unit : str
+    """
+
+    what: str
+    value: float
+    relation: str
+    limit: float
+    unit: str = ""
+
+    @property
+    def met(self) -> bool:
+        """Whether the number is as the claim wants it; a value that is no number is not."""
+        return bool(_RELATIONS[self.relation](self.value, self.limit))
+
+    @property
+    def text(self) -> str:
+        """The condition in words."""
+        return f"{self.what} {self.relation} {self.limit:.6g} {self.unit}".rstrip()
+
+    def as_json(self) -> dict[str, Any]:
+        """The condition as a JSON object."""
+        numbers = {"value": _finite(self.value), "relation": self.relation, "limit": _finite(self.limit)}
+        return {"what": self.what, **numbers, "unit": self.unit, "met": self.met}
+
+
+def below(what: str, value: float, limit: float, unit: str = "") -> Threshold:
+    """Return the condition that a number is less than a limit."""
+    return Threshold(what, float(value), "<", float(limit), unit)
+
+
+def above(what: str, value: float, limit: float, unit: str = "") -> Threshold:
+    """Return the condition that a number is greater than a limit."""
+    return Threshold(what, float(value), ">", float(limit), unit)
+
+
+def equals(what: str, value: int, wanted: int) -> Threshold:
+    """Return the condition that a count is a given one."""
+    return Threshold(what, float(value), "=", float(wanted))
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a measurement comes from.
+
+    Attributes
+    ----------
+    computed : str
+        What was computed.
+    functions : tuple of str
+        Full names of the functions that compute it.
+    command : str or None
+        Command that computes it again.
+    search : str or None
+        How motions were looked for, where the claim rests on how many there are: a search that is not exhaustive
+        can only say what it has found.
+    """
+
+    computed: str
+    functions: tuple[str, ...] = ()
+    command: str | None = COMMAND
+    search: str | None = None
+
+
+def source(computed: str, *functions: Callable, command: str = COMMAND, search: str | None = None) -> Source:
+    """Return the source of a measurement from the functions that compute it."""
+    return Source(computed, tuple(f"{f.__module__}.{f.__qualname__}" for f in functions), command, search)
+
+
+def _finite(value: float) -> float | None:
+    # JSON knows no infinity: a measurement that came to nothing has no value.
+    return float(value) if math.isfinite(value) else None
+
+
+@dataclass(frozen=True)
 class Line:
     """One line of the ledger.
 
@@ -54,6 +148,10 @@ class Line:
         The printed figure.
     value : float or None
         The measured one.
+    source : Source
+        What was computed, by which functions and command.
+    thresholds : tuple of Threshold
+        Conditions that the verdict rests on. The verdict on a printed figure rests on the first that is met.
     checks : tuple of Check
         Tests of the measurement: residuals, an independent way to the same figure.
     """
@@ -63,6 +161,8 @@ class Line:
     kind: str
     measured: str
     verdict: str
+    source: Source
+    thresholds: tuple[Threshold, ...] = ()
     printed: str | None = None
     value: float | None = None
     checks: tuple[Check, ...] = field(default=())
@@ -82,20 +182,29 @@ class Line:
             return None
         return "paper" if self.checks and all(check.passes for check in self.checks) else "ours"
 
+    @property
+    def threshold(self) -> str:
+        """The conditions in words; empty where there is nothing to test."""
+        return "; ".join(threshold.text for threshold in self.thresholds)
+
     def as_json(self) -> dict[str, Any]:
         """The line as a JSON object."""
-        names = ("section", "claim", "kind", "printed", "measured", "value", "verdict", "holds", "fault")
-        # JSON knows no infinity: a measurement that came to nothing has no value.
+        names = ("section", "claim", "kind", "printed", "measured", "value", "verdict", "holds", "fault", "threshold")
         checks = [
             {
                 "what": check.what,
-                "value": float(check.value) if math.isfinite(check.value) else None,
+                "value": _finite(check.value),
                 "limit": float(check.limit),
                 "passes": check.passes,
             }
             for check in self.checks
         ]
-        return {name: getattr(self, name) for name in names} | {"checks": checks}
+        return (
+            {name: getattr(self, name) for name in names}
+            | {"thresholds": [threshold.as_json() for threshold in self.thresholds]}
+            | {name: getattr(self.source, name) for name in ("computed", "command", "search")}
+            | {"functions": list(self.source.functions), "checks": checks}
+        )
 
 
 def unit(printed: str) -> Decimal:
@@ -103,13 +212,30 @@ def unit(printed: str) -> Decimal:
     return Decimal((0, (1,), int(Decimal(printed).as_tuple().exponent)))
 
 
-def figure_verdict(value: float, printed: str) -> str:
+def figure_thresholds(value: float, printed: str) -> tuple[Threshold, ...]:
+    """Conditions behind the verdict on a measured figure: rounding, then, where it does not round, cutting off."""
+    exact, shown, last = Decimal(value), Decimal(printed), unit(printed)
+    digits = f"last digit of {printed}"
+    distance = float(abs(exact - shown))
+    rounds = Threshold(f"distance from the print, to half a unit of the {digits},", distance, "<=", float(last / 2))
+    if rounds.met:
+        return (rounds,)
+    # What is cut off is further from zero than the print, by less than a unit.
+    beyond = float((exact - shown) * (-1 if printed.startswith("-") else 1))
+    past = f"distance beyond the print, to a unit of the {digits},"
+    return (
+        rounds,
+        Threshold("distance beyond the print, away from zero,", beyond, ">=", 0.0),
+        Threshold(past, beyond, "<", float(last)),
+    )
+
+
+def figure_verdict(thresholds: Sequence[Threshold]) -> str:
     """Verdict on a measured figure: it rounds to the print, the print cuts it off, or neither."""
-    exact, shown = Decimal(value), Decimal(printed)
-    if abs(exact - shown) <= unit(printed) / 2:
+    rounds, *cut = thresholds
+    if rounds.met:
         return ROUNDS
-    cut = exact.quantize(unit(printed), rounding=ROUND_DOWN)
-    return TRUNCATED if cut == shown else FAILS
+    return TRUNCATED if all(threshold.met for threshold in cut) else FAILS
 
 
 def figure(
@@ -118,6 +244,7 @@ def figure(
     printed: str,
     value: float,
     error: float,
+    source: Source,
     checks: Iterable[Check] = (),
     kind: str = "number",
 ) -> Line:
@@ -132,6 +259,7 @@ def figure(
         Measured.
     error : float
         Its own error; it must be too small to change the verdict.
+    source : Source
     checks : iterable of Check
         Further tests of the measurement.
     kind : str
@@ -143,32 +271,98 @@ def figure(
     margin = abs(abs(Decimal(value) - Decimal(printed)) - unit(printed) / 2)
     tests = (Check("own error, against the distance from the limit of rounding", error, float(margin)), *checks)
     digits = max(3, -int(Decimal(printed).as_tuple().exponent) + 4)
-    measured = f"{value:.{digits}f}, own error {error:.1e}"
-    return tested(Line(section, claim, kind, measured, figure_verdict(value, printed), printed, value, tests))
+    thresholds = figure_thresholds(value, printed)
+    line = Line(
+        section=section,
+        claim=claim,
+        kind=kind,
+        measured=f"{value:.{digits}f}, own error {error:.1e}",
+        verdict=figure_verdict(thresholds),
+        source=source,
+        thresholds=thresholds,
+        printed=printed,
+        value=value,
+        checks=tests,
+    )
+    return tested(line)
 
 
 def words(
     section: str,
     claim: str,
-    holds: bool,
+    thresholds: Iterable[Threshold],
     measured: str,
+    source: Source,
     checks: Iterable[Check],
     kind: str = "structure",
     printed: str | None = None,
 ) -> Line:
-    """Line on a claim in words, which holds or does not; the checks test the measurement."""
-    return tested(Line(section, claim, kind, measured, REPRODUCED if holds else FAILS, printed, None, tuple(checks)))
+    """Line on a claim in words, which holds if every threshold is met; the checks test the measurement."""
+    conditions = tuple(thresholds)
+    line = Line(
+        section=section,
+        claim=claim,
+        kind=kind,
+        measured=measured,
+        verdict=REPRODUCED if conditions and all(each.met for each in conditions) else FAILS,
+        source=source,
+        thresholds=conditions,
+        printed=printed,
+        checks=tuple(checks),
+    )
+    return tested(line)
 
 
-def count(section: str, claim: str, printed: int, value: int, measured: str, checks: Iterable[Check] = ()) -> Line:
+def count(
+    section: str, claim: str, printed: int, value: int, measured: str, source: Source, checks: Iterable[Check] = ()
+) -> Line:
     """Line on a printed count."""
-    verdict = REPRODUCED if value == printed else FAILS
-    return tested(Line(section, claim, "structure", measured, verdict, str(printed), float(value), tuple(checks)))
+    condition = equals("count", value, printed)
+    line = Line(
+        section=section,
+        claim=claim,
+        kind="structure",
+        measured=measured,
+        verdict=REPRODUCED if condition.met else FAILS,
+        source=source,
+        thresholds=(condition,),
+        printed=str(printed),
+        value=float(value),
+        checks=tuple(checks),
+    )
+    return tested(line)
+
+
+def count_by_cut(
+    section: str,
+    claim: str,
+    printed: int,
+    counts: Mapping[str, int],
+    measured: str,
+    source: Source,
+    checks: Iterable[Check] = (),
+) -> Line:
+    """Line on a printed count of what can be cut into pieces in several ways: the count under each way."""
+    conditions = tuple(equals(cut, value, printed) for cut, value in counts.items())
+    met = [condition.met for condition in conditions]
+    line = Line(
+        section=section,
+        claim=claim,
+        kind="structure",
+        measured=measured,
+        verdict=REPRODUCED if all(met) else DEPENDS if any(met) else FAILS,
+        source=source,
+        thresholds=conditions,
+        printed=str(printed),
+        checks=tuple(checks),
+    )
+    return tested(line)
 
 
 def untestable(section: str, claim: str, why: str, kind: str = "structure") -> Line:
     """Line on a claim that nothing here can test."""
-    return Line(section, claim, kind, why, UNTESTABLE)
+    nothing = Source("nothing", command=None)
+    return Line(section=section, claim=claim, kind=kind, measured=why, verdict=UNTESTABLE, source=nothing)
 
 
 def tested(line: Line, *more: Check) -> Line:

@@ -8,9 +8,16 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from .ledger import FAILS, REPRODUCED, ROUNDS, TRUNCATED, UNTESTABLE, Line, counts
+from .ledger import DEPENDS, FAILS, REPRODUCED, ROUNDS, TRUNCATED, UNTESTABLE, Line, counts
 
-STYLES = {REPRODUCED: "green", ROUNDS: "green", TRUNCATED: "yellow", FAILS: "red", UNTESTABLE: "dim"}
+STYLES = {
+    REPRODUCED: "green",
+    ROUNDS: "green",
+    TRUNCATED: "yellow",
+    DEPENDS: "yellow",
+    FAILS: "red",
+    UNTESTABLE: "dim",
+}
 _WHOSE = {"paper": "the paper's", "ours": "ours: the measurement does not pass its own tests"}
 
 
@@ -25,6 +32,9 @@ def show_ledger(console: Console, lines: Sequence[Line]) -> None:
     for line in lines:
         if not line.holds:
             console.print(_failure(line), style="red", markup=False, highlight=False, soft_wrap=True)
+            for threshold in line.thresholds:
+                text = f"    wanted: {threshold.text}; it is {threshold.value:.6g}"
+                console.print(text, markup=False, highlight=False, soft_wrap=True)
             for check in line.checks:
                 word = "passes" if check.passes else "FAILS"
                 text = f"    {check.what}: {check.value:.2e}, limit {check.limit:.2e}: {word}"
@@ -44,9 +54,26 @@ def summary(lines: Sequence[Line]) -> str:
 def markdown(lines: Sequence[Line]) -> str:
     """The ledger as a Markdown document."""
     rows = ["# The paper, line by line", "", summary(lines), ""]
-    rows += ["| § | claim | printed | measured | verdict |", "|---|---|---|---|---|"]
+    rows += [
+        "| § | claim | printed | measured | verdict | threshold | computed | reproduced by |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
     for line in lines:
         verdict = line.verdict if line.holds else f"**{line.verdict}**: {_WHOSE[line.fault or 'ours']}"
-        cells = (line.section, line.claim, line.printed or "", line.measured, verdict)
+        cells = (
+            line.section,
+            line.claim,
+            line.printed or "",
+            line.measured,
+            verdict,
+            line.threshold,
+            ". ".join(part for part in (line.source.computed, line.source.search) if part),
+            _reproduced_by(line),
+        )
         rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(rows) + "\n"
+
+
+def _reproduced_by(line: Line) -> str:
+    command = [line.source.command] if line.source.command else []
+    return ", ".join(f"`{part}`" for part in (*command, *line.source.functions))

@@ -21,16 +21,19 @@ from .model import model_check
 from .named import plane_lines
 from .orbits import orbit_lines
 from .points import point_lines
+from .rates import rate_lines
 from .reduction import reduction_lines
 from .rides import ride_lines
 from .stability import section_lines
 from .steep import steep_lines
 from .structure import structure_lines
+from .unseen import unseen_lines
 
 PARTS: dict[str, Callable[[Evidence], Iterator[Line]]] = {
     "equations": structure_lines,
     "orbits": orbit_lines,
     "plane": plane_lines,
+    "rates": rate_lines,
     "bowl": bowl_lines,
     "configurations": configuration_lines,
     "steep bowl": steep_lines,
@@ -38,6 +41,7 @@ PARTS: dict[str, Callable[[Evidence], Iterator[Line]]] = {
     "Q1, Q2": point_lines,
     "stability": section_lines,
     "rides": ride_lines,
+    "not testable": unseen_lines,
 }
 
 

@@ -7,17 +7,22 @@ from collections.abc import Iterator
 import numpy as np
 
 from reference.circular import REAR_SPEED, STEER
-from reference.families import FAMILIES
-from reference.special import SpecialPoint
-from reports.paper.ledger import Check, Line, words
+from reference.critical import reconnections
+from reference.families import FAMILIES, trace
+from reference.special import SpecialPoint, special_points
+from reports.paper.ledger import Check, Line, above, below, equals, source, words
 
-from .evidence import Evidence
+from .evidence import Evidence, families_command
 from .profile import abscissa, apart, figure_coordinates, nearest
+from .search import search
 
 _PLANE, _SMALL, _AFTER, _DEEP = 0.0, 0.005, 0.05, 0.2
 _ALIKE = 0.2  # rad: curves of the paper's figures, pi/2 wide and pi high, that one would call alike
 _LITTLE = 0.02  # rad: a hundredth of them
 _NEAR = (1e-2, 1e-3)  # of alpha, before the touching point
+_TOUCHING = source(
+    "where two families exchange parts: a regular root of 18 equations", reconnections, command="velodrome critical"
+)
 _FINE = 0.02  # step of the arc where two curves are near
 
 
@@ -46,28 +51,46 @@ def _numbers(values: list[float]) -> str:
 def _alike(evidence: Evidence, claim: str, one: float, other: float, numbers: tuple[int, ...]) -> Line:
     """Curves are alike if they end alike and lie near each other in the paper's figures."""
     apart_by = profiles(evidence, one, other, numbers)
-    ends = all(evidence.family(one, n).ends == evidence.family(other, n).ends for n in numbers)
+    alike = sum(evidence.family(one, n).ends == evidence.family(other, n).ends for n in numbers)
     what = f"families {', '.join(map(str, numbers))}"
     return words(
-        *("3.3", claim, ends and max(apart_by) < _ALIKE),
-        f"{what}: the curves are nowhere further apart than {_numbers(apart_by)} rad in the figures' coordinates and "
-        f"end {'alike' if ends else 'differently'}; a fifth of a radian counts as alike",
-        [evidence.residual((one, other))],
+        section="3.3",
+        claim=claim,
+        thresholds=[
+            equals("families that end alike", alike, len(numbers)),
+            below("largest distance of two curves in the figures' coordinates", max(apart_by), _ALIKE, "rad"),
+        ],
+        measured=f"{what}: the curves are nowhere further apart than {_numbers(apart_by)} rad in the figures' "
+        f"coordinates and end {'alike' if alike == len(numbers) else 'differently'}; a fifth of a radian counts as "
+        "alike",
+        source=source(
+            "the families' curves and their largest distance", profiles, command=families_command(one, other)
+        ),
+        checks=[evidence.residual((one, other))],
     )
 
 
 def _small_curvature(evidence: Evidence) -> Iterator[Line]:
     found = evidence.found(_SMALL)
     static, pivoting = len(found.static), len(found.pivoting)
-    whole = [evidence.residual((_PLANE, _SMALL))]
-    text = f"a grid of starts finds {static} static equilibrium and {pivoting} pivoting motion"
-    claim = "at alpha = 1/200 there is one static equilibrium A and one pivoting motion"
-    yield words("3.3", claim, (static, pivoting) == (1, 1), text, whole)
+    whole = [evidence.residual((_PLANE, _SMALL)), evidence.searched_again(_SMALL)]
+    yield words(
+        section="3.3",
+        claim="at alpha = 1/200 there is one static equilibrium A and one pivoting motion",
+        thresholds=[equals("static equilibria", static, 1), equals("pivoting motions", pivoting, 1)],
+        measured=f"a grid of starts finds {static} static equilibrium and {pivoting} pivoting motion",
+        source=source("static equilibria and pivoting motions", search, search=found.described),
+        checks=whole,
+    )
     ends = [evidence.family(_SMALL, number).points[0].unknowns for number in (3, 4)]
     off = float(np.abs(np.abs(ends[0]) - np.abs(ends[1])).max())
     yield words(
-        *("3.3", "at alpha = 1/200 G of family 3 and H of family 4 are one motion", off < 1e-12),
-        *(f"their constants differ by {off:.0e}", [_pivots(ends)]),
+        section="3.3",
+        claim="at alpha = 1/200 G of family 3 and H of family 4 are one motion",
+        thresholds=[below("largest difference of their constants", off, 1e-12)],
+        measured=f"their constants differ by {off:.0e}",
+        source=source("the ends of families 3 and 4", trace, command=families_command(_SMALL)),
+        checks=[_pivots(ends)],
     )
     before = evidence.found(_PLANE)
     changes = [abs(float(found.static[0][STEER] - before.static[0][STEER]))]
@@ -75,10 +98,13 @@ def _small_curvature(evidence: Evidence) -> Iterator[Line]:
     rates = [abs(one.equations.motion(one.pivoting[0]).front_rate) for one in (before, found)]
     changes.append(float(np.ptp(abscissa(evidence.bicycle, np.array(rates)))))
     yield words(
-        *("3.3", "at alpha = 1/200 A and G have changed little from the plane", max(changes) < _LITTLE),
-        f"A: steer by {changes[0]:.4f} rad; G: lean by {changes[1]:.5f}, steer by {changes[2]:.5f}, front rate from "
-        f"{rates[0]:.4f} to {rates[1]:.4f}: all within {_LITTLE} rad in the figure",
-        whole,
+        section="3.3",
+        claim="at alpha = 1/200 A and G have changed little from the plane",
+        thresholds=[below("largest change in the figures' coordinates", max(changes), _LITTLE, "rad")],
+        measured=f"A: steer by {changes[0]:.4f} rad; G: lean by {changes[1]:.5f}, steer by {changes[2]:.5f}, front "
+        f"rate from {rates[0]:.4f} to {rates[1]:.4f}: all within {_LITTLE} rad in the figure",
+        source=source("the static equilibria and pivoting motions of both", search, search=found.described),
+        checks=whole,
     )
     yield _alike(evidence, "at alpha = 1/200 the curves are very similar to the plane's", _PLANE, _SMALL, FAMILIES)
 
@@ -103,34 +129,39 @@ def _between(evidence: Evidence, alpha: float) -> np.ndarray:
 
 
 def _collision(evidence: Evidence) -> Iterator[Line]:
-    touch = evidence.touching((2, 4))
+    touch, claim = (
+        evidence.touching((2, 4)),
+        "at a right value of alpha cusp D of family 2 and cusp I of family 4 merge",
+    )
     if touch is None:
-        yield words("3.3", "cusps D and I merge at a right value of alpha", False, "no touching point is found", [])
+        yield words("3.3", claim, [equals("touching points", 0, 1)], "no touching point is found", _TOUCHING, [])
         return
     near = [float(np.linalg.norm(_between(evidence, touch.alpha * (1 - share)))) for share in _NEAR]
     # The distance of two turning points that merge falls like the root of what alpha is short of it.
     order = float(np.log(near[0] / near[1]) / np.log(_NEAR[0] / _NEAR[1]))
     after = _cusps(evidence, touch.alpha * (1 + _NEAR[0]))
-    touching = [
-        Check("residual of the touching point's 44 equations", touch.residual, 1e-12),
-        Check("how far the order of D's approach to I is from 1/2", abs(order - 0.5), 0.01),
-    ]
+    touching = [Check("residual of the touching point's equations", touch.residual, 1e-12)]
     yield words(
-        *("3.3", "at a right value of alpha cusp D of family 2 and cusp I of family 4 merge", after is None),
-        f"alpha = {touch.alpha:.11f}, lean {touch.motion.lean:.6f}, steer {touch.motion.steer:.6f}; below, D and I are "
-        f"apart like its root (order {order:.4f}); above, there are none",
-        touching,
+        section="3.3",
+        claim=claim,
+        thresholds=[
+            equals("pairs of cusps beyond the touching point", int(after is not None), 0),
+            below("departure of the order of D's approach to I from 1/2", abs(order - 0.5), 0.01),
+        ],
+        measured=f"alpha = {touch.alpha:.11f}, lean {touch.motion.lean:.6f}, steer {touch.motion.steer:.6f}; below, D "
+        f"and I are apart like its root (order {order:.4f}); above, there are none",
+        source=_TOUCHING,
+        checks=touching,
     )
     alphas = [_PLANE, _SMALL, 0.01, 0.015]
     distances = [float(np.linalg.norm(_between(evidence, alpha))) for alpha in alphas]
     yield words(
-        *(
-            "3.3",
-            "before that alpha families 2 and 4 approach each other as alpha grows",
-            bool(np.all(np.diff(distances) < 0)),
-        ),
-        f"D and I are {_numbers(distances)} rad apart at alpha = 0, 0.005, 0.01, 0.015",
-        touching,
+        section="3.3",
+        claim="before that alpha families 2 and 4 approach each other as alpha grows",
+        thresholds=[below("largest change of the distance from D to I", np.diff(distances).max(), 0.0, "rad")],
+        measured=f"D and I are {_numbers(distances)} rad apart at alpha = 0, 0.005, 0.01, 0.015",
+        source=source("cusps D and I in the figures' coordinates", special_points, command=families_command(*alphas)),
+        checks=touching,
     )
     yield _separation(evidence, touching)
 
@@ -146,42 +177,59 @@ def _separation(evidence: Evidence, touching: list[Check]) -> Line:
     before = _between(evidence, 0.015)
     angle = float(np.degrees(np.arccos(abs(direction @ before) / np.linalg.norm(direction) / np.linalg.norm(before))))
     return words(
-        *("3.3", "beyond that alpha they separate in another direction", gaps[0] > gaps[1] > gaps[2] and angle > 45),
-        f"their least distance is {_numbers(gaps[::-1])} rad at alpha = 0.02, 0.03, 0.05; at 0.02 across the line from "
-        f"D to I before, at {angle:.0f} degrees to it",
-        touching,
+        section="3.3",
+        claim="beyond that alpha they separate in another direction",
+        thresholds=[
+            above("least growth of the curves' least distance", -np.diff(gaps).max(), 0.0, "rad"),
+            above("angle to the line from D to I before", angle, 45.0, "degrees"),
+        ],
+        measured=f"their least distance is {_numbers(gaps[::-1])} rad at alpha = 0.02, 0.03, 0.05; at 0.02 across the "
+        f"line from D to I before, at {angle:.0f} degrees to it",
+        source=source(
+            "least distance of families 2 and 4", trace, nearest, command=families_command(0.02, 0.03, _AFTER)
+        ),
+        checks=touching,
     )
 
 
 def _split(evidence: Evidence) -> Iterator[Line]:
     ends = {alpha: {n: evidence.family(alpha, n).ends for n in (2, 4)} for alpha in (_SMALL, _AFTER)}
     old, new = ends[_SMALL], ends[_AFTER]
-    exchanged = old[2][0] == new[4][1] and old[4][1] == new[2][0] and old != new
+    exchanged = [old[2][0] == new[4][1] != new[2][0], old[4][1] == new[2][0] != new[4][1]]
     whole = [evidence.residual((_SMALL, _AFTER))]
     yield words(
-        *("3.3", "collision and split: families 2 and 4 take new profiles by alpha = 1/20", exchanged),
-        f"they have exchanged an end: 2 ran to a {old[2][0]}, runs to a {new[2][0]}; 4 ran to a {old[4][1]}, runs to a "
-        f"{new[4][1]}",
-        whole,
+        section="3.3",
+        claim="collision and split: families 2 and 4 take new profiles by alpha = 1/20",
+        thresholds=[equals("ends that have passed to the other family", sum(exchanged), 2)],
+        measured=f"they have exchanged an end: 2 ran to a {old[2][0]}, runs to a {new[2][0]}; 4 ran to a {old[4][1]}, "
+        f"runs to a {new[4][1]}",
+        source=source("ends of families 2 and 4", trace, command=families_command(_SMALL, _AFTER)),
+        checks=whole,
     )
     claim = "at alpha = 1/20 the profiles of families 1 and 3 have changed little from the plane"
     yield _alike(evidence, claim, _PLANE, _AFTER, (1, 3))
-    gone = evidence.special(_AFTER, 2, "D") is None and evidence.special(_AFTER, 4, "I") is None
-    at = [evidence.special(_SMALL, 2, "D"), evidence.special(_SMALL, 4, "I")]
-    claim = "at alpha = 1/20 the cusps D and I have disappeared"
-    text = "neither is found; both are at 1/200" if gone else "one is still there"
-    yield words("3.3", claim, gone and None not in at, text, whole)
+    there = {a: [evidence.special(a, 2, "D"), evidence.special(a, 4, "I")] for a in (_SMALL, _AFTER)}
+    left = {alpha: sum(point is not None for point in points) for alpha, points in there.items()}
+    yield words(
+        section="3.3",
+        claim="at alpha = 1/20 the cusps D and I have disappeared",
+        thresholds=[equals("cusps D and I at 1/200", left[_SMALL], 2), equals("at 1/20", left[_AFTER], 0)],
+        measured="neither is found; both are at 1/200" if left[_AFTER] == 0 else "one is still there",
+        source=source("extrema of the front rate", special_points, command=families_command(_SMALL, _AFTER)),
+        checks=whole,
+    )
     claim = "at alpha = 1/5 the curves are very similar to those at 1/20"
     yield _alike(evidence, claim, _AFTER, _DEEP, FAMILIES)
 
 
 def _role(evidence: Evidence) -> Line:
     touches = [touch for pair in ((2, 4), (1, 3)) if (touch := evidence.touching(pair)) is not None]
-    text = "; ".join(f"{' and '.join(map(str, t.families))} touch at alpha = {t.alpha:.11f}" for t in touches)
+    residual = max((t.residual for t in touches), default=np.inf)
     return words(
-        *("1", "the surface parameter merges and separates families", len(touches) > 0),
-        *(
-            text,
-            [Check("largest residual of the 44 equations", max((t.residual for t in touches), default=np.inf), 1e-12)],
-        ),
+        section="1",
+        claim="the surface parameter merges and separates families",
+        thresholds=[above("alphas at which families touch", len(touches), 0)],
+        measured="; ".join(f"{' and '.join(map(str, t.families))} touch at alpha = {t.alpha:.11f}" for t in touches),
+        source=_TOUCHING,
+        checks=[Check("largest residual of the touching points' equations", residual, 1e-12)],
     )

@@ -7,12 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from reference.circular import LEAN, STEER, CircularMotion, newton, rear_rate_condition
-from reports.paper.ledger import Check, Line, figure, words
+from reference.families import motions
+from reports.paper.ledger import Check, Line, Source, Threshold, above, below, figure, source, words
 
 from .evidence import Evidence
 
 NAMES = ("P1", "P2", "P3", "P4")
 _ROUND_OFF = 1e-14  # of numbers of order ten
+_LARGE = 1.5  # times another lean: what one would call large beside small
 
 
 def configuration_lines(evidence: Evidence) -> Iterator[Line]:
@@ -22,8 +24,26 @@ def configuration_lines(evidence: Evidence) -> Iterator[Line]:
         errors = own_errors(evidence, name, motion)
         for field, what in (("lean", "lean"), ("steer", "steer"), ("front_rate", "front rate")):
             claim = f"{name} of family {point['family']}: {what}"
-            yield figure("3.3", claim, point[field], getattr(motion, field), errors[field])
+            solved = solved_point(evidence, name)
+            yield figure("3.3", claim, point[field], getattr(motion, field), errors[field], solved)
     yield from _descriptions(evidence)
+
+
+def solved_point(evidence: Evidence, name: str) -> Source:
+    """Return the source of a printed point's motion."""
+    return source(
+        "the motion of the family at the rear rate, and again on the curves of a grid of starts",
+        motions,
+        own_errors,
+        command=circular_command(evidence, name),
+    )
+
+
+def circular_command(evidence: Evidence, name: str) -> str:
+    """Return the command that shows a printed point's motion."""
+    point, motion = evidence.figures[name], named_motion(evidence, name)
+    where = f"--alpha {point['alpha']:g} --rear-rate {motion.rear_rate:g} --family {point['family']}"
+    return f"velodrome circular {where} --near={motion.lean:.2f},{motion.steer:.2f}"
 
 
 def named_motion(evidence: Evidence, name: str) -> CircularMotion:
@@ -57,35 +77,43 @@ def own_errors(evidence: Evidence, name: str, motion: CircularMotion) -> dict[st
 def _descriptions(evidence: Evidence) -> Iterator[Line]:
     one, two, three, four = (named_motion(evidence, name) for name in NAMES)
     solved = [Check("largest residual", max(m.residual for m in (one, two, three, four)), 1e-12)]
-    half = np.pi / 2
+    command = " && ".join(circular_command(evidence, name) for name in NAMES)
+    told = source("the motions P1 to P4", motions, command=command)
 
-    def line(claim: str, holds: bool, measured: str) -> Line:
-        return words("3.3", claim, bool(holds), measured, solved)
+    def turns(motion: CircularMotion, left: bool) -> list[Threshold]:
+        half = np.pi / 2
+        if left:
+            return [above("yaw rate", motion.yaw_rate, 0.0, "rad/s"), below("steer", motion.steer, half, "rad")]
+        return [below("yaw rate", motion.yaw_rate, 0.0, "rad/s"), above("steer", motion.steer, half, "rad")]
 
+    def line(claim: str, thresholds: list[Threshold], measured: str) -> Line:
+        return words("3.3", claim, thresholds, measured, told, solved)
+
+    leans = [abs(m.lean) for m in (one, two, three, four)]
     yield line(
         "P1 rides anticlockwise, handlebar forward, with a small lean",
-        one.yaw_rate > 0 and one.steer < half and abs(one.lean) < abs(three.lean) / 2,
-        f"yaw rate {one.yaw_rate:.4f}, steer {one.steer:.4f}, lean {one.lean:.4f}: less than half of P3's",
+        [*turns(one, left=True), below("lean over P3's, which is called large,", leans[0] / leans[2], 1 / _LARGE)],
+        f"yaw rate {one.yaw_rate:.4f}, steer {one.steer:.4f}, lean {one.lean:.4f}: {leans[0] / leans[2]:.3f} of P3's",
     )
     yield line(
         "P2 rides clockwise, handlebar reversed, with a large lean",
-        two.yaw_rate < 0 and two.steer > half and abs(two.lean) > 1.5 * abs(one.lean),
+        [*turns(two, left=False), above("lean over P1's, which is called small,", leans[1] / leans[0], _LARGE)],
         f"yaw rate {two.yaw_rate:.4f}, steer {two.steer:.4f}, lean {two.lean:.4f}",
     )
     yield line(
         "P2's wheels rotate in opposite directions",
-        two.rear_rate * two.front_rate < 0,
+        [below("product of the wheels' rates", two.rear_rate * two.front_rate, 0.0, "rad^2/s^2")],
         f"rear rate {two.rear_rate:.4f}, front rate {two.front_rate:.4f}",
     )
     yield line(
         "P3 is like P1 but for a large lean",
-        three.yaw_rate > 0 and three.steer < half and abs(three.lean) > 1.5 * abs(one.lean),
+        [*turns(three, left=True), above("lean over P1's", leans[2] / leans[0], _LARGE)],
         f"yaw rate {three.yaw_rate:.4f}, steer {three.steer:.4f}, lean {three.lean:.4f}",
     )
     radii = [float(np.hypot(*m.position[:2])) for m in (one, two, three, four)]
     yield line(
         "P4 rides clockwise, handlebar reversed, on a small circle",
-        four.yaw_rate < 0 and four.steer > half and radii[3] == min(radii),
+        [*turns(four, left=False), below("radius over the least of the others", radii[3] / min(radii[:3]), 1.0)],
         f"yaw rate {four.yaw_rate:.4f}, steer {four.steer:.4f}; D's circle {radii[3]:.3f} m, the smallest of "
         + ", ".join(f"{radius:.3f}" for radius in radii),
     )

@@ -19,13 +19,18 @@ from reference.surface import Paraboloid
 from reports.paper import printed
 from reports.paper.ledger import Check
 
-from .search import Found, search
+from .search import OTHER_GRID, Found, missing, search
 
 LONGEST_STEP = 0.05  # of the arc: some 100 to 300 points a family, no stable section known is shorter than three
 OTHER_STEP = 0.03  # a second tracing, whose points lie elsewhere: what it finds tells the error of the first
 LARGEST_TOUCHING = 0.4  # alpha up to which touching points are looked for: two are known below
 
 Thing = TypeVar("Thing")
+
+
+def families_command(*alphas: float) -> str:
+    """Return the command that follows the families at some alphas and tells their special points and sections."""
+    return " && ".join(f"velodrome families --alpha {alpha:g}" for alpha in alphas)
 
 
 @dataclass(frozen=True)
@@ -83,6 +88,17 @@ class Evidence:
     def found(self, alpha: float) -> Found:
         """Static equilibria, pivoting motions and whole curves, from a grid of starts."""
         return self.once(("search", "alpha", alpha), lambda: search(Steady(self.bicycle, Paraboloid(alpha))))
+
+    def searched_again(self, *alphas: float) -> Check:
+        """Whether a search from other starts finds the same: what is counted must not be a grid's chance."""
+        lone = 0
+        for alpha in alphas:
+            again = self.once(
+                ("second search", "alpha", alpha),
+                lambda a=alpha: search(Steady(self.bicycle, Paraboloid(a)), OTHER_GRID),
+            )
+            lone += missing(self.found(alpha), again)
+        return Check("what one of two searches from different starts has found alone", float(lone), 0.0)
 
     def motions(self, alpha: float, number: int, rear_rate: float) -> list[CircularMotion]:
         """Motions of a family at a rear rate."""

@@ -10,9 +10,9 @@ from reference.circular import CircularMotion
 from reference.kinematics import rotations
 from reference.stability import Linearisation, linearise
 from reference.surface import Paraboloid
-from reports.paper.ledger import Check, Line, figure, untestable, words
+from reports.paper.ledger import Check, Line, above, below, figure, source, untestable, words
 
-from .configurations import named_motion, own_errors
+from .configurations import circular_command, named_motion, own_errors, solved_point
 from .evidence import Evidence
 
 _STATES = (("x", "D's x in the heading frame"), ("y", "D's y"), ("lean", "lean"), ("steer", "steer"))
@@ -25,7 +25,9 @@ def point_lines(evidence: Evidence) -> Iterator[Line]:
         errors = own_errors(evidence, name, motion)
         values = {"x": motion.position[0], "y": motion.position[1], "lean": motion.lean, "steer": motion.steer}
         for (field, what), text in zip(_STATES, printed["v"], strict=False):
-            yield figure("4.2", f"{name}: {what}", text, float(values[field]), errors[field])
+            yield figure(
+                "4.2", f"{name}: {what}", text, float(values[field]), errors[field], solved_point(evidence, name)
+            )
         yield from _spectrum(evidence, name, motion)
         why = "the text lacks the matrix; its eigenvalues are held above"
         yield untestable("4.2", f"{name}: the 7 x 7 Jacobian as printed", why, "number")
@@ -36,21 +38,32 @@ def _spectrum(evidence: Evidence, name: str, motion: CircularMotion) -> Iterator
     surface = Paraboloid(evidence.figures[name]["alpha"])
     reduced = linearise(evidence.bicycle, surface, *motion.state())
     error = eigenvalue_errors(reduced)
+    told = source(
+        "eigenvalues of the reduced Jacobian at the motion",
+        linearise,
+        eigenvalue_errors,
+        command=circular_command(evidence, name),
+    )
     for real, imaginary in evidence.figures[name]["eigenvalues"]:
         target = complex(float(real), float(imaginary))
         i = int(np.abs(reduced.eigenvalues - target).argmin())
         value = complex(reduced.eigenvalues[i])
         if target == 0:
-            text = f"smallest {abs(value):.0e}"
-            checks = [Check("its own error", float(error[i]), 1e-9)]
-            yield words("4.2", f"{name}: an eigenvalue is zero", abs(value) < 1e-9, text, checks, "number", "0")
+            yield words(
+                section="4.2",
+                claim=f"{name}: an eigenvalue is zero",
+                thresholds=[below("smallest size of an eigenvalue", abs(value), 1e-9, "1/s")],
+                measured=f"smallest {abs(value):.0e}",
+                source=told,
+                checks=[Check("its own error", float(error[i]), 1e-9)],
+                kind="number",
+                printed="0",
+            )
             continue
-        yield figure(
-            "4.2", f"{name}: eigenvalue {_complex(real, imaginary)}, real part", real, value.real, float(error[i])
-        )
+        claim = f"{name}: eigenvalue {_complex(real, imaginary)}"
+        yield figure("4.2", f"{claim}, real part", real, value.real, float(error[i]), told)
         if target.imag:
-            claim = f"{name}: eigenvalue {_complex(real, imaginary)}, imaginary part"
-            yield figure("4.2", claim, imaginary, abs(value.imag), float(error[i]))
+            yield figure("4.2", f"{claim}, imaginary part", imaginary, abs(value.imag), float(error[i]), told)
 
 
 def _complex(real: str, imaginary: str) -> str:
@@ -75,17 +88,31 @@ def _meaning(evidence: Evidence) -> Iterator[Line]:
         growth = float(np.real(rest).max())
         field = Check("largest of X at the motion", float(np.abs(reduced.field).max()), 1e-9)
         sense, bar = ("anticlockwise", "forward") if forward else ("clockwise", "reversed")
+        command = circular_command(evidence, name)
+        half, than = np.pi / 2, (above, below) if forward else (below, above)
         yield words(
-            *("4.2", f"{name} rides {sense}, handlebar {bar}"),
-            (motion.yaw_rate > 0) == forward and (motion.steer < np.pi / 2) == forward,
-            *(f"yaw rate {motion.yaw_rate:.4f}, steer {motion.steer:.4f}", [field]),
+            section="4.2",
+            claim=f"{name} rides {sense}, handlebar {bar}",
+            thresholds=[
+                than[0]("yaw rate", motion.yaw_rate, 0.0, "rad/s"),
+                than[1]("steer", motion.steer, half, "rad"),
+            ],
+            measured=f"yaw rate {motion.yaw_rate:.4f}, steer {motion.steer:.4f}",
+            source=solved_point(evidence, name),
+            checks=[field],
         )
-        word = "Lyapunov stable, not asymptotically" if stable else "Lyapunov unstable"
+        what = "largest real part of the six other eigenvalues"
         yield words(
-            *("4.2", f"{name} is {word}", (growth < 0) == stable),
-            f"largest real part of the six other eigenvalues {growth:.6f}",
-            [field, Check("own error over its size", float(eigenvalue_errors(reduced).max()) / abs(growth), 1e-3)],
-            "stability",
+            section="4.2",
+            claim=f"{name} is {'Lyapunov stable, not asymptotically' if stable else 'Lyapunov unstable'}",
+            thresholds=[(below if stable else above)(what, growth, 0.0, "1/s")],
+            measured=f"{what} {growth:.6f}",
+            source=source("eigenvalues of the reduced Jacobian at the motion", linearise, command=command),
+            checks=[
+                field,
+                Check("own error over its size", float(eigenvalue_errors(reduced).max()) / abs(growth), 1e-3),
+            ],
+            kind="stability",
         )
     yield _reference_point(evidence)
 
@@ -104,7 +131,19 @@ def _reference_point(evidence: Evidence) -> Line:
         shift = rotations(bicycle, q[None])[0, 0] @ (rise * bicycle.steer_axis)
         other = min(other, float(np.abs(motion.position[:2] + shift[:2] - [float(t) for t in printed]).max()))
     return words(
-        *("2.1", "D is the point of the steering axis at the height of the front axle", worst <= 0.005 < other),
-        f"the printed x and y of Q1 and Q2 then agree to {worst:.4f} m, at the rear axle's height to {other:.4f} m",
-        [Check("largest residual", max(named_motion(evidence, n).residual for n in ("Q1", "Q2")), 1e-12)],
+        section="2.1",
+        claim="D is the point of the steering axis at the height of the front axle",
+        thresholds=[
+            below("largest distance from the printed x and y, to half a unit of their last digit,", worst, 0.005, "m"),
+            above("the same for a D at the rear axle's height", other, 0.005, "m"),
+        ],
+        measured=f"the printed x and y of Q1 and Q2 then agree to {worst:.4f} m, at the rear axle's height to "
+        f"{other:.4f} m",
+        source=source(
+            "D of Q1 and Q2 for two readings of its place",
+            named_motion,
+            rotations,
+            command=" && ".join(circular_command(evidence, name) for name in ("Q1", "Q2")),
+        ),
+        checks=[Check("largest residual", max(named_motion(evidence, n).residual for n in ("Q1", "Q2")), 1e-12)],
     )

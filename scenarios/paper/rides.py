@@ -15,7 +15,7 @@ from reference.kinematics import REAR_ANGLE
 from reference.simulate import Motion, simulate, simulate_modified_euler
 from reference.stability import independent, linearise
 from reference.surface import Paraboloid
-from reports.paper.ledger import Check, Line, words
+from reports.paper.ledger import Check, Line, above, below, source, words
 
 from .configurations import named_motion
 from .energy import motion_of_energy
@@ -101,14 +101,22 @@ def _unstable(evidence: Evidence) -> Iterator[Line]:
     delay, expected = half.at - one.at, np.log(4) / growth
     grown = Check("growth rate of the precise ride, relative to the eigenvalue", abs(precise.rate / growth - 1), 1e-2)
     yield words(
-        *("4.2", "even with just numerical errors Q1 does not keep its circle", bool(np.isfinite(one.at))),
-        f"started on Q1 to round-off, modified Euler at {step:g} s is off by 1 % of the radius at {one.at:.2f} s, at "
-        f"half the step {delay:.3f} s later (ln 4 / {growth:.5f} = {expected:.3f}: an error of order two that grows "
-        f"with the eigenvalue); the precise integrator at {precise.at:.2f} s, growing at {precise.rate:.5f} 1/s",
-        [grown, Check("delay at half the step, less the expected", abs(delay - expected), 0.02)],
-        "simulation",
+        section="4.2",
+        claim="even with just numerical errors Q1 does not keep its circle",
+        thresholds=[below(f"time until the radius is off by {_LEAVES:.0%}", _or_never(one.at), _WATCHED["paper"], "s")],
+        measured=f"started on Q1 to round-off, modified Euler at {step:g} s is off by 1 % of the radius at "
+        f"{one.at:.2f} s, at half the step {delay:.3f} s later (ln 4 / {growth:.5f} = {expected:.3f}: an error of "
+        f"order two that grows with the eigenvalue); the precise integrator at {precise.at:.2f} s, growing at "
+        f"{precise.rate:.5f} 1/s",
+        source=source("rides from Q1 by two integrators", simulate_modified_euler, simulate, linearise),
+        checks=[grown, Check("delay at half the step, less the expected", abs(delay - expected), 0.02)],
+        kind="simulation",
     )
     yield _rounded_start(evidence, motion, surface, step)
+
+
+def _or_never(time: float) -> float:
+    return time if np.isfinite(time) else float("inf")
 
 
 def _rounded_start(evidence: Evidence, motion: CircularMotion, surface: Paraboloid, step: float) -> Line:
@@ -124,11 +132,14 @@ def _rounded_start(evidence: Evidence, motion: CircularMotion, surface: Parabolo
     ]
     leaves = [leaving_time(ride, circle) for ride in rides]
     return words(
-        *("4.2", "Q1, started from v* as printed, leaves its circle", bool(np.all(np.isfinite(leaves)))),
-        f"off by 1 % at {leaves[0]:.3f} s, by the precise integrator at {leaves[1]:.3f} s: here it is the two printed "
-        "decimals that matter, not the integrator",
-        [Check("integrators' difference", abs(leaves[0] - leaves[1]), 0.01)],
-        "simulation",
+        section="4.2",
+        claim="Q1, started from v* as printed, leaves its circle",
+        thresholds=[below(f"time until the radius is off by {_LEAVES:.0%}", _or_never(max(leaves)), times[-1], "s")],
+        measured=f"off by 1 % at {leaves[0]:.3f} s, by the precise integrator at {leaves[1]:.3f} s: here it is the two "
+        "printed decimals that matter, not the integrator",
+        source=source("rides from v* as printed by two integrators", simulate_modified_euler, simulate),
+        checks=[Check("integrators' difference", abs(leaves[0] - leaves[1]), 0.01)],
+        kind="simulation",
     )
 
 
@@ -155,11 +166,14 @@ def _energy(evidence: Evidence, rides: dict[int, Motion]) -> Line:
     drift = max(float(np.ptp(e) / e[0]) for e in (_energies(evidence, ride) for ride in rides.values()))
     evaluations = sum(ride.evaluations for ride in rides.values())
     return words(
-        *("2.3", "the uncontrolled bicycle conserves energy", drift < 1e-8),
-        f"over {_LONG:g} s of the two disturbed rides of Q2 by {drift:.0e} of itself, what the tolerance of "
+        section="2.3",
+        claim="the uncontrolled bicycle conserves energy",
+        thresholds=[below("change of the energy, relative,", drift, 1e-8)],
+        measured=f"over {_LONG:g} s of the two disturbed rides of Q2 by {drift:.0e} of itself, what the tolerance of "
         f"{_TOLERANCE:.0e} leaves",
-        [Check("evaluations of the right-hand side (must be many)", -evaluations, -1000)],
-        "simulation",
+        source=source("energy along two disturbed rides of Q2", simulate, observe),
+        checks=[Check("evaluations of the right-hand side (must be many)", -evaluations, -1000)],
+        kind="simulation",
     )
 
 
@@ -197,33 +211,49 @@ def _stable(evidence: Evidence, rides: dict[int, Motion]) -> Iterator[Line]:
     whole = [Check("rides that ended early", float(sum(ride.ended is not None for ride in rides.values())), 0.0)]
     circle = float(np.hypot(*motion.position[:2]))
     off = [float(np.abs(radius(ride) - circle).max()) for ride in rides.values()]
+    ridden = source("rides from Q2, disturbed, over 1200 s", simulate)
     yield words(
-        *("4.2", "disturbed by a lean rate of +-0.1 rad/s Q2 stays close to its circle", max(off) < _CLOSE * circle),
-        f"over {_LONG:g} s D's distance from the axis departs from {circle:.4f} m by at most {off[0]:.3f} (+) and "
-        f"{off[1]:.3f} m (-), within {_CLOSE:.0%}",
-        whole,
-        "simulation",
+        section="4.2",
+        claim="disturbed by a lean rate of +-0.1 rad/s Q2 stays close to its circle",
+        thresholds=[below("largest departure of the radius, relative,", max(off) / circle, _CLOSE)],
+        measured=f"over {_LONG:g} s D's distance from the axis departs from {circle:.4f} m by at most {off[0]:.3f} (+) "
+        f"and {off[1]:.3f} m (-), within {_CLOSE:.0%}",
+        source=ridden,
+        checks=whole,
+        kind="simulation",
     )
     plus, minus = (_settling(evidence, ride, motion) for ride in rides.values())
     error = max(abs(one.limit - one.predicted) for one in (plus, minus))
-    apart = min(abs(one.limit - motion.rear_rate) for one in (plus, minus))
+    apart = [abs(one.limit - motion.rear_rate) for one in (plus, minus)]
     left = max(plus.left, minus.left)
     yield words(
-        *("4.2", "the disturbed Q2's rear rate converges to a constant near, but not equal to, its own"),
-        1e-3 < apart < 1 and left < 1e-6,
-        f"to {plus.limit:.7f} (+) and {minus.limit:.7f} rad/s (-), constant to {left:.0e}; the circles of family 2 "
-        f"that have the disturbed energies have {plus.predicted:.7f} and {minus.predicted:.7f}",
-        [*whole, Check("limits against the prediction from energy", error, 1e-6)],
-        "simulation",
+        section="4.2",
+        claim="the disturbed Q2's rear rate converges to a constant near, but not equal to, its own",
+        thresholds=[
+            above("lesser distance of the constant from Q2's rear rate", min(apart), 1e-3, "rad/s"),
+            below("larger distance", max(apart), 1.0, "rad/s"),
+            below("span of the rear rate in the last 100 s", left, 1e-6, "rad/s"),
+        ],
+        measured=f"to {plus.limit:.7f} (+) and {minus.limit:.7f} rad/s (-), constant to {left:.0e}; the circles of "
+        f"family 2 that have the disturbed energies have {plus.predicted:.7f} and {minus.predicted:.7f}",
+        source=source("rides from Q2, disturbed, and the circles of their energies", simulate, motion_of_energy),
+        checks=[*whole, Check("limits against the prediction from energy", error, 1e-6)],
+        kind="simulation",
     )
     slowest = float(np.sort(np.real(linearise(evidence.bicycle, surface, *motion.state()).eigenvalues))[-2])
     departs = abs((plus.decay + minus.decay) / 2 / slowest - 1)
     yield words(
-        *("4.2", "Q2 is stable but not asymptotically: a disturbance does not die out", apart > 1e-3 and slowest < 0),
-        f"what oscillates decays at {-plus.decay:.4f} and {-minus.decay:.4f} 1/s, the slowest eigenvalue's "
+        section="4.2",
+        claim="Q2 is stable but not asymptotically: a disturbance does not die out",
+        thresholds=[
+            above("lesser distance that stays of the rear rate from Q2's", min(apart), 1e-3, "rad/s"),
+            below("slowest eigenvalue's real part", slowest, 0.0, "1/s"),
+        ],
+        measured=f"what oscillates decays at {-plus.decay:.4f} and {-minus.decay:.4f} 1/s, the slowest eigenvalue's "
         f"{-slowest:.4f}; the change of energy stays",
-        [*whole, Check("decay over the slowest eigenvalue's, less one", departs, 0.1)],
-        "simulation",
+        source=source("rides from Q2, disturbed, and the eigenvalues at Q2", simulate, linearise),
+        checks=[*whole, Check("decay over the slowest eigenvalue's, less one", departs, 0.1)],
+        kind="simulation",
     )
 
 

@@ -22,14 +22,45 @@ from reference.circular import (
 from reference.continuation import follow, sign_changes
 from reference.kernels.steady import STANDING, UNKNOWNS
 
-# Starts: angles on a grid, at rest, pivoting and at some rear rates that curves of benchmark size pass.
-_LEANS, _STEERS, _RATES = np.linspace(-1.2, 1.2, 7), np.linspace(0.05, 3.09, 7), (4.0, 12.0, 18.0, 24.0)
 _MOST = 25  # Newton steps
 _SAME = 1e-5  # two solutions of one start's condition; each is known to round-off
 _ON_CURVE = 0.1  # from a followed curve's nearest point: curves are followed in steps of as much
 # Unknowns that mirroring left and right turns about: y, lean, steer, yaw speed, and at both contacts the
 # position and the force across.
 _ACROSS = [1, 3, 5, 6, 11, 14, 17, 20]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Starts: angles on a grid, at rest, pivoting and at some rear rates that curves of benchmark size pass.
+
+    Attributes
+    ----------
+    lean, steer : tuple
+        Least, largest [rad], and number.
+    rates : tuple of float
+        [rad/s].
+    """
+
+    lean: tuple[float, float, int]
+    steer: tuple[float, float, int]
+    rates: tuple[float, ...]
+
+    @property
+    def described(self) -> str:
+        """The starts in words."""
+        (least, largest, leans), (first, last, steers) = self.lean, self.steer
+        rates = ", ".join(f"{rate:g}" for rate in self.rates)
+        return (
+            f"Newton's method from {leans} leans of {least:g} to {largest:g} and {steers} steers of {first:g} to "
+            f"{last:g} rad, at rest, pivoting, and at rear rates of {rates} rad/s, and the whole curves through what "
+            "it finds; what no start leads to is not found"
+        )
+
+
+GRID = Grid((-1.2, 1.2, 7), (0.05, 3.09, 7), (4.0, 12.0, 18.0, 24.0))
+# Starts of which none is one of the other grid's, nor at one of its rates: what both find is not a grid's chance.
+OTHER_GRID = Grid((-1.3, 1.3, 8), (0.02, 3.12, 8), (2.0, 7.0, 15.0, 21.0, 40.0))
 
 
 @dataclass(frozen=True)
@@ -43,12 +74,15 @@ class Found:
         Static equilibria and pivoting motions that circular motions lead to.
     curves : list of ndarray, shape (n, 22)
         Each from one end to the other, through a pivoting motion where it has one.
+    described : str
+        How it was searched.
     """
 
     equations: Steady
     static: list[np.ndarray]
     pivoting: list[np.ndarray]
     curves: list[np.ndarray]
+    described: str
 
     @property
     def families(self) -> int:
@@ -56,18 +90,31 @@ class Found:
         return len(self.curves) + sum(_pivots(curve) for curve in self.curves)
 
 
-def search(equations: Steady) -> Found:
+def search(equations: Steady, grid: Grid = GRID) -> Found:
     """Look for all circular motions of a bicycle on a surface."""
-    static = list(_distinct(_solutions(equations, unknown_condition(SIGMA, 0.0))))
-    pivoting = list(_distinct(_solutions(equations, unknown_condition(REAR_SPEED, 0.0))))
+    static = list(_distinct(_solutions(equations, unknown_condition(SIGMA, 0.0), grid)))
+    pivoting = list(_distinct(_solutions(equations, unknown_condition(REAR_SPEED, 0.0), grid)))
     starts = [*static, *pivoting]
-    for rate in _RATES:
-        starts += _solutions(equations, rear_rate_condition(rate))
+    for rate in grid.rates:
+        starts += _solutions(equations, rear_rate_condition(rate), grid)
     curves: list[np.ndarray] = []
     for start in starts:
         if all(distance(curve, start) > _ON_CURVE for curve in curves):
             curves.append(_whole(equations, start))
-    return Found(equations, static, pivoting, curves)
+    return Found(equations, static, pivoting, curves, grid.described)
+
+
+def missing(one: Found, other: Found) -> int:
+    """Number of equilibria, pivoting motions and curves that one of two searches has and the other has not."""
+    lone = sum(abs(len(getattr(one, what)) - len(getattr(other, what))) for what in ("static", "pivoting", "curves"))
+    for first, second in ((one, other), (other, one)):
+        for what in ("static", "pivoting"):
+            known = [coordinates(u) for u in getattr(second, what)]
+            lone += sum(all(np.abs(coordinates(u) - k).max() > _SAME for k in known) for u in getattr(first, what))
+        # In the middle of a curve: at their ends two followed curves may differ by a step.
+        middles = [curve[len(curve) // 2] for curve in first.curves]
+        lone += sum(all(distance(curve, u) > _ON_CURVE for curve in second.curves) for u in middles)
+    return lone
 
 
 def mirrored(unknowns: np.ndarray) -> np.ndarray:
@@ -93,9 +140,9 @@ def _pivots(curve: np.ndarray) -> int:
     return len(sign_changes(curve[:, REAR_SPEED], STANDING))
 
 
-def _solutions(equations: Steady, condition: Callable) -> Iterator[np.ndarray]:
-    for lean in _LEANS:
-        for steer in _STEERS:
+def _solutions(equations: Steady, condition: Callable, grid: Grid) -> Iterator[np.ndarray]:
+    for lean in np.linspace(*grid.lean):
+        for steer in np.linspace(*grid.steer):
             try:
                 start = start_on_plane(equations.bicycle, float(lean), float(steer))
                 unknowns, _ = newton(equations, start, condition, most=_MOST)

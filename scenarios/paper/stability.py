@@ -11,18 +11,20 @@ from reference.circular import SIGMA, CircularMotion
 from reference.critical import CriticalPoint, last_stable
 from reference.curve import sample
 from reference.families import FAMILIES
-from reference.sections import SectionEnd
+from reference.sections import SectionEnd, stable_sections
+from reference.special import special_points
 from reference.stability import Linearisation, growth_rate, linearise
 from reference.surface import Paraboloid
-from reports.paper.ledger import Check, Line, words
+from reports.paper.ledger import Check, Line, Source, Threshold, above, below, equals, source, words
 
-from .evidence import OTHER_STEP, Evidence
+from .evidence import OTHER_STEP, Evidence, families_command
 from .profile import abscissa
 from .rides import disturbed_decay
 
 _NEIGHBOUR = 0.05  # rad of lean and steer, of curves some 7 rad long
 _SHRINKING = (0.0, 0.0025, 0.005, 0.0075, 0.01, 0.015, 0.02, 0.025, 0.03, 0.033)
 _SCAN = (0.075, 0.1, 0.15, 0.3, 0.4, 0.5, 0.6, 0.75, 0.9)
+_VANISHING = source("where the last stable section of a family vanishes", last_stable, command="velodrome critical")
 _SEARCHED = 0.05  # alpha up to which last sections are looked for closely; the scan goes on from there
 
 
@@ -57,14 +59,33 @@ def _stable_families(evidence: Evidence, alpha: float) -> Line:
     text = "; ".join(_text(n, ends) for n in stable for ends in sections[n])
     if not stable:
         text = f"none, on the families or on any curve from a grid of starts; slowest growth {least:.4f} 1/s"
-    checks = _section_checks(evidence, alpha, sections)
+    checks = [*_section_checks(evidence, alpha, sections), evidence.searched_again(alpha)]
     # What is stable against the print must stay when it is disturbed, by the equations of motion themselves.
     for number in set(stable) - set(printed):
-        for ends in sections[number]:
-            checks.append(_stays(evidence, alpha, number, ends))
-    holds = stable == printed and (bool(stable) or least > 0)
+        checks += [_stays(evidence, alpha, number, ends) for ends in sections[number]]
+    thresholds: list[Threshold] = [
+        equals(
+            f"family {number}: whether it has a stable section (0, 1)", int(number in stable), int(number in printed)
+        )
+        for number in FAMILIES
+    ]
+    if not stable:
+        thresholds.append(above("slowest growth on all curves", least, 0.0, "1/s"))
     return words(
-        "4.2", f"at alpha = {alpha:g} stable motions are in families: {named}", holds, text, checks, "stability", named
+        section="4.2",
+        claim=f"at alpha = {alpha:g} stable motions are in families: {named}",
+        thresholds=thresholds,
+        measured=text,
+        source=source(
+            "stable sections of all families, their ends solved for, and the growth on all curves",
+            stable_sections,
+            sample,
+            command=families_command(alpha),
+            search=evidence.found(alpha).described,
+        ),
+        checks=checks,
+        kind="stability",
+        printed=named,
     )
 
 
@@ -128,14 +149,18 @@ def _next_to_cusps(evidence: Evidence, alpha: float, cusps: dict[int, str]) -> L
             ends = [end.motion for section in sections for end in section]
             gaps[name] = min([np.inf, *(float(np.hypot(m.lean - cusp.lean, m.steer - cusp.steer)) for m in ends)])
     return words(
-        *("4.2", f"at alpha = {alpha:g} stable motions neighbour the cusp {' and '.join(cusps.values())}"),
-        len(gaps) == len(cusps) and max(gaps.values()) < _NEIGHBOUR,
-        "they begin "
+        section="4.2",
+        claim=f"at alpha = {alpha:g} stable motions neighbour the cusp {' and '.join(cusps.values())}",
+        thresholds=[
+            equals("cusps found", len(gaps), len(cusps)),
+            below("largest distance of a stable section from its cusp", max(gaps.values()), _NEIGHBOUR, "rad"),
+        ],
+        measured="they begin "
         + ", ".join(f"{gap:.5f} rad from {name}" for name, gap in gaps.items())
-        + "; the cusps themselves "
-        "are unstable",
-        [evidence.residual((alpha,))],
-        "stability",
+        + "; the cusps themselves are unstable",
+        source=source("stable sections and cusps", stable_sections, special_points, command=families_command(alpha)),
+        checks=[evidence.residual((alpha,))],
+        kind="stability",
     )
 
 
@@ -148,11 +173,20 @@ def _small(evidence: Evidence) -> Line:
     largest = max(widths.values(), default=0.0)
     text = "; ".join(f"{where}: {width:.4f}" for where, width in widths.items())
     return words(
-        *("4.2", "stable sections are small", largest < 0.1 * np.pi / 2),
-        f"widths on the figures' abscissa, which is pi/2 long: {text}",
-        [evidence.residual()],
-        "stability",
+        section="4.2",
+        claim="stable sections are small",
+        thresholds=[
+            below("largest width on the figures' abscissa, a tenth of its length,", largest, 0.05 * np.pi, "rad")
+        ],
+        measured=f"widths on the figures' abscissa, which is pi/2 long: {text}",
+        source=_sections_of(evidence.cases),
+        checks=[evidence.residual()],
+        kind="stability",
     )
+
+
+def _sections_of(alphas: tuple[float, ...]) -> Source:
+    return source("stable sections of all families", stable_sections, command=families_command(*alphas))
 
 
 def _last(evidence: Evidence, number: int) -> CriticalPoint | None:
@@ -162,28 +196,46 @@ def _last(evidence: Evidence, number: int) -> CriticalPoint | None:
 def _second_and_fourth(evidence: Evidence) -> Line:
     two, four = _last(evidence, 2), _last(evidence, 4)
     others = [n for n in (1, 3) if any(evidence.sections(alpha, n) for alpha in evidence.cases)]
+    claim = "when the curvature is very small there are stable sections in families 2 and 4"
     if two is None or four is None:
-        return words("5", "stable sections are in families 2 and 4", False, "one of them has none", [])
+        missing = equals("families 2 and 4 with stable sections", sum(each is not None for each in (two, four)), 2)
+        return words("5", claim, [missing], "one of them has none", _VANISHING, [])
     residual = Check("growth rate where the last sections vanish", max(two.residual, four.residual), 1e-9)
     return words(
-        *("5", "when the curvature is very small there are stable sections in families 2 and 4", not others),
-        f"in family 4 up to alpha = {four.alpha:.10f}, in family 2 up to {two.alpha:.10f}; so in both at 1/200 too",
-        [residual],
-        "stability",
+        section="5",
+        claim=claim,
+        thresholds=[
+            equals("other families with stable sections, in the five cases", len(others), 0),
+            above("lesser alpha up to which both have one", min(two.alpha, four.alpha), 0.0, "1/m"),
+        ],
+        measured=f"in family 4 up to alpha = {four.alpha:.10f}, in family 2 up to {two.alpha:.10f}; so in both at "
+        "1/200 too",
+        source=_VANISHING,
+        checks=[residual],
+        kind="stability",
     )
 
 
 def _shrinks(evidence: Evidence) -> Line:
-    holds, parts = True, []
+    slowest, first, parts = np.inf, np.inf, []
     for number in (2, 4):
         widths = [sum(_width(evidence, e) for e in evidence.sections(a, number)) for a in _SHRINKING]
-        holds = holds and widths[0] > 0 and all(b < a or a == b == 0 for a, b in pairwise(widths))
+        # Where there is none left it cannot shrink.
+        slowest = min([slowest, *(a - b for a, b in pairwise(widths) if a > 0 or b > 0)])
+        first = min(first, widths[0])
         parts.append(f"family {number}: " + ", ".join(f"{width:.4f}" for width in widths))
     return words(
-        *("5", "the stable region shrinks as the curvature grows", holds),
-        f"widths on the figures' abscissa at alpha = {', '.join(f'{a:g}' for a in _SHRINKING)}: {'; '.join(parts)}",
-        [evidence.residual((0.0, 0.005))],
-        "stability",
+        section="5",
+        claim="the stable region shrinks as the curvature grows",
+        thresholds=[
+            above("lesser width on the plane", first, 0.0, "rad"),
+            above("least shrinking from one alpha to the next", slowest, 0.0, "rad"),
+        ],
+        measured=f"widths on the figures' abscissa at alpha = {', '.join(f'{a:g}' for a in _SHRINKING)}: "
+        f"{'; '.join(parts)}",
+        source=_sections_of(_SHRINKING),
+        checks=[evidence.residual((0.0, 0.005))],
+        kind="stability",
     )
 
 
@@ -192,24 +244,40 @@ def _none_from(evidence: Evidence) -> Line:
     alphas = sorted(alpha for alpha in {*evidence.cases, *_SCAN} if alpha >= start)
     slowest = {alpha: _least_growth(evidence, alpha) for alpha in alphas}
     last = max((point.alpha for point in (_last(evidence, n) for n in (2, 4)) if point is not None), default=np.nan)
+    residual = max((p.residual for n in (2, 4) if (p := _last(evidence, n))), default=np.inf)
     return words(
-        *("5", f"from alpha = {start:g} on no stable section exists", min(slowest.values()) > 0 and last < start),
-        f"none at {len(alphas)} alphas up to 1, slowest growth {min(slowest.values()):.4f} 1/s; the last one vanishes "
-        f"at {last:.10f}",
-        [Check("growth rate where it vanishes", max(p.residual for n in (2, 4) if (p := _last(evidence, n))), 1e-9)],
-        "stability",
+        section="5",
+        claim=f"from alpha = {start:g} on no stable section exists",
+        thresholds=[
+            above(f"slowest growth at {len(alphas)} alphas from there on", min(slowest.values()), 0.0, "1/s"),
+            below("alpha at which the last section vanishes", last, start, "1/m"),
+        ],
+        measured=f"none at {len(alphas)} alphas up to 1, slowest growth {min(slowest.values()):.4f} 1/s; the last one "
+        f"vanishes at {last:.10f}. Between these alphas and beyond 1 nothing is proved",
+        source=source(
+            "growth on all curves at some alphas, and where the last section vanishes",
+            sample,
+            last_stable,
+            command="velodrome critical",
+            search=evidence.found(alphas[-1]).described,
+        ),
+        checks=[Check("growth rate where it vanishes", residual, 1e-9)],
+        kind="stability",
     )
 
 
 def _only_small(evidence: Evidence) -> Line:
-    point = _last(evidence, 2)
+    point, claim = _last(evidence, 2), "stable motions exist only on very small curvature"
     if point is None:
-        return words("1", "stable motions exist only on very small curvature", False, "no last one is found", [])
+        return words("1", claim, [equals("last sections", 0, 1)], "no last one is found", _VANISHING, [])
     curvature = 2 * point.alpha
     return words(
-        *("1", "stable motions exist only on very small curvature", curvature * evidence.bicycle.wheelbase < 0.1),
-        f"up to a curvature of {curvature:.6f} 1/m at the bottom: a radius of {1 / curvature:.1f} m, "
+        section="1",
+        claim=claim,
+        thresholds=[below("largest curvature times the wheelbase", curvature * evidence.bicycle.wheelbase, 0.1)],
+        measured=f"up to a curvature of {curvature:.6f} 1/m at the bottom: a radius of {1 / curvature:.1f} m, "
         f"{1 / curvature / evidence.bicycle.wheelbase:.0f} wheelbases",
-        [Check("growth rate where the last section vanishes", point.residual, 1e-9)],
-        "stability",
+        source=_VANISHING,
+        checks=[Check("growth rate where the last section vanishes", point.residual, 1e-9)],
+        kind="stability",
     )

@@ -6,30 +6,35 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference.circular import LEAN, REAR_SPEED, SIGMA, STEER, Steady, newton, unknown_condition
+from reference.circular import LEAN, REAR_SPEED, SIGMA, STEER
+from reference.critical import reconnections
 from reference.curve import sample
-from reference.families import FAMILIES
-from reference.surface import Paraboloid
-from reports.paper.ledger import Check, Line, count, words
+from reference.families import FAMILIES, trace
+from reports.paper.ledger import Check, Line, Source, above, below, count_by_cut, equals, source, words
 
 from .bowl import profiles
-from .evidence import Evidence
+from .evidence import Evidence, families_command
+from .fast import carry_pivot, pivot_at, squared_rates, with_angle
 from .limits import Limit, limit
-from .search import Found, coordinates, distance
+from .search import Found, coordinates, distance, search
 
-_STEEP, _DEEP, _BETWEEN = 1.0, 0.2, 0.44
+_STEEP, _DEEP = 1.0, 0.2
+_BETWEEN = (0.425, 0.44, 0.46)  # where no pivoting motion is left
 _MUCH = 0.4  # rad in the figures' coordinates: twice what counts as alike
-_SECANT = 30
+_NEAR_REST, _NEAR_INFINITY = 0.41, 0.47  # alphas at which the pivoting motion is slow, and fast
+_SAME = 0.1  # in `coordinates`: curves are followed in steps of as much
 
 
 def steep_lines(evidence: Evidence) -> Iterator[Line]:
     """Lines on alpha = 1 and on all alphas."""
     found = evidence.found(_STEEP)
     yield _changed(evidence)
-    yield _still_there(found)
+    yield _still_there(evidence, found)
     yield _third_and_fourth(evidence, found)
     yield from _first_and_third(evidence, found)
+    yield from _four_still(evidence, found)
     yield from _always(evidence)
+    yield _never_without(evidence)
 
 
 def _solved(found: Found) -> Check:
@@ -44,20 +49,33 @@ def _solved(found: Found) -> Check:
 def _changed(evidence: Evidence) -> Line:
     apart_by = profiles(evidence, _DEEP, _STEEP, FAMILIES)
     return words(
-        *("3.3", "when alpha is large the profiles change a lot", max(apart_by) > _MUCH),
-        f"from 1/5 to 1 the curves followed from the families' anchors move by "
+        section="3.3",
+        claim="when alpha is large the profiles change a lot",
+        thresholds=[above("largest distance of two curves in the figures' coordinates", max(apart_by), _MUCH, "rad")],
+        measured=f"from 1/5 to 1 the curves followed from the families' anchors move by "
         f"{', '.join(f'{value:.2f}' for value in apart_by)} rad in the figures' coordinates",
-        [evidence.residual((_DEEP, _STEEP))],
+        source=source("the families' curves and their distance", profiles, command=families_command(_DEEP, _STEEP)),
+        checks=[evidence.residual((_DEEP, _STEEP))],
     )
 
 
-def _still_there(found: Found) -> Line:
+def _searched(found: Found, what: str) -> Source:
+    return source(what, search, search=found.described)
+
+
+def _still_there(evidence: Evidence, found: Found) -> Line:
     forces = sample(found.equations, np.array([*found.static, *found.pivoting])).normal_force
     return words(
-        *("3.3", "at alpha = 1 a static equilibrium A and a pivoting motion G (H) still exist", _one_each(found)),
-        f"one of each, but in both the ground would have to pull the front wheel: {forces[0, 1]:.1f} N at A (steer "
-        f"{found.static[0][STEER]:.6f}), {forces[-1, 1]:.1f} N at G",
-        [_solved(found)],
+        section="3.3",
+        claim="at alpha = 1 a static equilibrium A and a pivoting motion G (H) still exist",
+        thresholds=[
+            equals("static equilibria", len(found.static), 1),
+            equals("pivoting motions", len(found.pivoting), 1),
+        ],
+        measured=f"one of each, but in both the ground would have to pull the front wheel: {forces[0, 1]:.1f} N at A "
+        f"(steer {found.static[0][STEER]:.6f}), {forces[-1, 1]:.1f} N at G",
+        source=_searched(found, "static equilibria and pivoting motions, and their contact forces"),
+        checks=[_solved(found), evidence.searched_again(_STEEP)],
     )
 
 
@@ -71,9 +89,12 @@ def _third_and_fourth(evidence: Evidence, found: Found) -> Line:
         start = evidence.family(_STEEP, number).points[0].unknowns
         gaps.append(float(np.abs(np.abs(start) - np.abs(found.pivoting[0])).max()))
     return words(
-        *("3.3", "at alpha = 1 family 3 merges with family 4 at G", max(gaps) < 1e-12),
-        f"both start in the one pivoting motion: constants differ by {max(gaps):.0e}",
-        [_solved(found)],
+        section="3.3",
+        claim="at alpha = 1 family 3 merges with family 4 at G",
+        thresholds=[below("largest difference of the constants of their ends from G's", max(gaps), 1e-12)],
+        measured=f"both start in the one pivoting motion: constants differ by {max(gaps):.0e}",
+        source=source("the ends of families 3 and 4", trace, command=families_command(_STEEP)),
+        checks=[_solved(found)],
     )
 
 
@@ -90,36 +111,99 @@ def _towards(found: Found, curve: np.ndarray) -> Limit:
 def _first_and_third(evidence: Evidence, found: Found) -> Iterator[Line]:
     at_rest, pivoting = _holding(found, found.static[0]), _holding(found, found.pivoting[0])
     one, other = _towards(found, at_rest), _towards(found, pivoting)
-    same_limit = max(abs(one.steer), abs(other.steer)) < 1e-3 and min(one.front_rate, other.front_rate) > 300
     touch = evidence.touching((1, 3))
-    exchanged = [_solved(found)]
+    solved, again = _solved(found), evidence.searched_again(_STEEP)
+    exchanged = [solved]
     if touch is not None:
-        exchanged.append(Check("residual of the touching point's 44 equations", touch.residual, 1e-12))
+        exchanged.append(Check("residual of the touching point's equations", touch.residual, 1e-12))
     where = "nowhere" if touch is None else f"at alpha = {touch.alpha:.11f}"
     yield words(
-        *("3.3", "at alpha = 1 family 3 merges with family 1 too", same_limit and touch is not None),
-        f"they have exchanged ends {where}: the curve that starts in A, as family 1 did, runs to F (-pi/2, 0, "
+        section="3.3",
+        claim="by alpha = 1 family 3 has met family 1",
+        thresholds=[
+            equals("alphas below 1 at which they touch", int(touch is not None), 1),
+            below("larger steer of the two curves' flat ends", max(abs(one.steer), abs(other.steer)), 1e-3, "rad"),
+            above("lesser front rate there", min(one.front_rate, other.front_rate), 300.0, "rad/s"),
+        ],
+        measured=f"they have exchanged ends {where}: the curve that starts in A, as family 1 did, runs to F (-pi/2, 0, "
         f"infinity), as family 3 did; the curve of G tends to the same corner of the figure (steers {one.steer:.5f}, "
         f"{other.steer:.5f})",
-        exchanged,
+        source=source("the touching point, and the curves' limits", reconnections, limit, command="velodrome critical"),
+        checks=exchanged,
     )
+    yield _at_b(evidence, found)
     near = min(distance(pivoting, u) for u in at_rest)
-    joined = near < 1e-3 or abs(one.radius - other.radius) < 1e-3
+    apart = abs(one.radius - other.radius)
     yield words(
-        *("3.3", "so at alpha = 1 families 1, 3 and 4 are one combined family", joined),
-        f"the curve of A and the curve of G (through H into family 4) share no motion: nowhere nearer than {near:.3f} "
-        f"(lean, steer, pitch, bounded radius and speed); at the corner they share in the figure D rides circles of "
-        f"{one.radius:.4f} and {other.radius:.4f} m",
-        [_solved(found), Check("residual on the way to the corner", max(one.residual, other.residual), 1e-12)],
+        section="3.3",
+        claim="so at alpha = 1 families 1, 3 and 4 are one combined family",
+        thresholds=[
+            below("least distance of the curve of A from that of G (its coordinates as in `search`)", near, _SAME)
+        ],
+        measured=f"the curve of A and the curve of G (through H into family 4) share no motion: nowhere nearer than "
+        f"{near:.3f} (lean, steer, pitch, bounded radius and speed); at the corner they share in the figure D rides "
+        f"circles of {one.radius:.4f} and {other.radius:.4f} m, {apart:.4f} m apart",
+        source=_searched(found, "the curves through A and through G"),
+        checks=[solved, again, Check("residual on the way to the corner", max(one.residual, other.residual), 1e-12)],
     )
     yield _combined_somewhere(evidence)
-    printed = evidence.figures["counts"]["families"]
-    ends = "; ".join(_ends(curve) for curve in found.curves)
-    yield count(
-        *("5", "at alpha = 1 there still are four families", printed, found.families),
-        f"{len(found.curves)} curves, one through the pivoting motion: {found.families} families ({ends})",
-        [_solved(found), Check("nearest two curves, over how near is the same", 0.1 / _nearest(found), 1.0)],
+
+
+def _at_b(evidence: Evidence, found: Found) -> Line:
+    """B as the text has it: straight ahead, upright, which is the limit of large circles with the handlebar forward."""
+    ends = [(curve, u) for curve in found.curves for u in (curve[0], curve[-1]) if u[STEER] < 0.5 * np.pi]
+    straight, end = max(ends, key=lambda pair: float(np.hypot(*pair[1][:2])))
+    pivoting, at_rest = _holding(found, found.pivoting[0]), _holding(found, found.static[0])
+    apart = min(distance(pivoting, u) for u in straight)
+    from_a = min(distance(at_rest, u) for u in straight)
+    return words(
+        section="3.3",
+        claim="at alpha = 1 family 3 merges with family 1 at point B",
+        thresholds=[below("least distance of B's curve from that of G (coordinates as in `search`)", apart, _SAME)],
+        measured="B, upright straight motion by the text, is the limit of large circles with the handlebar forward "
+        f"(here lean {end[LEAN]:.2f}, steer {end[STEER]:.2f}, D's circle {np.hypot(*end[:2]):.0f} m). It lies on a "
+        f"curve of its own, nowhere nearer than {apart:.3f} to the curve of G and {from_a:.3f} to the curve of A. The "
+        "text lacks the figure: that it letters another point B there cannot be excluded",
+        source=_searched(found, "the curves through large circles, through G and through A"),
+        checks=[_solved(found), evidence.searched_again(_STEEP)],
     )
+
+
+def _four_still(evidence: Evidence, found: Found) -> Iterator[Line]:
+    """Number of families at alpha = 1 by how curves are cut, beside those on the plane by the same cut."""
+    level = evidence.found(evidence.cases[0])
+    cuts = {
+        "whole curves": (len(found.curves), len(level.curves)),
+        "curves cut at the pivoting motion": (found.families, level.families),
+        "those whose wheels are both pushed, cut there": (_pushed(found), _pushed(level)),
+    }
+    yield count_by_cut(
+        section="5",
+        claim="at alpha = 1 there still are four families",
+        printed=evidence.figures["counts"]["families"],
+        counts={cut: here for cut, (here, _) in cuts.items()},
+        measured="; ".join(f"{cut}: {here}, and {there} on the plane" for cut, (here, there) in cuts.items())
+        + f" ({'; '.join(_ends(curve) for curve in found.curves)}). Curves that pass on to others at alphas between "
+        "have no numbers of their own",
+        source=_searched(found, "all curves of circular motions, counted under each way to cut them"),
+        checks=[
+            _solved(found),
+            evidence.searched_again(evidence.cases[0], _STEEP),
+            Check("how near is the same, over the nearest two curves' distance", _SAME / _nearest(found), 1.0),
+        ],
+    )
+
+
+def _pushed(found: Found) -> int:
+    """Number of pieces along which the ground pushes both wheels, cut at pivoting motions in them."""
+    pieces = 0
+    for curve in found.curves:
+        # A pivoting motion itself has a rear rate of zero to round-off, of either sign: its neighbours tell.
+        moving = curve[(curve[:, SIGMA] >= 0) & (np.abs(curve[:, REAR_SPEED]) > 1e-9)]
+        physical = sample(found.equations, moving).physical
+        turns = (moving[:-1, REAR_SPEED] * moving[1:, REAR_SPEED] < 0) & physical[:-1] & physical[1:]
+        pieces += int(physical[0]) + int(np.sum(~physical[:-1] & physical[1:])) + int(np.sum(turns))
+    return pieces
 
 
 def _nearest(found: Found) -> float:
@@ -136,79 +220,129 @@ def _ends(curve: np.ndarray) -> str:
 
 def _combined_somewhere(evidence: Evidence) -> Line:
     """Where families 1, 3, 4 are one curve: from where 1 and 3 touch to where the pivoting motion comes to rest."""
-    touch, (rest, speed) = (
-        evidence.touching((1, 3)),
-        evidence.once(("pivot at rest",), lambda: _pivot_at_rest(evidence)),
-    )
+    touch, (rest, _) = evidence.touching((1, 3)), _at_rest(evidence)
     low = np.nan if touch is None else touch.alpha
     middle = evidence.family(0.5 * (low + rest), 3).ends if low < rest else ("", "")
     return words(
-        *("5", "when alpha is large enough families 1, 3 and 4 are one", middle == ("pivot", "static")),
-        f"literally so from alpha = {low:.11f} to {rest:.11f}, where G comes to rest: the curve of G and H runs to A",
-        [
-            Check("squared speed of G at rest, relative", speed, 1e-12),
-            Check("residual of the touching point's 44 equations", np.inf if touch is None else touch.residual, 1e-12),
+        section="5",
+        claim="when alpha is large enough families 1, 3 and 4 are one",
+        thresholds=[
+            above("alphas from the touching point to where G is at rest", rest - low, 0.0, "1/m"),
+            equals("half-way, ends of G's curve that are G and A", sum(e in ("pivot", "static") for e in middle), 2),
+        ],
+        measured=f"literally so from alpha = {low:.11f} to {rest:.11f}, where G comes to rest: the curve of G and H runs "
+        "to A; not at alpha = 1",
+        source=source("the touching point, and the alpha at which G comes to rest", reconnections, pivot_at),
+        checks=[
+            Check("residual of the touching point's equations", np.inf if touch is None else touch.residual, 1e-12),
         ],
     )
 
 
-def _pivot_at_rest(evidence: Evidence) -> tuple[float, float]:
-    """Alpha at which the pivoting motion's speed vanishes, by the secant method, and what is left of sigma."""
-    condition, u = unknown_condition(REAR_SPEED, 0.0), evidence.found(_DEEP).pivoting[0]
+def _at_rest(evidence: Evidence) -> tuple[float, np.ndarray]:
+    """Alpha at which the pivoting motion known from the plane comes to rest, and the motion."""
+    start = with_angle(evidence.found(_DEEP).pivoting[0])
+    return evidence.once(
+        ("pivot at rest",), lambda: pivot_at(evidence.bicycle, start, _DEEP, towards=_NEAR_REST, angle=0.0)
+    )
 
-    def carried(alpha: float, start: np.ndarray) -> np.ndarray:
-        equations = Steady(evidence.bicycle, Paraboloid(alpha))
-        return newton(equations, start, condition, most=_SECANT)[0]
 
-    for alpha in np.linspace(_DEEP, 0.4, 11)[1:]:
-        u = carried(float(alpha), u)
-    before, here = 0.4, 0.41
-    last, u = u, carried(here, u)
-    for _ in range(_SECANT):
-        step = -u[SIGMA] * (here - before) / (u[SIGMA] - last[SIGMA])
-        before, here, last = here, here + float(step), u
-        u = carried(here, u)
-        if abs(step) < 1e-14 or u[SIGMA] == last[SIGMA]:
-            break
-    return here, abs(float(u[SIGMA]))
+def _infinitely_fast(evidence: Evidence) -> tuple[float, np.ndarray]:
+    """Alpha at which the pivoting motion of steep bowls is infinitely fast, and the motion."""
+    start = with_angle(evidence.found(_STEEP).pivoting[0])
+    return evidence.once(
+        ("infinitely fast pivot",),
+        lambda: pivot_at(evidence.bicycle, start, _STEEP, towards=_NEAR_INFINITY, angle=np.pi / 2),
+    )
+
+
+def _never_without(evidence: Evidence) -> Line:
+    """Families 3 and 4 meet in a pivoting motion: from one alpha to another there is none."""
+    (rest, slow), (fast, quick) = _at_rest(evidence), _infinitely_fast(evidence)
+    inside = [alpha for alpha in _BETWEEN if rest < alpha < fast]
+    found = [evidence.found(alpha) for alpha in inside]
+    squares = []
+    for at, motion in ((rest, slow), (fast, quick)):
+        for alpha in inside:
+            squares.append(squared_rates(carry_pivot(evidence.bicycle, motion, at, alpha)[-1][1]))
+    none = sum(len(each.pivoting) for each in found)
+    least = min((len(each.pivoting) for each in found), default=0)
+    return words(
+        section="5",
+        claim="families 3 and 4 can always be merged through the pivoting motion",
+        thresholds=[equals("least number of pivoting motions at alphas between the five cases", least, 1)],
+        measured=f"from alpha = {rest:.11f}, where G comes to rest, to {fast:.11f}, from where on there is another that "
+        f"begins infinitely fast, there is no pivoting motion: at alpha = {', '.join(f'{a:g}' for a in inside)} a "
+        f"search finds {none}, and both, carried on there, would have negative squared rates, {min(squares):.1f} to "
+        f"{max(squares):.1f} rad^2/s^2. Both ends are solved for, what lies between is sampled",
+        source=source(
+            "alphas at which the pivoting motion's squared rates are zero, and infinite; searches between",
+            pivot_at,
+            carry_pivot,
+            search,
+            search=found[0].described if found else None,
+        ),
+        checks=[
+            Check("squared rates of the two between, over 1 rad^2/s^2 (must be negative)", max(squares), -1.0),
+            evidence.searched_again(*inside),
+            *(_solved(each) for each in found),
+        ],
+    )
 
 
 def _always(evidence: Evidence) -> Iterator[Line]:
     cases = {alpha: evidence.found(alpha) for alpha in evidence.cases}
-    solved = [_solved(found) for found in cases.values()]
+    solved = [*(_solved(found) for found in cases.values()), evidence.searched_again(*cases)]
     many = "; ".join(f"{a:g}: {len(f.static)} and {len(f.pivoting)}" for a, f in cases.items())
+    searched = _searched(next(iter(cases.values())), "static equilibria and pivoting motions of the five cases")
     yield words(
-        *(
-            "5",
-            "in the five cases there are one static equilibrium and one pivoting motion",
-            all(map(_one_each, cases.values())),
-        ),
-        *(f"found at alpha = {many}", solved),
+        section="5",
+        claim="in the five cases there are one static equilibrium and one pivoting motion",
+        thresholds=[equals("cases with one of each", sum(map(_one_each, cases.values())), len(cases))],
+        measured=f"found at alpha = {many}",
+        source=searched,
+        checks=solved,
     )
-    between = evidence.found(_BETWEEN)
+    rates = [abs(sample(f.equations, np.array(f.pivoting)).front_rate).min() for f in cases.values() if f.pivoting]
+    rests = [abs(u[SIGMA]) for f in cases.values() for u in f.static]
+    yield words(
+        section="5",
+        claim="in the static equilibrium both wheels stand, in the pivoting motion the rear wheel alone",
+        thresholds=[
+            below("largest squared rates of a static equilibrium, over 400 rad^2/s^2,", max(rests), 1e-12),
+            above("least front rate of a pivoting motion", min(rates), 0.0, "rad/s"),
+        ],
+        measured=f"in the five cases; front rates {', '.join(f'{rate:.4f}' for rate in rates)} rad/s",
+        source=searched,
+        checks=solved,
+    )
     apart = [
         abs(abs(evidence.family(a, 3).points[0].unknowns) - abs(evidence.family(a, 4).points[0].unknowns)).max()
         for a in cases
     ]
     yield words(
-        *("5", "in the five cases families 3 and 4 merge in the pivoting motion", max(apart) < 1e-12),
-        *(f"both start in it: constants differ by at most {max(apart):.0e}", solved),
+        section="5",
+        claim="in the five cases families 3 and 4 merge in the pivoting motion",
+        thresholds=[below("largest difference of the constants of their ends", max(apart), 1e-12)],
+        measured=f"both start in it: constants differ by at most {max(apart):.0e}",
+        source=source("the ends of families 3 and 4", trace, command=families_command(*cases)),
+        checks=solved,
     )
+    alpha = _BETWEEN[1]
+    between = evidence.found(alpha)
     yield words(
-        *("5", "there always are one static equilibrium and one pivoting motion", _one_each(between)),
-        f"not between the five cases: at alpha = {_BETWEEN} {len(between.static)} static equilibria (steers "
+        section="5",
+        claim="there always are one static equilibrium and one pivoting motion",
+        thresholds=[
+            equals(f"static equilibria at alpha = {alpha:g}", len(between.static), 1),
+            equals(f"pivoting motions at alpha = {alpha:g}", len(between.pivoting), 1),
+        ],
+        measured=f"not between the five cases: at alpha = {alpha:g} {len(between.static)} static equilibria (steers "
         + ", ".join(f"{u[STEER]:.4f}" for u in between.static)
-        + f") and {len(between.pivoting)} pivoting motions: continued from below, G would have a squared speed of "
-        f"{_pivot_continued(evidence):.1f} rad^2/s^2",
-        [_solved(between), _steers_apart(between)],
+        + f") and {len(between.pivoting)} pivoting motions",
+        source=_searched(between, "static equilibria and pivoting motions between the five cases"),
+        checks=[_solved(between), _steers_apart(between), evidence.searched_again(alpha)],
     )
-
-
-def _pivot_continued(evidence: Evidence) -> float:
-    u, condition = evidence.found(_DEEP).pivoting[0], unknown_condition(REAR_SPEED, 0.0)
-    for alpha in np.linspace(_DEEP, _BETWEEN, 25)[1:]:
-        u, _ = newton(Steady(evidence.bicycle, Paraboloid(float(alpha))), u, condition, most=_SECANT)
-    return 400.0 * float(u[SIGMA])
 
 
 def _steers_apart(found: Found) -> Check:

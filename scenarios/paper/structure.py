@@ -8,18 +8,20 @@ from dataclasses import fields
 import numpy as np
 
 from reference.bicycle import Bicycle
+from reference.circular import Steady
 from reference.dae import consistent_state, dynamics, mass_matrix, residual
 from reference.families import FAMILIES
 from reference.kernels.steady import STEP
 from reference.kinematics import COORDINATES, YAW, angular_velocities, body_velocities, rotations
 from reference.surface import Paraboloid
-from reports.paper.ledger import Check, Line, count, words
+from reports.paper.ledger import Check, Line, below, count, equals, source, words
 
 from .brackets import growth
 from .evidence import Evidence
 
 CONTACT_ROWS, GAP_ROWS, ROLLING_ROWS = slice(9, 15), slice(15, 17), slice(17, 21)
 _BODIES, _HINGES = 4, 3
+_UNCHANGED = 1e-10  # of accelerations of order 10 to 100: round-off times the condition of the mass matrix, 1e3
 _ROUND_OFF = 1e-9  # of the largest singular value: what is below is zero to round-off
 # A state with nothing special about it: leaning, steered, all three free rates at work.
 _PLACE, _LEAN, _STEER, _RATES = (1.3, -2.1), 0.2, 0.4, (0.3, -0.5, 12.0)
@@ -50,21 +52,37 @@ def _clear(smallest: float) -> Check:
 
 def _bodies(printed: dict[str, int], bicycle: Bicycle, q: np.ndarray) -> Iterator[Line]:
     names = [f.name for f in fields(bicycle) if f.name != "gravity"]
-    text = f"{len(names)} parameters, and gravity"
-    yield count("2.1", "the bicycle has 25 geometric and mass parameters", printed["parameters"], len(names), text)
+    yield count(
+        section="2.1",
+        claim="the bicycle has 25 geometric and mass parameters",
+        printed=printed["parameters"],
+        value=len(names),
+        measured=f"{len(names)} parameters, and gravity",
+        source=source("number of the bicycle's parameters, gravity aside", Bicycle),
+    )
     unit = np.eye(9)
     many = np.repeat(q[None], 9, axis=0)
     motion = np.concatenate([body_velocities(bicycle, many, unit), angular_velocities(bicycle, many, unit)], axis=2)
     free, smallest = rank(motion.reshape(9, -1))
-    text = f"velocities of {_BODIES} bodies under the {len(COORDINATES)} rates: rank {free}"
-    claim = "without contacts the bicycle has nine coordinates: 4 x 6 - 3 x 5"
     hinged = Check("4 x 6 - 3 x 5 less the rank", abs(6 * _BODIES - 5 * _HINGES - free), 0.0)
-    yield count("2.1", claim, printed["coordinates"], free, text, [_clear(smallest), hinged])
+    yield count(
+        section="2.1",
+        claim="without contacts the bicycle has nine coordinates: 4 x 6 - 3 x 5",
+        printed=printed["coordinates"],
+        value=free,
+        measured=f"velocities of {_BODIES} bodies under the {len(COORDINATES)} rates: rank {free}",
+        source=source("rank of the bodies' velocities under unit rates", body_velocities, angular_velocities, rank),
+        checks=[_clear(smallest), hinged],
+    )
     product = _turn(2, q[3]) @ _turn(0, q[4]) @ _turn(1, q[5])
     error = float(np.abs(product - rotations(bicycle, q[None])[0, 0]).max())
     yield words(
-        *("2.1", "the rear frame's angles are yaw, lean, pitch, in the order 3-1-2", error < 1e-14),
-        *(f"product of the three turns: off by {error:.0e}", [Check("a turn that is none", -abs(q[4]), -0.1)]),
+        section="2.1",
+        claim="the rear frame's angles are yaw, lean, pitch, in the order 3-1-2",
+        thresholds=[below("largest entry of the difference", error, 1e-14)],
+        measured=f"product of the three turns: off by {error:.0e}",
+        source=source("the frame's rotation against the product of three turns", rotations),
+        checks=[Check("a turn that is none", -abs(q[4]), -0.1)],
     )
 
 
@@ -95,31 +113,38 @@ def _constraints(
     printed: dict[str, int], bicycle: Bicycle, surface: Paraboloid, q: np.ndarray, qd: np.ndarray
 ) -> Iterator[Line]:
     slopes = derivatives(bicycle, surface, q, qd)
+    ranked = source("rank of the constraints' derivatives at a state with nothing special about it", derivatives, rank)
+
+    def line(claim: str, key: str, value: int, measured: str, smallest: float) -> Line:
+        return count("2.2", claim, printed[key], value, measured, ranked, [_clear(smallest)])
+
     contact = slopes["p"][CONTACT_ROWS]
     solved, smallest = rank(contact)
     text = f"derivative of the contact equations by the contact parameters: rank {solved}"
     claim = "three contact parameters a wheel, solved from three contact equations of regular Jacobian"
-    yield count("2.2", claim, printed["contact_equations"], solved, text, [_clear(smallest)])
+    yield line(claim, "contact_equations", solved, text, smallest)
     gaps = slopes["q"][GAP_ROWS] - slopes["p"][GAP_ROWS] @ np.linalg.solve(contact, slopes["q"][CONTACT_ROWS])
     closed, smallest = rank(gaps)
     text = f"gaps after elimination of the contact parameters: rank {closed}"
     claim = "of four geometric equations a contact leaves one holonomic constraint: two in all"
-    yield count("2.2", claim, printed["holonomic"], closed, text, [_clear(smallest)])
+    yield line(claim, "holonomic", closed, text, smallest)
     rolling = slopes["qd"][ROLLING_ROWS]
     rolls, smallest = rank(rolling)
-    text = f"rolling rows: rank {rolls}"
     claim = "pure rolling gives four independent velocity constraints"
-    yield count("2.2", claim, printed["nonholonomic"], rolls, text, [_clear(smallest)])
+    yield line(claim, "nonholonomic", rolls, f"rolling rows: rank {rolls}", smallest)
     both, smallest = rank(np.vstack([gaps, rolling]))
     text = f"{len(COORDINATES)} rates less {both} independent constraints"
     claim = "the bicycle has three degrees of freedom in velocity"
-    yield count("2.2", claim, printed["velocity_freedoms"], len(COORDINATES) - both, text, [_clear(smallest)])
+    yield line(claim, "velocity_freedoms", len(COORDINATES) - both, text, smallest)
     reached, smallest = growth(bicycle, surface, q)
     yield words(
-        *("2.2", "the four rolling constraints are nonholonomic", reached[-1] == printed["independent_coordinates"]),
-        f"velocities, their brackets, brackets of those span {', '.join(map(str, reached))} dimensions: "
+        section="2.2",
+        claim="the four rolling constraints are nonholonomic",
+        thresholds=[equals("dimensions that are reached", reached[-1], printed["independent_coordinates"])],
+        measured=f"velocities, their brackets, brackets of those span {', '.join(map(str, reached))} dimensions: "
         "none of the four integrates",
-        [Check("1e-4 over the smallest singular value that counts", 1e-4 / smallest, 0.1)],
+        source=source("rank of the velocity fields and of their Lie brackets, by central differences", growth),
+        checks=[Check("1e-4 over the smallest singular value that counts", 1e-4 / smallest, 0.1)],
     )
 
 
@@ -134,20 +159,27 @@ def _equations(
         "nonholonomic": (rows[ROLLING_ROWS], "rolling constraints"),
     }
     left = Check("largest residual of the 21 equations at the solved state", float(np.abs(rows).max()), 1e-11)
+    counted = source("number of equations and unknowns of the DAE, solved at a state", residual, dynamics)
     for name, (part, what) in parts.items():
         text = f"{len(part)} {what}"
-        yield count("2.3", f"the DAE has {printed[name]} {what}", printed[name], len(part), text, [left])
+        yield count("2.3", f"the DAE has {printed[name]} {what}", printed[name], len(part), text, counted, [left])
     unknown = len(COORDINATES) + now.contact.size + now.force.size
     text = f"{len(COORDINATES)} coordinates, {now.contact.size} contact parameters, {now.force.size} multipliers"
-    yield count("2.3", "21 unknowns", printed["unknowns"], unknown, text, [left])
+    yield count("2.3", "21 unknowns", printed["unknowns"], unknown, text, counted, [left])
     slopes = derivatives(bicycle, surface, q, qd)
     regular, smallest = rank(slopes["force"][:9])
     condition = float(np.linalg.cond(mass_matrix(bicycle, q)))
     yield words(
-        *("2.3", "with initial conditions the equations determine the motion", regular == 6 and condition < 1e8),
-        f"mass matrix of condition {condition:.1e}, forces on the bicycle of rank {regular}: accelerations and "
-        "multipliers follow from one regular system",
-        [_clear(smallest), left],
+        section="2.3",
+        claim="with initial conditions the equations determine the motion",
+        thresholds=[
+            equals("rank of the forces on the bicycle", regular, now.force.size),
+            below("condition of the mass matrix", condition, 1e8),
+        ],
+        measured=f"mass matrix of condition {condition:.1e}, forces on the bicycle of rank {regular}: accelerations "
+        "and multipliers follow from one regular system",
+        source=source("condition of the mass matrix, rank of the forces", mass_matrix, derivatives, rank),
+        checks=[_clear(smallest), left],
     )
 
 
@@ -164,27 +196,36 @@ def _symmetries(
 
     spun = q.copy()
     spun[7:] += (1.0, -2.0)
-    by_wheels = change(spun, qd, np.eye(3))
+    by_wheels = below("change of the accelerations", change(spun, qd, np.eye(3)), _UNCHANGED)
     turn = _turn(2, 0.7)
     turned, rates = q.copy(), qd.copy()
     turned[:3], rates[:3], turned[YAW] = turn @ q[:3], turn @ qd[:3], q[YAW] + 0.7
-    by_yaw = change(turned, rates, turn.T)
+    by_yaw = below("change of the accelerations, turned back,", change(turned, rates, turn.T), _UNCHANGED)
     lean = q.copy()
     lean[4] += 1e-3
     # Accelerations are of order 10 to 100.
     moved = Check("what the test sees of a lean of 1e-3 (must be seen)", -change(lean, qd, np.eye(3)), -1e-3)
+    changed = source("accelerations at a state and at the turned one", dynamics)
     yield words(
-        *("3.1", "the wheels' angles do not appear in the equations", by_wheels < 1e-10),
-        *(f"accelerations change by {by_wheels:.0e} when the wheels are turned", [moved]),
+        section="3.1",
+        claim="the wheels' angles do not appear in the equations",
+        thresholds=[by_wheels],
+        measured=f"accelerations change by {by_wheels.value:.0e} when the wheels are turned",
+        source=changed,
+        checks=[moved],
     )
     yield words(
-        *("3.1", "on a surface of revolution the equations are invariant under turns: yaw is cyclic", by_yaw < 1e-10),
-        *(f"accelerations, turned back, change by {by_yaw:.0e}", [moved]),
+        section="3.1",
+        claim="on a surface of revolution the equations are invariant under turns: yaw is cyclic",
+        thresholds=[by_yaw],
+        measured=f"accelerations, turned back, change by {by_yaw.value:.0e}",
+        source=changed,
+        checks=[moved],
     )
-    cyclic = int(by_wheels < 1e-10) * 2 + int(by_yaw < 1e-10)
+    cyclic = int(by_wheels.met) * 2 + int(by_yaw.met)
     six = len(COORDINATES) - cyclic
     text = f"{len(COORDINATES)} coordinates less {cyclic} cyclic ones"
-    yield count("3.1", "six coordinates are not cyclic", printed["noncyclic_coordinates"], six, text)
+    yield count("3.1", "six coordinates are not cyclic", printed["noncyclic_coordinates"], six, text, changed)
 
 
 def _constants(printed: dict[str, int], evidence: Evidence) -> Iterator[Line]:
@@ -194,9 +235,13 @@ def _constants(printed: dict[str, int], evidence: Evidence) -> Iterator[Line]:
     angles, rates = (motion.lean, motion.pitch, motion.steer), (motion.yaw_rate, motion.rear_rate, motion.front_rate)
     constants = motion.position.size + len(angles) + len(rates) + motion.contact.size + motion.force.size
     yield count(
-        *("3.1", "a circular motion is 21 constants: 9 kinematic, 6 of the contacts, 6 multipliers"),
-        *(printed["unknowns"], constants, "the 21 equations hold along all families with 21 constants"),
-        [residual_check],
+        section="3.1",
+        claim="a circular motion is 21 constants: 9 kinematic, 6 of the contacts, 6 multipliers",
+        printed=printed["unknowns"],
+        value=constants,
+        measured="the 21 equations hold along all families with 21 constants",
+        source=source("constants of a motion, residuals along all families", Steady.motion, Steady.residual),
+        checks=[residual_check],
     )
     widest, least = 0.0, np.inf
     for alpha in evidence.cases:
@@ -206,8 +251,11 @@ def _constants(printed: dict[str, int], evidence: Evidence) -> Iterator[Line]:
                 values = np.linalg.svd(family.equations.jacobian(point.unknowns), compute_uv=False)
                 widest, least = max(widest, values[-1] / values[0]), min(least, values[-2] / values[0])
     yield words(
-        *("3.1", "one of the 21 constants is free: circular motions come in one-parameter families", widest < 1e-12),
-        f"the equations have rank 20 along all families: smallest relative singular value {widest:.0e}, the next "
-        f">= {least:.0e}",
-        [Check("smallest over next singular value", widest / least, 1e-3), residual_check],
+        section="3.1",
+        claim="one of the 21 constants is free: circular motions come in one-parameter families",
+        thresholds=[below("smallest relative singular value of the equations", widest, 1e-12)],
+        measured=f"the equations have rank 20 along all families: smallest relative singular value {widest:.0e}, the "
+        f"next >= {least:.0e}",
+        source=source("singular values of the equations' Jacobian along all families", Steady.jacobian),
+        checks=[Check("smallest over next singular value", widest / least, 1e-3), residual_check],
     )
