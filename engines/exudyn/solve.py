@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import exudyn as exu
 
 from engines.engine import EngineError, Progress
+from reference.rim import Ending
 
 from .settings import SolverSettings
 from .start import Start, begin, correct, second_order_start
@@ -37,14 +39,23 @@ class Integration:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Steps done, process CPU time [s], and why the integration ended early (None if it did not)."""
+    """Steps done, process CPU time [s], and why the integration ended early (None if it did not).
+
+    What comes after the time ``until`` [s] is none of the ride.
+    """
 
     steps: int
     cpu_time: float
     ended: str | None
+    until: float = math.inf
 
 
-def integrate(system: exu.MainSystem, integration: Integration, progress: Progress) -> Outcome:
+def integrate(
+    system: exu.MainSystem,
+    integration: Integration,
+    progress: Progress,
+    look: Callable[[float], Ending | None] = lambda _: None,
+) -> Outcome:
     """Integrate a system from its initial state; its sensors hold the result.
 
     Parameters
@@ -54,6 +65,8 @@ def integrate(system: exu.MainSystem, integration: Integration, progress: Progre
     integration : Integration
     progress : callable
         Called now and then with the simulated time [s]; what it raises ends the run and is raised again.
+    look : callable
+        Called with the time [s] before each step and after the last; says why the ride ends there, or None.
 
     Raises
     ------
@@ -64,12 +77,14 @@ def integrate(system: exu.MainSystem, integration: Integration, progress: Progre
     taken = 0
     step = integration.end / integration.steps
     start: Start | None = None
+    ending: Ending | None = None
 
     with _interruptible() as interrupted:
 
         def before_step(_system, _time):
-            nonlocal taken
+            nonlocal taken, ending
             try:
+                ending = look(taken * step)
                 if taken == 0 and start is not None:
                     correct(system, start)
                 elif taken > 0 and taken % PROGRESS_STEPS == 0:
@@ -77,7 +92,7 @@ def integrate(system: exu.MainSystem, integration: Integration, progress: Progre
             except BaseException as error:  # an exception must not cross the engine, which would swallow it
                 raised.append(error)
             taken += 1
-            return not (raised or interrupted.is_set())
+            return not (raised or ending or interrupted.is_set())
 
         system.SetPreStepUserFunction(before_step)
         solver: Any = exu.MainSolverImplicitSecondOrder()
@@ -96,6 +111,10 @@ def integrate(system: exu.MainSystem, integration: Integration, progress: Progre
         raise raised[0]
     if interrupted.is_set():  # by a signal that the caller has made harmless
         return Outcome(taken, cpu_time, "interrupted")
+    if success:
+        ending = look(taken * step)
+    if ending is not None:
+        return Outcome(taken if success else taken - 1, cpu_time, ending.why, ending.time)
     if success:
         return Outcome(taken, cpu_time, None)
     failure = "the Jacobian is singular" if solver.conv.linearSolverFailed else "Newton's method did not converge"

@@ -35,6 +35,7 @@ from numba.np.numpy_support import carray
 from engines.mujoco.library import announce
 from reference.kernels import contact
 from reference.kernels.linear import factorise, solve_factorised
+from reference.kernels.rim import level_axes
 from reference.kernels.vector import add, cross, dot, jit, scale
 
 WHEELS = 8  # the most that a blackboard has room for
@@ -177,15 +178,6 @@ def _is_for(board, model, data):
 
 
 @jit
-def rim_axes(axle):
-    """Axes (x, z) of a wheel's plane, x level; nan where the wheel lies flat."""
-    x = (axle[1], -axle[0], 0.0)
-    length = np.sqrt(x[0] * x[0] + x[1] * x[1])
-    x = scale(1 / length, x)
-    return x, cross(x, axle)
-
-
-@jit
 def _wheel(board, k):
     """Return (centre, axle) of wheel k."""
     geom = board.geom[k]
@@ -198,7 +190,7 @@ def _wheel(board, k):
 def _contact_at(board, k):
     """Evaluate wheel k's contact at its place on the blackboard."""
     centre, axle = _wheel(board, k)
-    x, z = rim_axes(axle)
+    x, z = level_axes(axle)
     function = _function_at(board.surface, _SURFACE)
     xi, eta, angle = board.place[k, 0], board.place[k, 1], board.place[k, 2]
     parameters = _reals(board.parameters, board.parameter_count)
@@ -210,7 +202,7 @@ def _contact_at(board, k):
 def _find(board, k):
     """Search wheel k's contact from its pose alone and keep its place; True where it stands on the ground."""
     centre, axle = _wheel(board, k)
-    x, z = rim_axes(axle)
+    x, z = level_axes(axle)
     radius, function = board.radius[k], _function_at(board.surface, _SURFACE)
     parameters = _reals(board.parameters, board.parameter_count)
     xi, eta, angle = contact.first_guess(centre, x, z, radius, function, parameters)

@@ -1,4 +1,4 @@
-"""The whole rim of a wheel above the ground: does it touch anywhere but at its contact?
+"""Clearance of the whole rim of a wheel: whether it touches the ground anywhere but at its contact.
 
 The rim point w(a) = c + r e(a) stands h(a) = w_z - f(w_x, w_y) above the ground, which is below the rim if
 and only if h >= 0 all round. At the contact h and h' vanish, so with d the angle from there
@@ -38,7 +38,7 @@ from .vector import combine, cross, dot, jit, scale
 
 _GOLDEN = (math.sqrt(5) - 1) / 2
 _SECTIONS = 40  # of an interval between samples: to some 1e-9 of it, the square root of round-off
-# Nearer to the contact the clearance is that at the contact: it changes by less than what 1 - cos d leaves of round-off.
+# Nearer to the contact the clearance is that at the contact: round-off over 1 - cos d would be more than it changes.
 _NEAR = 1e-5
 
 
@@ -195,3 +195,22 @@ def _distance(centre, x, z, radius, angle, function, parameters):
     f, fx, fy, _, _, _ = function(centre[0] + radius * e[0], centre[1] + radius * e[1], parameters)
     distance = (centre[2] + radius * e[2] - f) / np.sqrt(1 + fx * fx + fy * fy)
     return distance if distance == distance else math.inf
+
+
+@jit
+def lowest_contact(centre, x, z, radius, xi, eta, angle, bend, samples, function, parameters):
+    """Return (xi, eta, angle) of the contact where a rim is deepest, given the one that a search from the pose found.
+
+    That one is kept where the rim is clear but for it, as it nearly always is.
+    """
+    if bound(centre, x, z, radius, angle, bend, function, parameters) > 0:
+        return xi, eta, angle
+    clearance, _ = least_clearance(centre, x, z, radius, angle, samples, function, parameters)
+    if clearance > 0:
+        return xi, eta, angle
+    _, turn = deepest(centre, x, z, radius, samples, function, parameters)
+    e, _ = rim(turn, x, z)
+    one, two, three, found = contact.search(
+        centre, x, z, radius, centre[0] + radius * e[0], centre[1] + radius * e[1], turn, function, parameters
+    )
+    return (one, two, three) if found else (xi, eta, angle)
