@@ -9,7 +9,7 @@ import numpy as np
 from .bicycle import Bicycle
 from .kernels import dynamics as kernel
 from .kinematics import constants
-from .rim import ground
+from .rim import bicycle_rim_search
 from .surface import Surface
 
 
@@ -64,7 +64,7 @@ def observe(
         np.ascontiguousarray(qd, float),
         contacts,
         contact is not None,
-        ground(bicycle, surface),
+        bicycle_rim_search(bicycle, surface),
         surface.function.real,
         surface.parameters,
         constants(bicycle),

@@ -7,7 +7,9 @@ the wheel: a ride ends there. A start with a rim inside the ground is no start.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -17,23 +19,55 @@ from .kernels import rim as kernel
 from .kernels import touch
 from .kernels.dynamics import wheels
 from .kinematics import WHEELS, constants
-from .surface import Surface
+from .surface import Surface, SurfaceOfRevolution, evaluate
 
 _SAMPLES_A_DETAIL = 4
 # Samples of a rim: what smooth ground needs, and as many as resolve a detail of 2 mm along a wheel of a bicycle.
 _FEWEST, _MOST = 32, 4096
 _TOUCHING = 1e-9  # [m] no depth worth a number
+# Bounds of a bowl's curvature: rings of an eighth of a wheel, out to where most rides end, each sampled.
+_RINGS_A_WHEEL, _SAMPLES_A_RING, _FARTHEST = 8, 16, 200.0
 
 
-def ground(bicycle: Bicycle, surface: Surface) -> kernel.Ground:
-    """How closely to look at the rims of a bicycle on a surface, from the surface's ``bend`` and ``detail``."""
-    radii = bicycle.rear_wheel_radius, bicycle.front_wheel_radius
-    bend = float(getattr(surface, "bend", math.inf))
+def rim_search(surface: Surface, radii: Sequence[float]) -> kernel.RimSearch:
+    """How closely to look at the rims of wheels of some radii [m], from the surface's ``bend`` and ``detail``."""
+    largest, smallest = max(radii), min(radii)
+    finest = 2 * math.pi * largest * _SAMPLES_A_DETAIL / _MOST
     # Within a wheel's radius smooth ground does not bend to and fro, or no wheel could be said to touch it in a point.
-    finest = 2 * math.pi * max(radii) * _SAMPLES_A_DETAIL / _MOST
-    detail = max(min(float(getattr(surface, "detail", math.inf)), *radii), finest)
-    rear, front = (max(_FEWEST, math.ceil(2 * math.pi * r / detail * _SAMPLES_A_DETAIL)) for r in radii)
-    return kernel.Ground(bend, detail, rear, front)
+    detail = max(min(float(getattr(surface, "detail", math.inf)), smallest), finest)
+    samples = max(_FEWEST, math.ceil(2 * math.pi * largest / detail * _SAMPLES_A_DETAIL))
+    bend = getattr(surface, "bend", None)
+    bends, width = np.array([math.inf if bend is None else float(bend)]), math.inf
+    if bend is None and isinstance(surface, SurfaceOfRevolution):
+        bends, width = _bends(surface, 2 * largest, detail)
+    return kernel.RimSearch(bool(bends[0] > 0 or len(bends) > 1), bends, width, detail, samples)
+
+
+def bicycle_rim_search(bicycle: Bicycle, surface: Surface) -> kernel.RimSearch:
+    """How closely to look at the rims of a bicycle, see `rim_search`."""
+    return rim_search(surface, (bicycle.rear_wheel_radius, bicycle.front_wheel_radius))
+
+
+@lru_cache(maxsize=64)
+def _bends(surface: SurfaceOfRevolution, reach: float, detail: float) -> tuple[np.ndarray, float]:
+    """Bounds of a bowl's upward curvature within ``reach`` of its rings, shape (k,) [1/m], and the rings' width [m].
+
+    The principal curvatures are sampled, and may exceed the samples by what those differ between neighbours.
+    """
+    width = reach / _RINGS_A_WHEEL
+    rings = math.ceil(min(surface.extent[1], _FARTHEST) / width)
+    samples = max(_SAMPLES_A_RING, math.ceil(_SAMPLES_A_DETAIL * width / detail))
+    values = evaluate(surface, np.arange(rings * samples + 1) * (width / samples), 0.0)
+    curvature = values[:, [3, 5]].max(axis=1)
+    curvature[np.isnan(curvature)] = math.inf
+    with np.errstate(invalid="ignore"):
+        steps = np.maximum(curvature[1:], curvature[:-1]) + np.abs(np.diff(curvature))
+    steps[np.isnan(steps)] = math.inf
+    spread = _RINGS_A_WHEEL + 1
+    # Nothing is within reach across the axis that is not on this side of it; nothing is known beyond the last ring.
+    edges = np.full(spread, -math.inf), np.full(spread, math.inf)
+    rows = np.concatenate([edges[0], steps.reshape(rings, samples).max(axis=1), edges[1]])
+    return np.lib.stride_tricks.sliding_window_view(rows, 2 * spread + 1).max(axis=1), width
 
 
 def second_touch(wheel: str, time: float) -> str:
@@ -53,14 +87,13 @@ def rim_clearances(bicycle: Bicycle, surface: Surface, q: np.ndarray, contact: n
     contact : ndarray, shape (6,)
         Contact parameters of both wheels there, as `reference.dae.contact_parameters` gives them.
     """
-    known, function, parameters = ground(bicycle, surface), surface.function.real, surface.parameters
-    both, samples = wheels(q, constants(bicycle)), (known.rear, known.front)
+    known, function, parameters = bicycle_rim_search(bicycle, surface), surface.function.real, surface.parameters
     clearances = np.empty(2)
-    for k, (centre, x, _, z, radius) in enumerate(both):
+    for k, (centre, x, _, z, radius) in enumerate(wheels(q, constants(bicycle))):
         angle = contact[3 * k + 2]
-        clearances[k] = kernel.bound(centre, x, z, radius, angle, known.bend, function, parameters)
+        clearances[k] = kernel.bound(centre, x, z, radius, angle, known, function, parameters)
         if not clearances[k] > 0:
-            clearances[k], _ = kernel.least_clearance(centre, x, z, radius, angle, samples[k], function, parameters)
+            clearances[k], _ = kernel.least_clearance(centre, x, z, radius, angle, known.samples, function, parameters)
     return clearances
 
 
@@ -82,7 +115,7 @@ def require_clear_rims(bicycle: Bicycle, surface: Surface, q: np.ndarray, contac
     clear = rim_clearances(bicycle, surface, q, contact) > 0
     if clear.all():
         return
-    distance, k, point = min(_deepest(bicycle, surface, q, k) for k in np.flatnonzero(~clear))
+    distance, k, point = min(_deepest(bicycle, surface, q, k) for k in (0, 1) if not clear[k])
     place = f"x = {point[0]:.4g} m, y = {point[1]:.4g} m"
     if distance < -_TOUCHING:
         raise ValueError(f"the {WHEELS[k]} rim lies {-1e3 * distance:.3g} mm inside the ground at {place}")
@@ -92,10 +125,10 @@ def require_clear_rims(bicycle: Bicycle, surface: Surface, q: np.ndarray, contac
 def _deepest(bicycle: Bicycle, surface: Surface, q: np.ndarray, k: int) -> tuple[float, int, tuple[float, float]]:
     """Signed distance of a wheel's deepest rim point from the ground [m], the wheel, and x and y of that point [m]."""
     centre, x, _, z, radius = wheels(q, constants(bicycle))[k]
-    samples = ground(bicycle, surface)[2 + k]
+    samples = bicycle_rim_search(bicycle, surface).samples
     distance, angle = kernel.deepest(centre, x, z, radius, samples, surface.function.real, surface.parameters)
     radial, _ = kernel.rim(angle, x, z)
-    return distance, int(k), (centre[0] + radius * radial[0], centre[1] + radius * radial[1])
+    return distance, k, (centre[0] + radius * radial[0], centre[1] + radius * radial[1])
 
 
 @dataclass(frozen=True)
@@ -115,9 +148,6 @@ class RimWatch:
     surface : Surface
     q : ndarray, shape (9,)
         Coordinates at the start.
-    searched : bool
-        Whether the engine searches its contacts from the wheels' poses alone: then it must find the contacts that
-        continuity gives.
 
     Attributes
     ----------
@@ -132,10 +162,10 @@ class RimWatch:
         If a rim lies inside the ground at the start, see `require_clear_rims`.
     """
 
-    def __init__(self, bicycle: Bicycle, surface: Surface, q: np.ndarray, searched: bool) -> None:
-        known = ground(bicycle, surface)
+    def __init__(self, bicycle: Bicycle, surface: Surface, q: np.ndarray) -> None:
+        known = bicycle_rim_search(bicycle, surface)
         require_clear_rims(bicycle, surface, q)
-        self.needed = known.bend > 0
+        self.needed = known.curved
         self.centre, self.axle = np.zeros((2, 3)), np.zeros((2, 3))
         self._clock, self._clearance = np.zeros(2), np.zeros((2, 2))
         # The watch does not keep the surface's compiled function alive.
@@ -143,7 +173,7 @@ class RimWatch:
         radii = np.array([bicycle.rear_wheel_radius, bicycle.front_wheel_radius])
         arrays = (self.centre, self.axle, radii, self._clock)
         where = (known, self._function, surface.parameters)
-        self._look = touch.watch(*arrays, searched, *where, self._clearance).__next__
+        self._look = touch.watch(*arrays, *where, self._clearance).__next__
 
     def look(self, time: float) -> Ending | None:
         """Look at the rims at a time [s]; why the ride ends, None if it does not.
@@ -155,9 +185,6 @@ class RimWatch:
             return None
         before, now = self._clearance.T
         k = int(np.nanargmin(now))
-        if now[k] == -math.inf:
-            why = f"the search for the {WHEELS[k]} wheel's contact jumps to another place of its rim"
-            return Ending(time, f"{why} at t = {time:.6g} s")
         share = before[k] / (before[k] - now[k]) if 0 < before[k] < math.inf else 1.0
         touched = self._clock[1] + share * (time - self._clock[1])
         return Ending(touched, second_touch(WHEELS[k], touched))
@@ -182,8 +209,8 @@ def find_second_touch(
     Ending or None
         What happens between two samples is seen where they are closer than half the ground's detail.
     """
-    known = ground(bicycle, surface)
-    if not known.bend > 0:
+    known = bicycle_rim_search(bicycle, surface)
+    if not known.curved:
         return None
     q, qd = np.ascontiguousarray(q), np.ascontiguousarray(qd)
     function, parameters = surface.function.real, surface.parameters

@@ -12,7 +12,7 @@ from .bicycle import Bicycle
 from .dae import contact_parameters
 from .kernels import integrate as kernel
 from .kinematics import WHEELS, constants
-from .rim import ground, require_clear_rims, second_touch
+from .rim import bicycle_rim_search, require_clear_rims, second_touch
 from .surface import Surface, evaluate
 
 # Coefficients as data, from the library that everybody checks them against.
@@ -109,7 +109,7 @@ def simulate(
     times = np.ascontiguousarray(times, float)
     y = np.concatenate([q, qd, contact_parameters(bicycle, surface, np.asarray(q, float))])
     require_clear_rims(bicycle, surface, y[:9], y[18:])
-    rims = ground(bicycle, surface)
+    rims = bicycle_rim_search(bicycle, surface)
     out = np.empty((len(times), kernel.SIZE))
     index, t, h, steps, evaluations = 0, 0.0, 1e-3, 0, 0
     status = kernel.MORE
@@ -175,7 +175,7 @@ def simulate_modified_euler(
     out[0] = y
     count = stride * (len(times) - 1)
     status, rows, reached = kernel.modified_euler(
-        *(y, step, count, stride, ground(bicycle, surface)),
+        *(y, step, count, stride, bicycle_rim_search(bicycle, surface)),
         *(surface.function.real, surface.parameters, constants(bicycle), out[1:]),
     )
     rows += 1

@@ -119,7 +119,7 @@ def rim_look(model: Model, problem: Problem) -> Callable[[float], Ending | None]
         If a rim lies inside the ground at the start.
     """
     try:
-        watch = RimWatch(problem.bicycle, problem.surface, problem.q, searched=True)
+        watch = RimWatch(problem.bicycle, problem.surface, problem.q)
     except ValueError as error:
         raise EngineError(str(error)) from error
     if not watch.needed:

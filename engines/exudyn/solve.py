@@ -111,10 +111,10 @@ def integrate(
         raise raised[0]
     if interrupted.is_set():  # by a signal that the caller has made harmless
         return Outcome(taken, cpu_time, "interrupted")
-    if success:
-        ending = look(taken * step)
-    if ending is not None:
-        return Outcome(taken if success else taken - 1, cpu_time, ending.why, ending.time)
+    if ending is not None:  # before a step that was not taken
+        return Outcome(taken - 1, cpu_time, ending.why, ending.time)
+    if success and (ending := look(taken * step)) is not None:
+        return Outcome(taken, cpu_time, ending.why, ending.time)
     if success:
         return Outcome(taken, cpu_time, None)
     failure = "the Jacobian is singular" if solver.conv.linearSolverFailed else "Newton's method did not converge"

@@ -35,7 +35,7 @@ from numba.np.numpy_support import carray
 from engines.mujoco.library import announce
 from reference.kernels import contact
 from reference.kernels.linear import factorise, solve_factorised
-from reference.kernels.rim import level_axes
+from reference.kernels.rim import RimSearch, find_contact, level_axes
 from reference.kernels.vector import add, cross, dot, jit, scale
 
 WHEELS = 8  # the most that a blackboard has room for
@@ -52,6 +52,13 @@ BLACKBOARD = np.dtype(
         ("surface", _ADDRESS),
         ("parameters", _ADDRESS),
         ("parameter_count", np.int64),
+        # How closely to look at rims, `reference.kernels.rim.RimSearch`.
+        ("curved", np.int64),
+        ("bends", _ADDRESS),
+        ("bend_count", np.int64),
+        ("bend_width", np.float64),
+        ("detail", np.float64),
+        ("samples", np.int64),
         ("speeds", np.int64),
         # Arrays of the state that never move.
         ("qvel", _ADDRESS),
@@ -205,8 +212,10 @@ def _find(board, k):
     x, z = level_axes(axle)
     radius, function = board.radius[k], _function_at(board.surface, _SURFACE)
     parameters = _reals(board.parameters, board.parameter_count)
-    xi, eta, angle = contact.first_guess(centre, x, z, radius, function, parameters)
-    xi, eta, angle, found = contact.search(centre, x, z, radius, xi, eta, angle, function, parameters)
+    ground = RimSearch(
+        board.curved != 0, _reals(board.bends, board.bend_count), board.bend_width, board.detail, board.samples
+    )
+    xi, eta, angle, found = find_contact(centre, x, z, radius, ground, function, parameters)
     board.place[k, 0], board.place[k, 1], board.place[k, 2] = xi, eta, angle
     if not found:
         return False

@@ -36,7 +36,7 @@ def build_contacts(problem: Problem, settings: ExactContactSettings) -> Rig:
         wheels=wheels,
         follow=standing,
         stride=rim_stride(problem, settings.step),
-        look=rim_look(data, problem, searched=True),
+        look=rim_look(data, problem),
         forces=partial(contact_forces, model, data, wheels),
         callbacks=lambda: knife_edges(model, data, problem.surface, GROUNDS),
     )
@@ -62,7 +62,7 @@ def build_multipliers(problem: Problem, settings: MultiplierSettings) -> Rig:
         wheels=wheel_geoms(model),
         follow=standing,
         stride=rim_stride(problem, settings.step),
-        look=rim_look(data, problem, searched=True),
+        look=rim_look(data, problem),
         forces=forces,
         callbacks=lambda: rolling_forces(model, data, problem.surface, GROUNDS, settings.stabilisation),
     )

@@ -35,6 +35,7 @@ import numpy as np
 from engines.engine import EngineError
 from engines.mujoco import compiled, layout
 from engines.mujoco.callbacks import installed
+from reference.rim import rim_search
 from reference.surface import Surface
 
 
@@ -158,6 +159,13 @@ def _written(
     board["contact_size"], board["speeds"], board["stabilisation"] = found.contact_size, model.nv, stabilisation
     board["pyramidal"] = model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
     _write_wheels(board, model, wheels)
+    looking = rim_search(surface, [float(radius) for radius in board["radius"][: len(wheels)]])
+    board["curved"], board["bends"], board["bend_count"] = (
+        looking.curved,
+        looking.bends.ctypes.data,
+        len(looking.bends),
+    )
+    board["bend_width"], board["detail"], board["samples"] = looking.width, looking.detail, looking.samples
     board["model"], board["data"] = model._address, data._address
     try:
         yield

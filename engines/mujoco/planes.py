@@ -48,6 +48,6 @@ def build(problem: Problem, settings: ContactSettings) -> Rig:
         wheels=wheels,
         follow=follow,
         stride=1 if moving else look_stride(settings.step),
-        look=rim_look(data, problem, searched=False),
+        look=rim_look(data, problem),
         forces=partial(contact_forces, model, data, wheels),
     )

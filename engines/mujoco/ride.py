@@ -21,7 +21,7 @@ from engines.mujoco.state import to_mujoco
 from engines.mujoco.tangent import wheel_poses
 from reference.bicycle import BODIES
 from reference.kinematics import WHEELS, constants
-from reference.rim import Ending, RimWatch, ground
+from reference.rim import Ending, RimWatch, bicycle_rim_search
 
 REPORT_INTERVAL = 0.05
 # How often a bicycle is looked at whose ground needs no care: a wheel turns by far less than half a turn meanwhile.
@@ -119,8 +119,8 @@ def start(problem: Problem, settings: StepSettings, touching: Touching) -> tuple
     return model, data
 
 
-def rim_look(data: mujoco.MjData, problem: Problem, searched: bool) -> Callable[[float], Ending | None]:
-    """Make the look at both rims of a `Rig`; ``searched`` as in `reference.rim.RimWatch`.
+def rim_look(data: mujoco.MjData, problem: Problem) -> Callable[[float], Ending | None]:
+    """Make the look at both rims of a `Rig`.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def rim_look(data: mujoco.MjData, problem: Problem, searched: bool) -> Callable[
         If a rim lies inside the ground at the start.
     """
     try:
-        watch = RimWatch(problem.bicycle, problem.surface, problem.q, searched)
+        watch = RimWatch(problem.bicycle, problem.surface, problem.q)
     except ValueError as error:
         raise EngineError(str(error)) from error
     if not watch.needed:
@@ -153,7 +153,8 @@ def rim_stride(problem: Problem, step: float) -> int:
     Where the ground is less than half as curved as a wheel, a rim touches twice only when the wheel nearly lies flat.
     """
     largest = max(problem.bicycle.rear_wheel_radius, problem.bicycle.front_wheel_radius)
-    return look_stride(step) if ground(problem.bicycle, problem.surface).bend * largest < 0.5 else 1
+    sharpest = bicycle_rim_search(problem.bicycle, problem.surface).bends.max() * largest
+    return look_stride(step) if sharpest < 0.5 else 1
 
 
 def bodies(model: mujoco.MjModel) -> list[int]:

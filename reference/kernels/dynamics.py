@@ -22,7 +22,7 @@ import numpy as np
 from . import contact
 from .kinematics import angular_velocities, frames
 from .linear import factorise, solve, solve_factorised
-from .rim import lowest_contact
+from .rim import find_contact
 from .vector import add, combine, cross, dot, jit, scale
 
 # Dependent and independent generalised speeds of a consistent state.
@@ -321,15 +321,16 @@ def energies(q, qd, c):
 
 
 @jit
-def lowest_contacts(q, p, ground, function, parameters, c):
-    """Replace contacts ``p`` (6,) that the rims are not clear but for by those where they are deepest."""
-    both, samples = wheels(q, c), (ground.rear, ground.front)
+def find_contacts_from_pose(q, p, ground, function, parameters, c):
+    """Fill ``p`` (6,) with the contacts where both rims are deepest at q; True where both were found."""
+    both = wheels(q, c)
+    good = True
     for k in range(2):
         centre, x, _, z, radius = both[k]
         row = 3 * k
-        p[row], p[row + 1], p[row + 2] = lowest_contact(
-            centre, x, z, radius, p[row], p[row + 1], p[row + 2], ground.bend, samples[k], function, parameters
-        )
+        p[row], p[row + 1], p[row + 2], found = find_contact(centre, x, z, radius, ground, function, parameters)
+        good = good and found
+    return good
 
 
 @jit
@@ -344,11 +345,10 @@ def observe(q, qd, contacts, known, ground, function, parameters, c, points, nor
     good = True
     for n in range(q.shape[0]):
         p = contacts[n]
-        if not known:
-            guess_contacts(q[n], p, function, parameters, c)
-        good = find_contacts(q[n], p, function, parameters, c) and good
-        if not known:
-            lowest_contacts(q[n], p, ground, function, parameters, c)
+        if known:
+            good = find_contacts(q[n], p, function, parameters, c) and good
+        else:
+            good = find_contacts_from_pose(q[n], p, ground, function, parameters, c) and good
         gaps = rolling(q[n], qd[n], p, function, parameters, c, jacobian, gamma, p_rate)
         both = wheels(q[n], c)
         for k in range(2):

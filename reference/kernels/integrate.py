@@ -95,16 +95,16 @@ def _interpolate(y, coefficients, x, out):
 def _rim_bounds(y, ground, function, parameters, c):
     """Lower bounds of both rims' least clearances, from the contacts alone."""
     (c1, x1, _, z1, r1), (c2, x2, _, z2, r2) = wheels(y, c)
-    one = bound(c1, x1, z1, r1, y[20], ground.bend, function, parameters)
-    return one, bound(c2, x2, z2, r2, y[23], ground.bend, function, parameters)
+    one = bound(c1, x1, z1, r1, y[20], ground, function, parameters)
+    return one, bound(c2, x2, z2, r2, y[23], ground, function, parameters)
 
 
 @jit
 def rim_clearance(y, ground, function, parameters, c):
     """Return (clearance, wheel): the least of both rims' clearances, and whose it is."""
     (c1, x1, _, z1, r1), (c2, x2, _, z2, r2) = wheels(y, c)
-    one, _ = least_clearance(c1, x1, z1, r1, y[20], ground.rear, function, parameters)
-    two, _ = least_clearance(c2, x2, z2, r2, y[23], ground.front, function, parameters)
+    one, _ = least_clearance(c1, x1, z1, r1, y[20], ground.samples, function, parameters)
+    two, _ = least_clearance(c2, x2, z2, r2, y[23], ground.samples, function, parameters)
     return (one, 0) if one <= two else (two, 1)
 
 
@@ -195,7 +195,7 @@ def dop853(y, times, index, t, h, tolerance, most_steps, tableau, ground, functi
     Each accepted step and each output is projected onto gaps, contact equations and rolling. Stops at
     the last time, after ``most_steps`` steps (call again with what it returns), where the step
     shrinks to nothing or a contact is lost, or where a rim touches the ground at a second place: that is
-    looked for in the dense output, with the `rim.Ground` ``ground``, so that it depends on no output time.
+    looked for in the dense output, with the `rim.RimSearch` ``ground``, so that it depends on no output time.
 
     Returns ``(status, index, t, h, steps, evaluations)``.
     """
@@ -205,9 +205,7 @@ def dop853(y, times, index, t, h, tolerance, most_steps, tableau, ground, functi
     new, work, error5 = np.empty(SIZE), np.empty(SIZE), np.empty(SIZE)
     derivative(y, function, parameters, bicycle, stages[0])
     steps, evaluations, rejected = 0, 1, False
-    # On the level plane, without bend, no rim touches twice.
-    curved = ground.bend > 0
-    bounds = _rim_bounds(y, ground, function, parameters, c) if curved else (1.0, 1.0)
+    bounds = _rim_bounds(y, ground, function, parameters, c) if ground.curved else (1.0, 1.0)
     while index < times.size and steps < most_steps:
         if not SMALLEST_STEP < h < 1e300:
             return FAILED, index, t, h, steps, evaluations
@@ -222,7 +220,7 @@ def dop853(y, times, index, t, h, tolerance, most_steps, tableau, ground, functi
             h *= max(0.2, 0.9 * error ** (-1 / 8)) if error < 1e300 else 0.2
             rejected = True
             continue
-        next_bounds = _rim_bounds(new, ground, function, parameters, c) if curved else bounds
+        next_bounds = _rim_bounds(new, ground, function, parameters, c) if ground.curved else bounds
         clear = _are_clear(bounds, next_bounds)
         end, status = t + h, MORE
         if times[index] <= end or not clear:
@@ -264,8 +262,8 @@ def modified_euler(y, step, count, stride, ground, function, parameters, c, out)
     """
     bicycle = aligned(c)
     first, second, work = np.empty(SIZE), np.empty(SIZE), np.empty(SIZE)
-    rows, curved = 0, ground.bend > 0
-    before, wheel = rim_clearance(y, ground, function, parameters, c) if curved else (1.0, 0)
+    rows = 0
+    before, wheel = rim_clearance(y, ground, function, parameters, c) if ground.curved else (1.0, 0)
     for n in range(1, count + 1):
         derivative(y, function, parameters, bicycle, first)
         for i in range(SIZE):
@@ -277,7 +275,7 @@ def modified_euler(y, step, count, stride, ground, function, parameters, c, out)
             total += y[i]
         if not abs(total) < 1e300:
             return FAILED, rows, (n - 1) * step
-        if curved:
+        if ground.curved:
             clearance, wheel = rim_clearance(y, ground, function, parameters, c)
             if clearance <= 0:
                 touch = (n - 1 + before / (before - clearance)) * step

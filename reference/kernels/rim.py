@@ -11,7 +11,7 @@ contact alone if and only if g > 0 all round: g(0) > 0 says that the rim is less
 its contact. What a soft or an inexact contact has sunk, h(a) < 0, is taken off, and its slope h'(a), so that
 this holds to first order in the gap; a wheel in the air, h(a) > 0, touches where its rim comes to the ground.
 
-Bound. Let no eigenvalue of H exceed K anywhere. Then f(w) <= f(u) + grad f . (w - u) + K |w - u|^2 / 2
+Bound. Let no eigenvalue of H exceed K within 2 r of the contact. Then f(w) <= f(u) + grad f . (w - u) + K |w - u|^2 / 2
 horizontally, and with |w(a + d) - w(a)|^2 = 2 r^2 (1 - cos d)
 
     g(d) >= -e . N - K r
@@ -40,25 +40,32 @@ _GOLDEN = (math.sqrt(5) - 1) / 2
 _SECTIONS = 40  # of an interval between samples: to some 1e-9 of it, the square root of round-off
 # Nearer to the contact the clearance is that at the contact: round-off over 1 - cos d would be more than it changes.
 _NEAR = 1e-5
+LIFTED = 1e-3  # of the radius: a wheel with a wider gap is in the air
 
 
-class Ground(NamedTuple):
+class RimSearch(NamedTuple):
     """How closely to look at rims on a ground.
 
     Attributes
     ----------
-    bend : float
-        Bound K of the ground's upward curvature, the largest eigenvalue of its Hessian [1/m]; inf if unknown.
+    curved : bool
+        False where no rim can touch twice, since the ground bends upwards nowhere.
+    bends : ndarray, shape (k,)
+        Bounds K of the ground's upward curvature, the largest eigenvalue of its Hessian, within a wheel's diameter of
+        a point: entry i where the distance from the axis is i to i + 1 times ``width`` [1/m]; inf if unknown.
+    width : float
+        [m]; inf with one entry for all the ground.
     detail : float
         Length within which the ground does not bend to and fro [m].
-    rear, front : int
-        Samples of the rims.
+    samples : int
+        Of a rim.
     """
 
-    bend: float
+    curved: bool
+    bends: np.ndarray
+    width: float
     detail: float
-    rear: int
-    front: int
+    samples: int
 
 
 class Edge(NamedTuple):
@@ -128,11 +135,15 @@ def _least_between(edge, low, high, function, parameters):
 
 
 @jit
-def bound(centre, x, z, radius, angle, bend, function, parameters):
-    """Lower bound of the least clearance, -e . N - K r; nan where the contact is off the ground."""
+def bound(centre, x, z, radius, angle, ground, function, parameters):
+    """Lower bound of the least clearance, -e . N - K r; -inf where K is unknown, nan where there is no ground."""
     e, _ = rim(angle, x, z)
-    _, fx, fy, _, _, _ = function(centre[0] + radius * e[0], centre[1] + radius * e[1], parameters)
-    return e[0] * fx + e[1] * fy - e[2] - bend * radius
+    wx, wy = centre[0] + radius * e[0], centre[1] + radius * e[1]
+    _, fx, fy, _, _, _ = function(wx, wy, parameters)
+    distance = np.sqrt(wx * wx + wy * wy)
+    if not distance < ground.bends.size * ground.width:
+        return -math.inf
+    return e[0] * fx + e[1] * fy - e[2] - ground.bends[int(distance / ground.width)] * radius
 
 
 @jit
@@ -198,19 +209,22 @@ def _distance(centre, x, z, radius, angle, function, parameters):
 
 
 @jit
-def lowest_contact(centre, x, z, radius, xi, eta, angle, bend, samples, function, parameters):
-    """Return (xi, eta, angle) of the contact where a rim is deepest, given the one that a search from the pose found.
+def find_contact(centre, x, z, radius, ground, function, parameters):
+    """Search the contact of a wheel from its pose alone; returns (xi, eta, angle, found).
 
-    That one is kept where the rim is clear but for it, as it nearly always is.
+    It is where the rim is deepest. Newton's method from `contact.first_guess` nearly always finds that; if it does
+    not, the rim is sampled.
     """
-    if bound(centre, x, z, radius, angle, bend, function, parameters) > 0:
-        return xi, eta, angle
-    clearance, _ = least_clearance(centre, x, z, radius, angle, samples, function, parameters)
-    if clearance > 0:
-        return xi, eta, angle
-    _, turn = deepest(centre, x, z, radius, samples, function, parameters)
+    xi, eta, angle = contact.first_guess(centre, x, z, radius, function, parameters)
+    xi, eta, angle, found = contact.search(centre, x, z, radius, xi, eta, angle, function, parameters)
+    if not ground.curved or (found and bound(centre, x, z, radius, angle, ground, function, parameters) > 0):
+        return xi, eta, angle, found
+    if found and _distance(centre, x, z, radius, angle, function, parameters) < LIFTED * radius:
+        clearance, _ = least_clearance(centre, x, z, radius, angle, ground.samples, function, parameters)
+        if clearance > 0:
+            return xi, eta, angle, True
+    _, turn = deepest(centre, x, z, radius, ground.samples, function, parameters)
     e, _ = rim(turn, x, z)
-    one, two, three, found = contact.search(
-        centre, x, z, radius, centre[0] + radius * e[0], centre[1] + radius * e[1], turn, function, parameters
-    )
-    return (one, two, three) if found else (xi, eta, angle)
+    wx, wy = centre[0] + radius * e[0], centre[1] + radius * e[1]
+    one, two, three, better = contact.search(centre, x, z, radius, wx, wy, turn, function, parameters)
+    return (one, two, three, True) if better else (xi, eta, angle, found)
