@@ -93,7 +93,8 @@ def rim_clearances(bicycle: Bicycle, surface: Surface, q: np.ndarray, contact: n
         angle = contact[3 * k + 2]
         clearances[k] = kernel.bound(centre, x, z, radius, angle, known, function, parameters)
         if not clearances[k] > 0:
-            clearances[k], _ = kernel.least_clearance(centre, x, z, radius, angle, known.samples, function, parameters)
+            where = (centre, x, z, radius, angle, True, known.samples, function, parameters)
+            clearances[k], _ = kernel.least_clearance(*where)
     return clearances
 
 
@@ -167,7 +168,7 @@ class RimWatch:
         require_clear_rims(bicycle, surface, q)
         self.needed = known.curved
         self.centre, self.axle = np.zeros((2, 3)), np.zeros((2, 3))
-        self._clock, self._clearance = np.zeros(2), np.zeros((2, 2))
+        self._clock, self._clearance = np.zeros(2), np.full((2, 2), np.nan)
         # The watch does not keep the surface's compiled function alive.
         self._function = surface.function.real
         radii = np.array([bicycle.rear_wheel_radius, bicycle.front_wheel_radius])

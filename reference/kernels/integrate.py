@@ -103,8 +103,8 @@ def _rim_bounds(y, ground, function, parameters, c):
 def rim_clearance(y, ground, function, parameters, c):
     """Return (clearance, wheel): the least of both rims' clearances, and whose it is."""
     (c1, x1, _, z1, r1), (c2, x2, _, z2, r2) = wheels(y, c)
-    one, _ = least_clearance(c1, x1, z1, r1, y[20], ground.samples, function, parameters)
-    two, _ = least_clearance(c2, x2, z2, r2, y[23], ground.samples, function, parameters)
+    one, _ = least_clearance(c1, x1, z1, r1, y[20], True, ground.samples, function, parameters)
+    two, _ = least_clearance(c2, x2, z2, r2, y[23], True, ground.samples, function, parameters)
     return (one, 0) if one <= two else (two, 1)
 
 

@@ -3,13 +3,12 @@
 The rim point w(a) = c + r e(a) stands h(a) = w_z - f(w_x, w_y) above the ground, which is below the rim if
 and only if h >= 0 all round. At the contact h and h' vanish, so with d the angle from there
 
-    clearance   g(d) = (h(a + d) - h(a) - h'(a) sin d + max(h(a), 0)) / (r (1 - cos d))
-                g(0) = -e . N - r t . H t
+    clearance   g(d) = (h(a + d) - h(a) - h'(a) sin d) / (r (1 - cos d)),   g(0) = -e . N - r t . H t
 
 is smooth, N = (-fx, -fy, 1) and the Hessian H taken at the rim point. The rim touches the ground in its
-contact alone if and only if g > 0 all round: g(0) > 0 says that the rim is less curved than the ground below
-its contact. What a soft or an inexact contact has sunk, h(a) < 0, is taken off, and its slope h'(a), so that
-this holds to first order in the gap; a wheel in the air, h(a) > 0, touches where its rim comes to the ground.
+contact alone if and only if g > 0 all round: g(0) > 0 says that the rim is more curved than the ground below
+its contact. The gap h(a) of a soft or an inexact contact, and its slope h'(a), are taken off, so that this holds to
+first order in the gap. A wheel in the air has no contact: it touches where h itself comes to zero, and h(a) stays.
 
 Bound. Let no eigenvalue of H exceed K within 2 r of the contact. Then f(w) <= f(u) + grad f . (w - u) + K |w - u|^2 / 2
 horizontally, and with |w(a + d) - w(a)|^2 = 2 r^2 (1 - cos d)
@@ -76,7 +75,7 @@ class Edge(NamedTuple):
     tangent: Any
     radius: float
     slope: float  # h' / r at the contact
-    base: float  # min(h, 0) there
+    base: float  # the contact's gap h, zero for a wheel in the air
     here: float  # g(0)
 
 
@@ -90,17 +89,16 @@ def level_axes(axle):
 
 
 @jit
-def _edge(centre, x, z, radius, angle, samples, function, parameters):
-    """Return (edge, -e . N) of a rim whose contact is at ``angle``."""
+def _edge(centre, x, z, radius, angle, held, samples, function, parameters):
+    """Edge of a rim whose contact is at ``angle``; ``held`` is False for a wheel in the air."""
     e, t = rim(angle, x, z)
     f, fx, fy, fxx, fxy, fyy = function(centre[0] + radius * e[0], centre[1] + radius * e[1], parameters)
     n = (-fx, -fy, 1.0)
     height = centre[2] + radius * e[2] - f
-    upright = -dot(e, n)
     bend = fxx * t[0] * t[0] + 2 * fxy * t[0] * t[1] + fyy * t[1] * t[1]
     # In the air the clearance has no limit at d = 0: the sampling sees as far as its first sample.
-    lifted = max(height, 0.0) / (radius * (1 - math.cos(2 * math.pi / samples)))
-    return Edge(centre, e, t, radius, dot(t, n), min(height, 0.0), upright - radius * bend + lifted), upright
+    lifted = 0.0 if held else height / (radius * (1 - math.cos(2 * math.pi / samples)))
+    return Edge(centre, e, t, radius, dot(t, n), height if held else 0.0, lifted - dot(e, n) - radius * bend)
 
 
 @jit
@@ -147,12 +145,12 @@ def bound(centre, x, z, radius, angle, ground, function, parameters):
 
 
 @jit
-def least_clearance(centre, x, z, radius, angle, samples, function, parameters):
+def least_clearance(centre, x, z, radius, angle, held, samples, function, parameters):
     """Return (clearance, d): the least clearance of the whole rim and the angle to it from the contact at ``angle``.
 
-    (inf, 0) where the contact is off the ground, which is for others to tell.
+    ``held`` is False for a wheel in the air. (inf, 0) where the contact is off the ground, which is for others to tell.
     """
-    edge, _ = _edge(centre, x, z, radius, angle, samples, function, parameters)
+    edge = _edge(centre, x, z, radius, angle, held, samples, function, parameters)
     if not edge.here < math.inf:
         return math.inf, 0.0
     step = 2 * math.pi / samples
@@ -220,7 +218,7 @@ def find_contact(centre, x, z, radius, ground, function, parameters):
     if not ground.curved or (found and bound(centre, x, z, radius, angle, ground, function, parameters) > 0):
         return xi, eta, angle, found
     if found and _distance(centre, x, z, radius, angle, function, parameters) < LIFTED * radius:
-        clearance, _ = least_clearance(centre, x, z, radius, angle, ground.samples, function, parameters)
+        clearance, _ = least_clearance(centre, x, z, radius, angle, True, ground.samples, function, parameters)
         if clearance > 0:
             return xi, eta, angle, True
     _, turn = deepest(centre, x, z, radius, ground.samples, function, parameters)
