@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from reference.rim import find_second_touch, require_clear_rims
+
 from .engine import REQUIRED, SHAPES, Engine, EngineError, Problem, Progress, Settings, Trajectory
 from .guard import simulate
 
@@ -20,8 +22,10 @@ CLOCK_ERROR = 1e-9
 def ride(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
     """Run a problem in an engine and look at what it gives.
 
-    A state that is not finite ends the ride before it. The engine's own times are held against those asked for; what
-    agrees up to `CLOCK_ERROR` carries the latter, so that engines can be compared sample by sample.
+    A state that is not finite ends the ride before it, and so does a rim that touches the ground at a second place.
+    An engine may look for that in its own steps; here any engine's samples are looked at. The engine's own times are
+    held against those asked for; what agrees up to `CLOCK_ERROR` carries the latter, so that engines can be compared
+    sample by sample.
 
     Parameters
     ----------
@@ -37,10 +41,15 @@ def ride(engine: Engine, problem: Problem, settings: Any, progress: Progress) ->
     Raises
     ------
     EngineError
-        If the engine gives no trajectory, or one that is none of this problem: what is wrong with it.
+        If a rim lies inside the ground at the start, or the engine gives no trajectory, or one that is none of this
+        problem: what is wrong with it.
     Exception
         Whatever the engine raises.
     """
+    try:
+        require_clear_rims(problem.bicycle, problem.surface, problem.q)
+    except ValueError as error:
+        raise EngineError(str(error)) from error
     trajectory = simulate(engine, problem, settings, progress)
     if not isinstance(trajectory, Trajectory):
         raise EngineError(f"it gave a {type(trajectory).__name__}, not a Trajectory")
@@ -51,12 +60,20 @@ def ride(engine: Engine, problem: Problem, settings: Any, progress: Progress) ->
         trajectory = replace(trajectory, time=asked.copy())
     finite = np.all([np.isfinite(_rows(getattr(trajectory, name))).all(axis=1) for name in REQUIRED], axis=0)
     if finite.all():
-        return trajectory
+        return _until_second_touch(problem, trajectory)
     bad = int(np.argmin(finite))
     if bad == 0:
         raise EngineError("its first state is not finite")
     ended = f"its state is not finite at {trajectory.time[bad]:.6g} s"
-    return replace(trajectory.first(bad), ended=trajectory.ended or ended)
+    return _until_second_touch(problem, replace(trajectory.first(bad), ended=trajectory.ended or ended))
+
+
+def _until_second_touch(problem: Problem, trajectory: Trajectory) -> Trajectory:
+    """The ride up to where a rim touches a second place, at least its first sample; all of it if none does."""
+    ending = find_second_touch(problem.bicycle, problem.surface, trajectory.time, trajectory.q, trajectory.qd)
+    if ending is None:
+        return trajectory
+    return replace(trajectory.until(ending.time), ended=ending.why)
 
 
 def _rows(values: np.ndarray) -> np.ndarray:

@@ -138,6 +138,10 @@ class Trajectory:
         cut = {name: value[:samples] for name in SHAPES if (value := getattr(self, name)) is not None}
         return replace(self, **cut)
 
+    def until(self, time: float) -> Self:
+        """The ride up to a time [s], its first sample at least; steps and CPU time stay those of the whole."""
+        return self.first(max(1, int(np.searchsorted(self.time, time, side="right"))))
+
     def not_finite(self) -> list[str]:
         """Names of what is given and is not finite in some samples."""
         given = ((name, getattr(self, name)) for name in SHAPES)

@@ -73,7 +73,7 @@ class LagrangeEngine:
         cpu_time = time.process_time() - begin
         if len(motion.time) == 0:
             raise EngineError(motion.ended)
-        seen = observe(*where, motion.q, motion.qd)
+        seen = observe(*where, motion.q, motion.qd, motion.contact)
         return Trajectory(
             engine=self.name,
             version=self.version,

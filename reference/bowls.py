@@ -135,6 +135,11 @@ class Cone:
         """It has no edge."""
         return 0.0, math.inf
 
+    @property
+    def bend(self) -> float:
+        """The tip's curvature, slope / rounding [1/m]."""
+        return self.slope / self.rounding
+
     def flattened(self, fraction: float) -> SurfaceOfRevolution:
         """The cone of a fraction of the slope."""
         return Cone(fraction * self.slope, self.rounding) if fraction > 0 else Plane()

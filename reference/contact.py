@@ -9,6 +9,7 @@ import numpy as np
 from .bicycle import Bicycle
 from .kernels import dynamics as kernel
 from .kinematics import constants
+from .rim import bicycle_rim_search
 from .surface import Surface
 
 
@@ -39,14 +40,31 @@ class Observation:
     found: bool
 
 
-def observe(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> Observation:
-    """Measure contacts and energies of a trajectory from its coordinates (n, 9) and rates (n, 9)."""
+def observe(
+    bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, contact: np.ndarray | None = None
+) -> Observation:
+    """Measure contacts and energies of a trajectory.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    surface : Surface
+    q, qd : ndarray, shape (n, 9)
+        Coordinates and rates.
+    contact : ndarray, shape (n, 2, 3), optional
+        Contact parameters (xi, eta, rim angle), where an integrator has them. Without them the contact is searched
+        from each pose alone, and is the place where the rim is deepest.
+    """
     n = len(q)
+    contacts = np.empty((n, 6)) if contact is None else np.array(contact, float).reshape(n, 6)
     point, normal, gap = np.empty((n, 2, 3)), np.empty((n, 2, 3)), np.empty((n, 2))
     slip, energy = np.empty((n, 2, 2)), np.empty((n, 2))
     found = kernel.observe(
         np.ascontiguousarray(q, float),
         np.ascontiguousarray(qd, float),
+        contacts,
+        contact is not None,
+        bicycle_rim_search(bicycle, surface),
         surface.function.real,
         surface.parameters,
         constants(bicycle),

@@ -101,6 +101,23 @@ class HeightField:
         coefficients = _spline_coefficients(along_x.T).T
         return np.concatenate([self.origin, [self.spacing], samples.shape, coefficients.ravel()])
 
+    @cached_property
+    def bend(self) -> float:
+        """Bound of the largest eigenvalue of the Hessian [1/m].
+
+        A derivative of the spline is a mean of differences of its coefficients with positive weights.
+        """
+        nx, ny = len(self.heights), len(self.heights[0])
+        c = self._parameters[5:].reshape(nx + 4, ny + 4) / self.spacing**2
+        along, across = np.diff(c, 2, axis=0).max(), np.diff(c, 2, axis=1).max()
+        mixed = np.abs(np.diff(np.diff(c, axis=0), axis=1)).max()
+        return float((along + across) / 2 + np.hypot((along - across) / 2, mixed))
+
+    @property
+    def detail(self) -> float:
+        """The spacing [m]."""
+        return float(self.spacing)
+
 
 def _rows(heights: Sequence[Sequence[float]]) -> tuple[tuple[float, ...], ...]:
     """The heights as tuples; ValueError if they are no grid of numbers."""

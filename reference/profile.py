@@ -153,6 +153,11 @@ class SplineProfile:
         """From the first point to the last."""
         return self.radii[0], self.radii[-1]
 
+    @property
+    def detail(self) -> float:
+        """Least distance of two points [m]."""
+        return min(outer - inner for inner, outer in pairwise(self.radii))
+
     def flattened(self, fraction: float) -> SurfaceOfRevolution:
         """All heights times the fraction."""
         return SplineProfile(self.radii, tuple(fraction * z for z in self.heights)) if fraction > 0 else Plane()

@@ -12,12 +12,14 @@ from .bicycle import Bicycle
 from .dae import contact_parameters
 from .kernels import integrate as kernel
 from .kinematics import WHEELS, constants
+from .rim import bicycle_rim_search, require_clear_rims, second_touch
 from .surface import Surface, evaluate
 
 # Coefficients as data, from the library that everybody checks them against.
 _TABLEAU = tuple(
     np.ascontiguousarray(table, float) for table in (DOP853.A, DOP853.B, DOP853.E3, DOP853.E5, DOP853.A_EXTRA, DOP853.D)
 )
+_TOUCHED = {kernel.REAR_TOUCHED: WHEELS[0], kernel.FRONT_TOUCHED: WHEELS[1]}
 _STEPS_A_CALL = 200  # between two reports of progress; a step takes some 6 us
 # Steps shrink to `kernel.SMALLEST_STEP` before the edge of the ground: at 100 m/s a wheel is within 1 um of it, but
 # where the ground turns upright, as a sphere does, they shrink earlier.
@@ -79,6 +81,9 @@ def simulate(
 ) -> Motion:
     """Integrate precisely: Dormand-Prince 8(5,3), adaptive, projected on all constraints.
 
+    The motion ends where a rim touches the ground at a second place: what follows is an impact, which the
+    equations do not know.
+
     Parameters
     ----------
     bicycle : Bicycle
@@ -99,23 +104,27 @@ def simulate(
     Raises
     ------
     ValueError
-        If a wheel has no contact at the start.
+        If a wheel has no contact at the start, or a rim lies inside the ground or touches it twice.
     """
     times = np.ascontiguousarray(times, float)
     y = np.concatenate([q, qd, contact_parameters(bicycle, surface, np.asarray(q, float))])
+    require_clear_rims(bicycle, surface, y[:9], y[18:])
+    rims = bicycle_rim_search(bicycle, surface)
     out = np.empty((len(times), kernel.SIZE))
     index, t, h, steps, evaluations = 0, 0.0, 1e-3, 0, 0
     status = kernel.MORE
     while status == kernel.MORE:
         status, index, t, h, more, count = kernel.dop853(
-            *(y, times, index, t, h, tolerance, _STEPS_A_CALL, _TABLEAU),
+            *(y, times, index, t, h, tolerance, _STEPS_A_CALL, _TABLEAU, rims),
             *(surface.function.real, surface.parameters, constants(bicycle), out),
         )
         steps, evaluations = steps + more, evaluations + count
         if progress is not None:
             progress(min(t, float(times[-1])))
     ended = None
-    if status != kernel.DONE:
+    if status in _TOUCHED:
+        ended = second_touch(_TOUCHED[status], t)
+    elif status != kernel.DONE:
         why = _where_the_ground_ends(surface, y[18:]) or "the equations of motion become singular"
         ended = f"no solution beyond t = {t:.6g} s: {why}"
     return _motion(bicycle, surface, times, out[:index], steps, evaluations, ended)
@@ -136,6 +145,8 @@ def simulate_modified_euler(
 ) -> Motion:
     """Integrate as the paper does (section 4.2): modified Euler with a fixed step, nothing projected.
 
+    Ends at a second touch as `simulate` does.
+
     Parameters
     ----------
     bicycle : Bicycle
@@ -154,17 +165,25 @@ def simulate_modified_euler(
     Raises
     ------
     ValueError
-        If ``times`` are no such grid.
+        If ``times`` are no such grid, or a wheel has no contact at the start, or a rim lies inside the ground or
+        touches it twice.
     """
     stride = steps_per_output(times, step)
     y = np.concatenate([q, qd, contact_parameters(bicycle, surface, np.asarray(q, float))])
+    require_clear_rims(bicycle, surface, y[:9], y[18:])
     out = np.empty((len(times), kernel.SIZE))
     out[0] = y
     count = stride * (len(times) - 1)
-    rows = 1 + kernel.modified_euler(
-        y, step, count, stride, surface.function.real, surface.parameters, constants(bicycle), out[1:]
+    status, rows, reached = kernel.modified_euler(
+        *(y, step, count, stride, bicycle_rim_search(bicycle, surface)),
+        *(surface.function.real, surface.parameters, constants(bicycle), out[1:]),
     )
-    ended = None if rows == len(times) else f"the state is no longer finite after t = {times[rows - 1]:.6g} s"
+    rows += 1
+    ended = None
+    if status in _TOUCHED:
+        ended = second_touch(_TOUCHED[status], reached)
+    elif status != kernel.DONE:
+        ended = f"the state is no longer finite after t = {times[rows - 1]:.6g} s"
     return _motion(bicycle, surface, times, out[:rows], (rows - 1) * stride, 2 * (rows - 1) * stride, ended)
 
 

@@ -74,7 +74,13 @@ def surface_function(function: Callable[..., tuple]) -> SurfaceFunction:
 
 
 class Surface(Protocol):
-    """Any smooth ground z = f(x, y) of gravity's half space."""
+    """Any smooth ground z = f(x, y) of gravity's half space.
+
+    Two more properties are read where a surface has them, when the whole rim of a wheel is looked at
+    (`reference.rim`): ``bend``, a bound of the largest eigenvalue of the Hessian anywhere [1/m], which saves most of
+    the looking, and ``detail``, the length within which the ground does not bend to and fro [m], which says how
+    closely to look where it is less than a wheel's radius.
+    """
 
     @property
     def function(self) -> SurfaceFunction:
@@ -133,6 +139,11 @@ class Plane:
         """It has no edge."""
         return 0.0, math.inf
 
+    @property
+    def bend(self) -> float:
+        """It has none."""
+        return 0.0
+
     def flattened(self, fraction: float) -> Plane:
         """The plane itself, which is level."""
         return self
@@ -173,6 +184,11 @@ class Paraboloid:
     def extent(self) -> tuple[float, float]:
         """It has no edge."""
         return 0.0, math.inf
+
+    @property
+    def bend(self) -> float:
+        """2 alpha, everywhere [1/m]."""
+        return 2.0 * self.alpha
 
     def flattened(self, fraction: float) -> Paraboloid:
         """The paraboloid of a fraction of alpha."""

@@ -13,6 +13,7 @@ from reference.circular import CircularMotion
 from reference.dae import consistent_state
 from reference.families import find_motion
 from reference.kinematics import LEAN, REAR_ANGLE, STEER, YAW, body_positions
+from reference.rim import require_clear_rims
 from reference.stability import growth_rate, linearise
 from reference.surface import Plane, Surface, SurfaceOfRevolution, evaluate
 
@@ -57,7 +58,7 @@ def make_start(scenario: Scenario) -> Start:
     Raises
     ------
     ScenarioError
-        If there is no such motion, or its disturbed state cannot be reached.
+        If there is no such motion, or its disturbed state cannot be reached or has a rim inside the ground.
     """
     bicycle, surface = scenario.make_bicycle(), scenario.surface.make()
     try:
@@ -66,6 +67,7 @@ def make_start(scenario: Scenario) -> Start:
             family, motion, q, qd = _undisturbed(scenario, bicycle, surface)
             rate = _growth_rate(scenario, bicycle, surface, q, qd)
             undisturbed, (q, qd) = (q, qd), _disturbed(scenario, bicycle, surface, q, qd)
+            require_clear_rims(bicycle, surface, q)
     except (ValueError, ArithmeticError) as error:
         raise ScenarioError(f"motion: {error}") from error
     simulation = scenario.simulation

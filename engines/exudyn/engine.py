@@ -77,14 +77,16 @@ class ExudynEngine:
         EngineError
             If the engine does not even accept the initial state.
         """
-        from .model import build_model
+        from .model import build_model, rim_look
         from .solve import integrate, silent
 
         self.check(problem, settings)
         with silent():
             model = build_model(problem, settings, self.put_on_ground())
-            outcome = integrate(model.system, _integration(problem, settings, model), progress)
-        return self._trajectory(problem, settings, model, outcome)
+            look = rim_look(model, problem)
+            outcome = integrate(model.system, _integration(problem, settings, model), progress, look)
+        trajectory = self._trajectory(problem, settings, model, outcome)
+        return trajectory.until(outcome.until)
 
     def _trajectory(self, problem: Problem, settings: SolverSettings, model: Model, outcome: Outcome) -> Trajectory:
         from .model import read_motion

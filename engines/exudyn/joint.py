@@ -36,6 +36,7 @@ from exudyn.itemInterface import (
     ObjectConnectorCoordinateVector,
 )
 
+from reference.rim import rim_search
 from reference.surface import Surface
 
 from . import kernel
@@ -185,8 +186,9 @@ def _user_functions(shape: tuple[np.ndarray, np.ndarray], radii: np.ndarray, sur
         np.zeros(size) for size in ((2 * count, 7), (3 * count, 7 * count), (2, 3 * count), 1)
     )
     state[:count, 2], state[:count, 3] = radii, 1.0
-    function = surface.function.real
-    evaluate = kernel.constraints(state, *shape, radii, function, surface.parameters, scale, rows, values).__next__
+    function, looking = surface.function.real, rim_search(surface, radii)
+    where = (looking, function, surface.parameters)
+    evaluate = kernel.constraints(state, *shape, radii, *where, scale, rows, values).__next__
     evaluate()  # compiles
     memory, pack = state.data.cast("B"), Struct(f"{14 * count}d").pack_into
     on_position_level, on_velocity_level = values[0].tolist, values[1].tolist

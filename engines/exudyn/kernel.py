@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference.kernels import contact
+from reference.kernels.rim import find_contact
 from reference.kernels.vector import add, cross, dot, jit
 
 
@@ -43,10 +44,9 @@ def turned(body, v):
 
 
 @jit
-def contact_frame(centre, x, axle, z, radius, function, parameters):
+def contact_frame(centre, x, axle, z, radius, ground, function, parameters):
     """Return (gap, d, (lateral, forward, normal)) of a wheel; the gap is NaN where no contact is found."""
-    xi, eta, angle = contact.first_guess(centre, x, z, radius, function, parameters)
-    xi, eta, angle, found = contact.search(centre, x, z, radius, xi, eta, angle, function, parameters)
+    xi, eta, angle, found = find_contact(centre, x, z, radius, ground, function, parameters)
     _, _, gap, normal, d, _, _, _, _, _, _ = contact.equations(
         centre, x, z, radius, xi, eta, angle, function, parameters
     )
@@ -55,25 +55,25 @@ def contact_frame(centre, x, axle, z, radius, function, parameters):
 
 
 @jit
-def wheel_contact(coordinates, centre, triad, radius, function, parameters):
+def wheel_contact(coordinates, centre, triad, radius, ground, function, parameters):
     """Return (gap, A p + d, (lateral, forward, normal)) of a wheel at its node's coordinates (7,).
 
     ``centre`` (3,) is p, the rows of ``triad`` (3, 3) are right-handed unit vectors of the body with the
-    axle in the middle.
+    axle in the middle. ``ground`` is the `reference.kernels.rim.RimSearch`.
     """
     body = axes(coordinates[3], coordinates[4], coordinates[5], coordinates[6])
     offset = turned(body, centre)
     middle = (coordinates[0] + offset[0], coordinates[1] + offset[1], coordinates[2] + offset[2])
     x, axle, z = turned(body, triad[0]), turned(body, triad[1]), turned(body, triad[2])
-    gap, d, frame = contact_frame(middle, x, axle, z, radius, function, parameters)
+    gap, d, frame = contact_frame(middle, x, axle, z, radius, ground, function, parameters)
     return gap, add(offset, d), frame
 
 
 @jit
-def velocity_rows(coordinates, centre, triad, radius, function, parameters, rows):
+def velocity_rows(coordinates, centre, triad, radius, ground, function, parameters, rows):
     """Fill ``rows`` (3, 7) with W (lateral, forward, normal) at coordinates (7,); return the gap."""
     t0, t1, t2, t3 = coordinates[3], coordinates[4], coordinates[5], coordinates[6]
-    gap, arm, frame = wheel_contact(coordinates, centre, triad, radius, function, parameters)
+    gap, arm, frame = wheel_contact(coordinates, centre, triad, radius, ground, function, parameters)
     for i in range(3):
         # e . (w x d) = w . (d x e), and w = G theta' is twice the vector part of theta' conj(theta).
         m0, m1, m2 = cross(arm, frame[i])
@@ -87,7 +87,7 @@ def velocity_rows(coordinates, centre, triad, radius, function, parameters, rows
 
 
 @jit
-def constraints(state, centres, triads, radii, function, parameters, scale, rows, values):
+def constraints(state, centres, triads, radii, ground, function, parameters, scale, rows, values):
     """Evaluate the rolling constraints of k wheels again at every `next`.
 
     A generator: its arguments are unpacked once, which would otherwise cost ten times the evaluation.
@@ -102,7 +102,7 @@ def constraints(state, centres, triads, radii, function, parameters, scale, rows
         for wheel in range(count):
             block = rows[3 * wheel : 3 * wheel + 3, 7 * wheel : 7 * wheel + 7]
             shape = (centres[wheel], triads[wheel], radii[wheel])
-            gap = velocity_rows(state[wheel], shape[0], shape[1], shape[2], function, parameters, block)
+            gap = velocity_rows(state[wheel], shape[0], shape[1], shape[2], ground, function, parameters, block)
             for i in range(3):
                 velocity = 0.0
                 for j in range(7):
@@ -114,7 +114,7 @@ def constraints(state, centres, triads, radii, function, parameters, scale, rows
 
 
 @jit
-def probe(state, centre, triad, radius, function, parameters, point, frame, slip, gap):
+def probe(state, centre, triad, radius, ground, function, parameters, point, frame, slip, gap):
     """Measure the contact of one wheel again at every `next`.
 
     state (2, 7) holds its coordinates and their rates. Fills point (3,), frame (3, 3) with rows lateral,
@@ -122,8 +122,8 @@ def probe(state, centre, triad, radius, function, parameters, point, frame, slip
     """
     rows = np.empty((3, 7))
     while True:
-        gap[0], arm, axes_of_contact = wheel_contact(state[0], centre, triad, radius, function, parameters)
-        velocity_rows(state[0], centre, triad, radius, function, parameters, rows)
+        gap[0], arm, axes_of_contact = wheel_contact(state[0], centre, triad, radius, ground, function, parameters)
+        velocity_rows(state[0], centre, triad, radius, ground, function, parameters, rows)
         for i in range(3):
             point[i] = state[0, i] + arm[i]
             for j in range(3):
@@ -136,7 +136,7 @@ def probe(state, centre, triad, radius, function, parameters, point, frame, slip
 
 
 @jit
-def normals(coordinates, centres, triads, radii, function, parameters, out):
+def normals(coordinates, centres, triads, radii, ground, function, parameters, out):
     """Fill ``out`` (k, 3) with the surface's normals at the contacts of k wheels, again at every `next`.
 
     A wheel without contact gets NaN, on which the engine ends: any other normal would be taken for the true one.
@@ -144,14 +144,14 @@ def normals(coordinates, centres, triads, radii, function, parameters, out):
     while True:
         for wheel in range(radii.size):
             where = (coordinates[wheel], centres[wheel], triads[wheel], radii[wheel])
-            gap, _, frame = wheel_contact(where[0], where[1], where[2], where[3], function, parameters)
+            gap, _, frame = wheel_contact(where[0], where[1], where[2], where[3], ground, function, parameters)
             for i in range(3):
                 out[wheel, i] = frame[2][i] if gap == gap else np.nan
         yield True
 
 
 @jit
-def observe(position, velocity, rotation, spin, radius, function, parameters, point, frames, gap, slip):
+def observe(position, velocity, rotation, spin, radius, ground, function, parameters, point, frames, gap, slip):
     """Measure one wheel's contact along n samples of its own motion.
 
     position, velocity, spin (n, 3) and rotation (n, 3, 3) are the body's, in inertial axes; its centre is
@@ -162,7 +162,7 @@ def observe(position, velocity, rotation, spin, radius, function, parameters, po
         a = rotation[n]
         x, axle, z = (a[0, 0], a[1, 0], a[2, 0]), (a[0, 1], a[1, 1], a[2, 1]), (a[0, 2], a[1, 2], a[2, 2])
         centre = (position[n, 0], position[n, 1], position[n, 2])
-        gap[n], d, frame = contact_frame(centre, x, axle, z, radius, function, parameters)
+        gap[n], d, frame = contact_frame(centre, x, axle, z, radius, ground, function, parameters)
         turning = cross((spin[n, 0], spin[n, 1], spin[n, 2]), d)
         material = (velocity[n, 0] + turning[0], velocity[n, 1] + turning[1], velocity[n, 2] + turning[2])
         slip[n, 0], slip[n, 1] = dot(frame[0], material), dot(frame[1], material)

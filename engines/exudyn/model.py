@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,9 +11,10 @@ import numpy as np
 from exudyn.itemInterface import SensorBody
 from exudyn.rigidBodyUtilities import RigidBodyInertia
 
-from engines.engine import Problem
+from engines.engine import EngineError, Problem
 from reference.bicycle import BODIES, Bicycle
 from reference.kinematics import angular_velocities, body_positions, body_velocities, rotations
+from reference.rim import Ending, RimWatch
 
 from .settings import SolverSettings
 from .wheels import LEFT, MASS_UNIT, PutOnGround, Rolling
@@ -31,12 +33,15 @@ class Model:
         Both wheels on the ground.
     sensors : tuple of dict
         Per body, in the order of `BODIES`, sensor numbers of position, velocity, rotation and spin.
+    wheels : tuple
+        Nodes of the rear and the front wheel.
     """
 
     container: exu.SystemContainer
     system: exu.MainSystem
     rolling: Rolling
     sensors: tuple[dict[str, Any], ...]
+    wheels: tuple[Any, Any]
 
 
 def build_model(problem: Problem, settings: SolverSettings, put_on_ground: PutOnGround) -> Model:
@@ -48,7 +53,8 @@ def build_model(problem: Problem, settings: SolverSettings, put_on_ground: PutOn
     rolling = put_on_ground(system, bodies[2:], problem, settings)
     sensors = tuple(_watch(system, body["bodyNumber"]) for body in bodies)
     system.Assemble()
-    return Model(container, system, rolling, sensors)
+    rear, front = (body["nodeNumber"] for body in bodies[2:])
+    return Model(container, system, rolling, sensors, (rear, front))
 
 
 def _add_bodies(system: exu.MainSystem, problem: Problem) -> list[dict[str, Any]]:
@@ -102,6 +108,31 @@ def _watch(system: exu.MainSystem, body: Any) -> dict[str, Any]:
         )
         for name, kind in kinds.items()
     }
+
+
+def rim_look(model: Model, problem: Problem) -> Callable[[float], Ending | None]:
+    """Make the look at both rims that `engines.exudyn.solve.integrate` calls at every step.
+
+    Raises
+    ------
+    EngineError
+        If a rim lies inside the ground at the start.
+    """
+    try:
+        watch = RimWatch(problem.bicycle, problem.surface, problem.q)
+    except ValueError as error:
+        raise EngineError(str(error)) from error
+    if not watch.needed:
+        return lambda _: None
+    system, kinds = model.system, exu.OutputVariableType
+
+    def look(time: float) -> Ending | None:
+        for k, node in enumerate(model.wheels):
+            watch.centre[k] = system.GetNodeOutput(node, kinds.Position)
+            watch.axle[k] = system.GetNodeOutput(node, kinds.RotationMatrix)[1::3]
+        return watch.look(time)
+
+    return look
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 from engines.engine import Problem
 from reference.bicycle import BODIES, Bicycle
 from reference.kinematics import YAW, coordinates_from_bodies
+from reference.rim import rim_search
 
 from . import kernel
 from .model import Model, Motion
@@ -30,13 +31,14 @@ def measure_contacts(problem: Problem, model: Model, motion: Motion) -> Contacts
     n = len(motion.time)
     point, force, gap, slip = np.empty((n, 2, 3)), np.empty((n, 2, 3)), np.empty((n, 2)), np.empty((n, 2, 2))
     function, parameters = problem.surface.function.real, problem.surface.parameters
+    looking = rim_search(problem.surface, wheel_radii(problem))
     local_forces = model.rolling.local_forces(model.system)
     for wheel, radius in enumerate(wheel_radii(problem)):
         body = 2 + wheel
         frames = np.empty((n, 3, 3))
         kernel.observe(
             *(motion.position[:, body], motion.velocity[:, body], motion.rotation[:, body], motion.spin[:, body]),
-            *(radius, function, parameters),
+            *(radius, looking, function, parameters),
             *(point[:, wheel], frames, gap[:, wheel], slip[:, wheel]),
         )
         force[:, wheel] = np.einsum("ni,nij->nj", local_forces[:, wheel], frames)

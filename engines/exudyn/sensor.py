@@ -8,6 +8,8 @@ import exudyn as exu
 import numpy as np
 from exudyn.itemInterface import SensorUserFunction
 
+from reference.rim import rim_search
+
 from . import kernel
 from .joint import RollingJoint
 
@@ -66,8 +68,9 @@ def _user_function(joint: RollingJoint, quantity: Quantity, wheel: int) -> Any:
     state[0, 2], state[0, 3] = joint.radii[wheel], 1.0
     point, frame, slip, gap = np.empty(3), np.empty((3, 3)), np.empty(2), np.empty(1)
     function = joint.surface.function.real
+    where = (rim_search(joint.surface, joint.radii), function, joint.surface.parameters)
     shape = (joint.centres[wheel], joint.triads[wheel], joint.radii[wheel])
-    measure = kernel.probe(state, *shape, function, joint.surface.parameters, point, frame, slip, gap).__next__
+    measure = kernel.probe(state, *shape, *where, point, frame, slip, gap).__next__
     seen = {"ContactPoint": point, "Gap": gap, "Slip": slip}
     node, kind = joint.nodeNumbers[wheel], exu.OutputVariableType
 

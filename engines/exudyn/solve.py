@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import exudyn as exu
 
 from engines.engine import EngineError, Progress
+from reference.rim import Ending
 
 from .settings import SolverSettings
 from .start import Start, begin, correct, second_order_start
@@ -51,6 +53,8 @@ class Outcome:
         Steps done whose Newton iteration did not converge by the engine's own word.
     largest_residual : float
         That Newton's method left in a step done: a norm of forces and lengths, in the model's units.
+    until : float
+        Time after which nothing belongs to the ride any more [s].
     """
 
     steps: int
@@ -58,6 +62,7 @@ class Outcome:
     ended: str | None
     unconverged_steps: int
     largest_residual: float
+    until: float = math.inf
 
 
 class _Steps:
@@ -92,12 +97,17 @@ class _Steps:
         if self.taken % self._stride == 0:
             self._output.lastSensorsWritten = time
 
-    def outcome(self, done: int, cpu_time: float, ended: str | None) -> Outcome:
+    def outcome(self, done: int, cpu_time: float, ended: str | None, until: float = math.inf) -> Outcome:
         """Outcome of a run."""
-        return Outcome(done, cpu_time, ended, self.unconverged, self.residual)
+        return Outcome(done, cpu_time, ended, self.unconverged, self.residual, until)
 
 
-def integrate(system: exu.MainSystem, integration: Integration, progress: Progress) -> Outcome:
+def integrate(
+    system: exu.MainSystem,
+    integration: Integration,
+    progress: Progress,
+    look: Callable[[float], Ending | None] = lambda _: None,
+) -> Outcome:
     """Integrate a system from its initial state; its sensors hold the result.
 
     Parameters
@@ -107,6 +117,8 @@ def integrate(system: exu.MainSystem, integration: Integration, progress: Progre
     integration : Integration
     progress : callable
         Called now and then with the simulated time [s]; what it raises ends the run and is raised again.
+    look : callable
+        Called with the time [s] before each step and after the last; says why the ride ends there, or None.
 
     Raises
     ------
@@ -118,14 +130,19 @@ def integrate(system: exu.MainSystem, integration: Integration, progress: Progre
     start: Start | None = None
     solver: Any = exu.MainSolverImplicitSecondOrder()
     steps = _Steps(solver, integration)
+    ending: Ending | None = None
 
     with _interruptible() as interrupted:
 
         def before_step(_system, time):
+            nonlocal ending
             try:
                 if steps.taken > 0:
                     steps.end()
-                elif start is not None:
+                ending = look(steps.taken * step)
+                if ending is not None:
+                    return False
+                if steps.taken == 0 and start is not None:
                     correct(system, start)
                 if steps.taken > 0 and steps.taken % PROGRESS_STEPS == 0:
                     progress(steps.taken * step)
@@ -150,9 +167,13 @@ def integrate(system: exu.MainSystem, integration: Integration, progress: Progre
         raise raised[0]
     if interrupted.is_set():  # by a signal that the caller has made harmless
         return steps.outcome(steps.taken, cpu_time, "interrupted")
+    if ending is not None:  # before a step that was not taken
+        return steps.outcome(steps.taken, cpu_time, ending.why, ending.time)
     if success:
         steps.end()
-        return steps.outcome(steps.taken, cpu_time, None)
+        ending = look(steps.taken * step)
+        why, until = (None, math.inf) if ending is None else (ending.why, ending.time)
+        return steps.outcome(steps.taken, cpu_time, why, until)
     failure = "the Jacobian is singular" if solver.conv.linearSolverFailed else "Newton's method did not converge"
     if steps.taken == 0:
         raise EngineError(f"exudyn could not start: {failure}")

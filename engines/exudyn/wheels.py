@@ -11,6 +11,7 @@ import numpy as np
 from exudyn.itemInterface import SensorObject
 
 from engines.engine import Problem
+from reference.rim import rim_search
 
 from . import kernel
 from .joint import CreateRollingJointOnSurface, RollingJoint, slip_equations
@@ -104,8 +105,8 @@ def roll_discs_on_tangents(
     nodes, out = [wheel["nodeNumber"] for wheel in wheels], np.empty((2, 3))
     coordinates = np.array([system.GetNode(node)["referenceCoordinates"] for node in nodes])
     shape = (np.zeros((2, 3)), np.stack([np.eye(3)] * 2), np.array(wheel_radii(problem)))
-    function = problem.surface.function.real
-    find = kernel.normals(coordinates, *shape, function, problem.surface.parameters, out).__next__
+    function, looking = problem.surface.function.real, rim_search(problem.surface, wheel_radii(problem))
+    find = kernel.normals(coordinates, *shape, looking, function, problem.surface.parameters, out).__next__
     find()
     discs, objects = _add_discs(system, wheels, problem, out)
     kind = exu.OutputVariableType

@@ -35,6 +35,7 @@ from numba.np.numpy_support import carray
 from engines.mujoco.library import announce
 from reference.kernels import contact
 from reference.kernels.linear import factorise, solve_factorised
+from reference.kernels.rim import RimSearch, find_contact, level_axes
 from reference.kernels.vector import add, cross, dot, jit, scale
 
 WHEELS = 8  # the most that a blackboard has room for
@@ -51,6 +52,13 @@ BLACKBOARD = np.dtype(
         ("surface", _ADDRESS),
         ("parameters", _ADDRESS),
         ("parameter_count", np.int64),
+        # How closely to look at rims, `reference.kernels.rim.RimSearch`.
+        ("curved", np.int64),
+        ("bends", _ADDRESS),
+        ("bend_count", np.int64),
+        ("bend_width", np.float64),
+        ("detail", np.float64),
+        ("samples", np.int64),
         ("speeds", np.int64),
         # Arrays of the state that never move.
         ("qvel", _ADDRESS),
@@ -209,15 +217,6 @@ def _is_for(board, model, data):
 
 
 @jit
-def rim_axes(axle):
-    """Axes (x, z) of a wheel's plane, x level; nan where the wheel lies flat."""
-    x = (axle[1], -axle[0], 0.0)
-    length = np.sqrt(x[0] * x[0] + x[1] * x[1])
-    x = scale(1 / length, x)
-    return x, cross(x, axle)
-
-
-@jit
 def _wheel(board, k):
     """Return (centre, axle) of wheel k."""
     geom = board.geom[k]
@@ -230,7 +229,7 @@ def _wheel(board, k):
 def _contact_at(board, k):
     """Evaluate wheel k's contact at its place on the blackboard."""
     centre, axle = _wheel(board, k)
-    x, z = rim_axes(axle)
+    x, z = level_axes(axle)
     function = _function_at(board.surface, _SURFACE)
     xi, eta, angle = board.place[k, 0], board.place[k, 1], board.place[k, 2]
     parameters = _reals(board.parameters, board.parameter_count)
@@ -242,11 +241,13 @@ def _contact_at(board, k):
 def _find(board, k):
     """Search wheel k's contact from its pose alone and keep its place; True where it stands on the ground."""
     centre, axle = _wheel(board, k)
-    x, z = rim_axes(axle)
+    x, z = level_axes(axle)
     radius, function = board.radius[k], _function_at(board.surface, _SURFACE)
     parameters = _reals(board.parameters, board.parameter_count)
-    xi, eta, angle = contact.first_guess(centre, x, z, radius, function, parameters)
-    xi, eta, angle, found = contact.search(centre, x, z, radius, xi, eta, angle, function, parameters)
+    ground = RimSearch(
+        board.curved != 0, _reals(board.bends, board.bend_count), board.bend_width, board.detail, board.samples
+    )
+    xi, eta, angle, found = find_contact(centre, x, z, radius, ground, function, parameters)
     board.place[k, 0], board.place[k, 1], board.place[k, 2] = xi, eta, angle
     if not found:
         return False

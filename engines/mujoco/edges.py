@@ -11,7 +11,7 @@ import numpy as np
 
 from engines.engine import Problem
 from engines.mujoco.knife_edge import pressing_forces, rolling_forces, standing, stiffen, watched_edges
-from engines.mujoco.ride import Rig, bodies, contact_forces, look_stride, start, wheel_geoms
+from engines.mujoco.ride import Rig, bodies, contact_forces, rim_look, rim_stride, start, wheel_geoms
 from engines.mujoco.settings import ExactContactSettings, MultiplierSettings
 from reference.kinematics import WHEELS
 
@@ -35,7 +35,8 @@ def build_contacts(problem: Problem, settings: ExactContactSettings) -> Rig:
         bodies=bodies(model),
         wheels=wheels,
         follow=standing,
-        stride=look_stride(settings.step),
+        stride=rim_stride(problem, settings.step),
+        look=rim_look(data, problem),
         forces=partial(contact_forces, model, data, wheels),
         callbacks=lambda: watched_edges(model, data, problem.surface, GROUNDS, settings.converged_below),
         judged=settings.noslip_iterations == 0,
@@ -61,7 +62,8 @@ def build_multipliers(problem: Problem, settings: MultiplierSettings) -> Rig:
         bodies=bodies(model),
         wheels=wheel_geoms(model),
         follow=standing,
-        stride=look_stride(settings.step),
+        stride=rim_stride(problem, settings.step),
+        look=rim_look(data, problem),
         forces=forces,
         callbacks=lambda: rolling_forces(model, data, problem.surface, GROUNDS, settings.stabilisation),
     )

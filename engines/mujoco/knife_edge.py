@@ -36,6 +36,7 @@ from engines.engine import EngineError
 from engines.mujoco import compiled, layout
 from engines.mujoco.callbacks import installed
 from engines.mujoco.convergence import WRONG, Convergence, judged, share
+from reference.rim import rim_search
 from reference.surface import Surface
 
 
@@ -195,6 +196,13 @@ def _written(
     board["contact_size"], board["stabilisation"] = found.contact_size, stabilisation
     board["pyramidal"] = model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
     _write_wheels(board, model, wheels)
+    looking = rim_search(surface, [float(radius) for radius in board["radius"][: len(wheels)]])
+    board["curved"], board["bends"], board["bend_count"] = (
+        looking.curved,
+        looking.bends.ctypes.data,
+        len(looking.bends),
+    )
+    board["bend_width"], board["detail"], board["samples"] = looking.width, looking.detail, looking.samples
     yield
 
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -18,8 +19,10 @@ from engines.mujoco.convergence import Convergence, share
 from engines.mujoco.model import Touching, mjcf
 from engines.mujoco.settings import StepSettings
 from engines.mujoco.state import to_mujoco
+from engines.mujoco.tangent import wheel_poses
 from reference.bicycle import BODIES
-from reference.kinematics import WHEELS
+from reference.kinematics import WHEELS, constants
+from reference.rim import Ending, RimWatch, bicycle_rim_search
 
 REPORT_INTERVAL = 0.05
 # How often a bicycle is looked at whose ground needs no care: a wheel turns by far less than half a turn meanwhile.
@@ -84,6 +87,8 @@ class Rig:
         To be called every ``stride`` steps and before the first; False if a wheel has no contact point.
     stride : int
         Counted from the start, so that a ride ends where it ends whatever the output times.
+    look : callable
+        To be called after ``follow``, with the time [s]; says why the ride ends there, or None.
     forces : callable
         Fills an array (2, 3) with the contact forces of the last evaluation, inertial axes [N].
     callbacks : callable
@@ -98,6 +103,7 @@ class Rig:
     wheels: dict[int, int]
     follow: Callable[[], bool]
     stride: int
+    look: Callable[[float], Ending | None]
     forces: Callable[[np.ndarray], None]
     callbacks: Callable[[], AbstractContextManager[Convergence]]
     judged: bool = True
@@ -147,9 +153,42 @@ def start(problem: Problem, settings: StepSettings, touching: Touching) -> tuple
     return model, data
 
 
+def rim_look(data: mujoco.MjData, problem: Problem) -> Callable[[float], Ending | None]:
+    """Make the look at both rims of a `Rig`.
+
+    Raises
+    ------
+    EngineError
+        If a rim lies inside the ground at the start.
+    """
+    try:
+        watch = RimWatch(problem.bicycle, problem.surface, problem.q)
+    except ValueError as error:
+        raise EngineError(str(error)) from error
+    if not watch.needed:
+        return lambda _: None
+    c = constants(problem.bicycle)
+
+    def look(time: float) -> Ending | None:
+        wheel_poses(data.qpos, c, watch.centre, watch.axle)
+        return watch.look(time)
+
+    return look
+
+
 def look_stride(step: float) -> int:
     """Steps in `LOOK_INTERVAL`."""
     return max(1, int(LOOK_INTERVAL / step))
+
+
+def rim_stride(problem: Problem, step: float) -> int:
+    """Steps between two looks at wheels whose ground needs no care but for their rims.
+
+    Where the ground is less than half as curved as a wheel, a rim touches twice only when the wheel nearly lies flat.
+    """
+    largest = max(problem.bicycle.rear_wheel_radius, problem.bicycle.front_wheel_radius)
+    sharpest = bicycle_rim_search(problem.bicycle, problem.surface).bends.max() * largest
+    return look_stride(step) if sharpest < 0.5 else 1
 
 
 def bodies(model: mujoco.MjModel) -> list[int]:
@@ -206,15 +245,22 @@ def unconverged(convergence: Convergence, step: float) -> str | None:
     return f"MuJoCo's contact solver stopped unconverged at {steps * step:.6g} s: {share(residual)}"
 
 
-def advance(rig: Rig, steps: int, until: int) -> tuple[int, bool]:
-    """Go on from ``steps`` to ``until`` steps, or as far as there is ground; returns the steps and whether there is."""
+def advance(rig: Rig, step: float, steps: int, until: int) -> tuple[int, bool, Ending | None]:
+    """Go on from ``steps`` to ``until`` steps of length ``step``, or as far as the wheels roll on the ground.
+
+    Returns the steps, whether the wheels stand, and why the ride ends if a rim touches the ground twice.
+    """
     while steps < until:
         count = min(until - steps, rig.stride - steps % rig.stride)
         mujoco.mj_step(rig.model, rig.data, count)
         steps += count
-        if steps % rig.stride == 0 and not rig.follow():
-            return steps, False
-    return steps, True
+        if steps % rig.stride == 0:
+            if not rig.follow():
+                return steps, False, None
+            ending = rig.look(steps * step)
+            if ending is not None:
+                return steps, True, ending
+    return steps, True, None
 
 
 @contextmanager
@@ -250,6 +296,7 @@ def ride(rig: Rig, step: float, counts: list[int], progress: Progress) -> Ride:
         mujoco.mj_forward(rig.model, rig.data)
         if not rig.follow():
             raise EngineError("a wheel has no contact point with the surface at the start")
+        rig.look(0.0)
         record(rig, recording, 0)
         ended = unconverged(convergence, step)
         if ended is not None:
@@ -276,12 +323,15 @@ def _go_on(
         while steps < counts[k]:
             convergence.begin(steps)
             begun = process_time()
-            steps, standing = advance(rig, steps, min(steps + most, counts[k]))
+            steps, standing, touch = advance(rig, step, steps, min(steps + most, counts[k]))
             cpu_time += process_time() - begun
             ended = trouble(rig.data, standing)
             # A solver that has failed may be why the state is as it is.
             if (stopped := unconverged(convergence, step)) is not None:
                 return k, steps, cpu_time, stopped
+            if touch is not None and ended is None:
+                # It may lie before the last sample.
+                return max(1, bisect_right(counts[:k], touch.time / step)), steps, cpu_time, touch.why
             if ended is not None:
                 return k, steps, cpu_time, f"{ended} at {steps * step:.6g} s"
             if steps - reported >= most:

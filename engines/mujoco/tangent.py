@@ -22,13 +22,8 @@ HALF_THICKNESS = 1e-4
 
 
 @jit
-def place(qpos, c, function, parameters, p, position, quaternion):
-    """Fill the poses (2, 3), (2, 4) of both planes at ``qpos`` (10,); True where both wheels stand on one.
-
-    ``p`` (6,) are the contact parameters: a guess, replaced by the solution. False where a search
-    fails, or where a wheel lies flat, its centre less than its own thickness above the contact; once it
-    has gone through that, the search has followed the rim and the contact is above the centre.
-    """
+def coordinates(qpos):
+    """Generalised coordinates (9,) of MuJoCo's ``qpos`` (10,)."""
     w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
     q = np.empty(9)
     q[0], q[1], q[2] = qpos[0], qpos[1], qpos[2]
@@ -36,6 +31,27 @@ def place(qpos, c, function, parameters, p, position, quaternion):
     q[4] = np.arctan2(2 * (y * z + w * x), np.hypot(2 * (x * y - w * z), 1 - 2 * (x * x + z * z)))
     q[5] = np.arctan2(2 * (w * y - x * z), 1 - 2 * (x * x + y * y))
     q[6], q[7], q[8] = qpos[8], qpos[7], qpos[9]
+    return q
+
+
+@jit
+def wheel_poses(qpos, c, centre, axle):
+    """Fill the wheels' centres and axles (2, 3) at ``qpos`` (10,)."""
+    both = wheels(coordinates(qpos), c)
+    for k in range(2):
+        for i in range(3):
+            centre[k, i], axle[k, i] = both[k][0][i], both[k][2][i]
+
+
+@jit
+def place(qpos, c, function, parameters, p, position, quaternion):
+    """Fill the poses (2, 3), (2, 4) of both planes at ``qpos`` (10,); True where both wheels stand on one.
+
+    ``p`` (6,) are the contact parameters: a guess, replaced by the solution. False where a search
+    fails, or where a wheel lies flat, its centre less than its own thickness above the contact; once it
+    has gone through that, the search has followed the rim and the contact is above the centre.
+    """
+    q = coordinates(qpos)
     if not find_contacts(q, p, function, parameters, c):
         return False
     both = wheels(q, c)

@@ -22,6 +22,7 @@ import numpy as np
 from . import contact
 from .kinematics import angular_velocities, frames
 from .linear import factorise, solve, solve_factorised
+from .rim import find_contact
 from .vector import add, combine, cross, dot, jit, scale
 
 # Dependent and independent generalised speeds of a consistent state.
@@ -320,17 +321,34 @@ def energies(q, qd, c):
 
 
 @jit
-def observe(q, qd, function, parameters, c, points, normals, gap, slip, energy):
+def find_contacts_from_pose(q, p, ground, function, parameters, c):
+    """Fill ``p`` (6,) with the contacts where both rims are deepest at q; True where both were found."""
+    both = wheels(q, c)
+    good = True
+    for k in range(2):
+        centre, x, _, z, radius = both[k]
+        row = 3 * k
+        p[row], p[row + 1], p[row + 2], found = find_contact(centre, x, z, radius, ground, function, parameters)
+        good = good and found
+    return good
+
+
+@jit
+def observe(q, qd, contacts, known, ground, function, parameters, c, points, normals, gap, slip, energy):
     """Along a trajectory of n samples fill what its constraints and energy look like.
 
-    points, normals (n, 2, 3); gap (n, 2); slip (n, 2, 2), lateral and forward material velocity of
-    the contact; energy (n, 2), kinetic and potential. True where every contact was found.
+    contacts (n, 6) are the contact parameters where they are ``known``, and are filled with those where the rims are
+    deepest where not. points, normals (n, 2, 3); gap (n, 2); slip (n, 2, 2), lateral and forward material velocity
+    of the contact; energy (n, 2), kinetic and potential. True where every contact was found.
     """
-    jacobian, gamma, p_rate, p = np.empty((6, 9)), np.empty(6), np.empty(6), np.empty(6)
+    jacobian, gamma, p_rate = np.empty((6, 9)), np.empty(6), np.empty(6)
     good = True
     for n in range(q.shape[0]):
-        guess_contacts(q[n], p, function, parameters, c)
-        good = find_contacts(q[n], p, function, parameters, c) and good
+        p = contacts[n]
+        if known:
+            good = find_contacts(q[n], p, function, parameters, c) and good
+        else:
+            good = find_contacts_from_pose(q[n], p, ground, function, parameters, c) and good
         gaps = rolling(q[n], qd[n], p, function, parameters, c, jacobian, gamma, p_rate)
         both = wheels(q[n], c)
         for k in range(2):

@@ -12,13 +12,18 @@ import math
 import numpy as np
 
 from . import lean
+from .dynamics import wheels
 from .lean import derivative
 from .pose import aligned
 from .projection import project
+from .rim import bound, least_clearance
 from .vector import jit
 
 SIZE = 24
-DONE, MORE, FAILED = 0, 1, 2
+DONE, MORE, FAILED, REAR_TOUCHED, FRONT_TOUCHED = 0, 1, 2, 3, 4
+_LOOKS = 8  # at the rims while a wheel rolls over the ground's detail
+_BISECTIONS = 60
+_GOLDEN = (math.sqrt(5) - 1) / 2
 # Nothing that rolls changes within 10 ns: a smaller step means that a singularity is being crept up to
 # (a wheel flat on the ground, lean = +-pi/2), which would take millions of steps.
 SMALLEST_STEP = 1e-8
@@ -87,12 +92,110 @@ def _interpolate(y, coefficients, x, out):
 
 
 @jit
-def dop853(y, times, index, t, h, tolerance, most_steps, tableau, function, parameters, c, out):
+def _rim_bounds(y, ground, function, parameters, c):
+    """Lower bounds of both rims' least clearances, from the contacts alone."""
+    (c1, x1, _, z1, r1), (c2, x2, _, z2, r2) = wheels(y, c)
+    one = bound(c1, x1, z1, r1, y[20], ground, function, parameters)
+    return one, bound(c2, x2, z2, r2, y[23], ground, function, parameters)
+
+
+@jit
+def rim_clearance(y, ground, function, parameters, c):
+    """Return (clearance, wheel): the least of both rims' clearances, and whose it is."""
+    (c1, x1, _, z1, r1), (c2, x2, _, z2, r2) = wheels(y, c)
+    one, _ = least_clearance(c1, x1, z1, r1, y[20], True, ground.samples, function, parameters)
+    two, _ = least_clearance(c2, x2, z2, r2, y[23], True, ground.samples, function, parameters)
+    return (one, 0) if one <= two else (two, 1)
+
+
+@jit
+def _are_clear(bounds, next_bounds):
+    """Whether bounds at both ends of a step say that the rims were clear all along it.
+
+    They turn with the lean and the ground, which change little in a step: by less than they are above zero.
+    """
+    change = abs(bounds[0] - next_bounds[0]) + abs(bounds[1] - next_bounds[1])
+    return min(min(bounds[0], bounds[1]), min(next_bounds[0], next_bounds[1])) > change
+
+
+@jit
+def _clearance_within(y, coefficients, x, ground, function, parameters, c, work):
+    _interpolate(y, coefficients, x, work)
+    return rim_clearance(work, ground, function, parameters, c)
+
+
+@jit
+def _least_within(y, coefficients, low, high, ground, function, parameters, c, work):
+    """Return the fraction of a step, between two of them, at which the clearance is least, or the first found below 0.
+
+    Golden section: the clearance falls and rises once in between.
+    """
+    x = low
+    for _ in range(40):
+        one, other = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        at_one, _ = _clearance_within(y, coefficients, one, ground, function, parameters, c, work)
+        at_other, _ = _clearance_within(y, coefficients, other, ground, function, parameters, c, work)
+        x = one if at_one < at_other else other
+        if min(at_one, at_other) <= 0:
+            break
+        if at_one < at_other:
+            high = other
+        else:
+            low = one
+    return x
+
+
+@jit
+def _first_touch(y, coefficients, clear, touching, ground, function, parameters, c, work):
+    """Bisect a step between a fraction at which the rims are clear and one at which one is not: (fraction, wheel)."""
+    _, wheel = _clearance_within(y, coefficients, touching, ground, function, parameters, c, work)
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (clear + touching)
+        if not clear < middle < touching:
+            break
+        value, which = _clearance_within(y, coefficients, middle, ground, function, parameters, c, work)
+        if value > 0:
+            clear = middle
+        else:
+            touching, wheel = middle, which
+    return clear, wheel
+
+
+@jit
+def _second_touch(y, new, coefficients, ground, function, parameters, c, work):
+    """Return (fraction of a step at which a rim first touches a second place, wheel); (2, 0) if none does.
+
+    The rims are looked at so often that no wheel rolls further than a part of the ground's detail meanwhile; where a
+    touch and its end may lie between two looks, the least clearance is searched.
+    """
+    travel = math.sqrt((new[0] - y[0]) ** 2 + (new[1] - y[1]) ** 2 + (new[2] - y[2]) ** 2)
+    looks = 2 + int(_LOOKS * travel / ground.detail)
+    before, _ = _clearance_within(y, coefficients, 0.0, ground, function, parameters, c, work)
+    here, after = before, before
+    for k in range(1, looks + 2):
+        # Beyond the step's end there is nothing: the least may lie at the end.
+        if k <= looks:
+            after, _ = _clearance_within(y, coefficients, k / looks, ground, function, parameters, c, work)
+            if after <= 0:
+                return _first_touch(y, coefficients, (k - 1) / looks, k / looks, ground, function, parameters, c, work)
+        if here <= before and here <= after and here < max(before, after) - here:
+            low, high = max(k - 2, 0) / looks, min(k, looks) / looks
+            x = _least_within(y, coefficients, low, high, ground, function, parameters, c, work)
+            value, _ = _clearance_within(y, coefficients, x, ground, function, parameters, c, work)
+            if value <= 0:
+                return _first_touch(y, coefficients, low, x, ground, function, parameters, c, work)
+        before, here = here, after
+    return 2.0, 0
+
+
+@jit
+def dop853(y, times, index, t, h, tolerance, most_steps, tableau, ground, function, parameters, c, out):
     """Advance ``y`` in place and fill rows ``index``... of ``out`` (n, 24) at ``times``.
 
     Each accepted step and each output is projected onto gaps, contact equations and rolling. Stops at
-    the last time, after ``most_steps`` steps (call again with what it returns) or where the step
-    shrinks to nothing or a contact is lost.
+    the last time, after ``most_steps`` steps (call again with what it returns), where the step
+    shrinks to nothing or a contact is lost, or where a rim touches the ground at a second place: that is
+    looked for in the dense output, with the `rim.RimSearch` ``ground``, so that it depends on no output time.
 
     Returns ``(status, index, t, h, steps, evaluations)``.
     """
@@ -102,6 +205,7 @@ def dop853(y, times, index, t, h, tolerance, most_steps, tableau, function, para
     new, work, error5 = np.empty(SIZE), np.empty(SIZE), np.empty(SIZE)
     derivative(y, function, parameters, bicycle, stages[0])
     steps, evaluations, rejected = 0, 1, False
+    bounds = _rim_bounds(y, ground, function, parameters, c) if ground.curved else (1.0, 1.0)
     while index < times.size and steps < most_steps:
         if not SMALLEST_STEP < h < 1e300:
             return FAILED, index, t, h, steps, evaluations
@@ -116,14 +220,24 @@ def dop853(y, times, index, t, h, tolerance, most_steps, tableau, function, para
             h *= max(0.2, 0.9 * error ** (-1 / 8)) if error < 1e300 else 0.2
             rejected = True
             continue
-        if times[index] <= t + h:
+        next_bounds = _rim_bounds(new, ground, function, parameters, c) if ground.curved else bounds
+        clear = _are_clear(bounds, next_bounds)
+        end, status = t + h, MORE
+        if times[index] <= end or not clear:
             _dense(y, new, h, stages, a_extra, d, function, parameters, bicycle, work, coefficients)
             evaluations += 3
-            while index < times.size and times[index] <= t + h:
+            if not clear:
+                touch, wheel = _second_touch(y, new, coefficients, ground, function, parameters, c, work)
+                if touch <= 1:
+                    end, status = t + touch * h, FRONT_TOUCHED if wheel else REAR_TOUCHED
+            while index < times.size and times[index] <= end:
                 _interpolate(y, coefficients, (times[index] - t) / h, out[index])
                 if not project(out[index], function, parameters, c, bicycle):
                     return FAILED, index, t, h, steps, evaluations
                 index += 1
+            if status != MORE:
+                # A touch after the last time is none of this motion.
+                return (DONE if index == times.size else status), index, end, h, steps + 1, evaluations
         factor = 10.0 if error == 0 else min(10.0, 0.9 * error ** (-1 / 8))
         for i in range(SIZE):
             y[i] = new[i]
@@ -133,20 +247,23 @@ def dop853(y, times, index, t, h, tolerance, most_steps, tableau, function, para
         evaluations += 1
         t += h
         h *= min(1.0, factor) if rejected else factor
-        steps, rejected = steps + 1, False
+        steps, rejected, bounds = steps + 1, False, next_bounds
     return (DONE if index == times.size else MORE), index, t, h, steps, evaluations
 
 
 @jit
-def modified_euler(y, step, count, stride, function, parameters, c, out):
+def modified_euler(y, step, count, stride, ground, function, parameters, c, out):
     """Take ``count`` steps y += step (f(y) + f(y + step f(y))) / 2; every ``stride``-th fills a row of ``out``.
 
-    Nothing is projected: the constraints drift with the method's error. Returns the rows filled, fewer
-    than count / stride where the state stops being finite.
+    Nothing is projected: the constraints drift with the method's error. Stops where the state stops being finite,
+    and in the step in which a rim touches the ground at a second place.
+
+    Returns ``(status, rows filled, t)``, t by linear interpolation of the clearance.
     """
     bicycle = aligned(c)
     first, second, work = np.empty(SIZE), np.empty(SIZE), np.empty(SIZE)
     rows = 0
+    before, wheel = rim_clearance(y, ground, function, parameters, c) if ground.curved else (1.0, 0)
     for n in range(1, count + 1):
         derivative(y, function, parameters, bicycle, first)
         for i in range(SIZE):
@@ -157,11 +274,17 @@ def modified_euler(y, step, count, stride, function, parameters, c, out):
             y[i] += 0.5 * step * (first[i] + second[i])
             total += y[i]
         if not abs(total) < 1e300:
-            return rows
+            return FAILED, rows, (n - 1) * step
+        if ground.curved:
+            clearance, wheel = rim_clearance(y, ground, function, parameters, c)
+            if clearance <= 0:
+                touch = (n - 1 + before / (before - clearance)) * step
+                return FRONT_TOUCHED if wheel else REAR_TOUCHED, rows, touch
+            before = clearance
         if n % stride == 0:
             out[rows] = y
             rows += 1
-    return rows
+    return DONE, rows, count * step
 
 
 @jit

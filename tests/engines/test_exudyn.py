@@ -17,6 +17,7 @@ from pydantic import ValidationError
 from engines.engine import EngineError, Problem, Trajectory, load_engine
 from reference.bicycle import Bicycle
 from reference.dae import consistent_state
+from reference.rim import rim_search
 from reference.simulate import Motion, simulate
 from reference.surface import Paraboloid, Plane, Surface, SurfaceFunction, surface_function
 
@@ -181,6 +182,7 @@ def test_kernel_rows_are_derivatives():
     from engines.exudyn import kernel
 
     function, parameters = _waves.real, Waves.parameters
+    looking = rim_search(Waves(), [0.3])
     rng = np.random.default_rng(1)
     rows, scratch, step = np.empty((3, 7)), np.empty((3, 7)), 1e-6
     for _ in range(20):
@@ -188,11 +190,11 @@ def test_kernel_rows_are_derivatives():
         triad[2] *= np.linalg.det(triad)
 
         def gap(coordinates: np.ndarray, centre=centre, triad=triad) -> float:
-            return kernel.velocity_rows(coordinates, centre, triad, 0.3, function, parameters, scratch)
+            return kernel.velocity_rows(coordinates, centre, triad, 0.3, looking, function, parameters, scratch)
 
         theta = triad_upright(triad) + 0.2 * rng.standard_normal(4)
         coordinates = np.concatenate([rng.standard_normal(2), [0.3], theta / np.linalg.norm(theta)])
-        kernel.velocity_rows(coordinates, centre, triad, 0.3, function, parameters, rows)
+        kernel.velocity_rows(coordinates, centre, triad, 0.3, looking, function, parameters, rows)
         gradient = [(gap(coordinates + e) - gap(coordinates - e)) / (2 * step) for e in step * np.eye(7)]
         # Central differences: h^2 of curvature, and round-off over h.
         np.testing.assert_allclose(rows[2], gradient, rtol=0, atol=1e-8)
@@ -202,7 +204,7 @@ def test_kernel_rows_are_derivatives():
         rates = rng.standard_normal(7)
         rates[3:] -= coordinates[3:] * (coordinates[3:] @ rates[3:])  # along the unit sphere
         axes = [np.array(kernel.axes(*(coordinates + s * rates)[3:])).T for s in (-step, 0.0, step)]
-        _, arm, _ = kernel.wheel_contact(coordinates, centre, triad, 0.3, function, parameters)
+        _, arm, _ = kernel.wheel_contact(coordinates, centre, triad, 0.3, looking, function, parameters)
         material = rates[:3] + (axes[2] - axes[0]) / (2 * step) @ axes[1].T @ np.array(arm)
         np.testing.assert_allclose(rows @ rates, rows[:, :3] @ material, rtol=0, atol=1e-8)
 
