@@ -42,6 +42,7 @@ LARGEST_NOISE = 1e-6
 _SAMPLES = 6  # of the quadrature: its error goes with the seventh power of the output interval
 _FEWEST = 4  # samples of a ride from which the quadrature's error can be seen
 
+_WHEELS = tuple(f"{wheel}_wheel" for wheel in WHEELS)
 # Known up to whole turns.
 _TURNING = [YAW, REAR_ANGLE, FRONT_ANGLE]
 
@@ -200,7 +201,7 @@ def _reports(reported: Trajectory, followed: Trajectory, room: np.ndarray, size:
         given, found = getattr(reported, name), getattr(followed, name)
         if given is not None:
             apart = np.abs(given - found) if name == "gap" else _lengths(given - found)
-            yield name, WHEELS, unit, apart, scale * room + last
+            yield name, _WHEELS, unit, apart, scale * room + last
     # Kinetic energy is quadratic in the speeds.
     faster = 2 * moving / speed if speed > 0 else 2.0
     for name, scale in (("kinetic_energy", faster * energy), ("potential_energy", energy)):

@@ -251,7 +251,7 @@ def update(
     out = {(scenario, verdict.engine) for scenario, verdict in refused(verdicts)}
     for name, baseline in fresh.items():
         entries = {engine: entry for engine, entry in baseline["engines"].items() if (name, engine) not in out}
-        if not entries:
+        if baseline["engines"] and not entries:
             continue
         moved = [verdict for scenario, verdict in verdicts if scenario == name and verdict.status != "holds"]
         kept = {engine: entry for engine, entry in read_baseline(name, folder).items() if engine in there}

@@ -89,8 +89,7 @@ def show_outcome(console: Console, plan: Plan, outcome: Outcome) -> None:
     console.print()
     console.print(f"{plan.name}: {plan.scenario.title}, {duration:g} s", style="bold", markup=False)
     cells = {
-        name: [cell(values, metric, part) for _, _, metric, part in COLUMNS]
-        for name, values in outcome.metrics.items()
+        name: [cell(values, metric, part) for _, _, metric, part in COLUMNS] for name, values in outcome.metrics.items()
     }
     for table in _metric_tables(cells, console.width):
         console.print(table)

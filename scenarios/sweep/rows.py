@@ -27,7 +27,8 @@ METRICS: dict[str, pa.DataType] = {
     "size": pa.float64(),
     **dict.fromkeys(_ERRORS, pa.float64()),
     **dict.fromkeys(
-        ("rate_error", "rear_rate_error", "contact_force_error", "contact_force_error_at", "settled_force_error"), pa.float64()
+        ("rate_error", "rear_rate_error", "contact_force_error", "contact_force_error_at", "settled_force_error"),
+        pa.float64(),
     ),
     **dict.fromkeys(("radius_drift_rate", "phase_drift_rate", "rear_rate_drift_rate"), pa.float64()),
     **dict.fromkeys(("energy_drift", "energy_drift_rate", "energy_variation"), pa.float64()),
