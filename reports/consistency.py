@@ -191,7 +191,8 @@ def _reports(reported: Trajectory, followed: Trajectory, room: np.ndarray, size:
     speed = largest_speed(followed)
     # Velocities err by the error of coordinates times the motion's fastest rate.
     moving = speed + size * float(np.abs(followed.qd[:, YAW:]).max())
-    energy = (np.abs(followed.kinetic_energy) + np.abs(followed.potential_energy))[:, None]
+    parts = (followed.kinetic_energy, followed.potential_energy)
+    energy = np.sum([np.abs(part) for part in parts if part is not None], axis=0)[:, None]
     turned = np.minimum(*(_lengths(reported.body_quaternion + sign * followed.body_quaternion) for sign in (-1, 1)))
     # A position is known to a few units in its last place, an orientation to those of the largest angle.
     last = 16 * np.finfo(float).eps * (np.abs(followed.q).max() + size)
@@ -227,7 +228,7 @@ def _furthest(
 
 
 def _rates(reported: Trajectory, exact: Trajectory, room: np.ndarray) -> Mismatch:
-    """The rate furthest from its coordinate's derivative, as means over output intervals; ``room`` [m, rad] (n - 1, 9)."""
+    """The rate furthest from its coordinate's derivative, means over output intervals; ``room`` (n - 1, 9) [m, rad]."""
     time, q, qd = reported.time, coordinate_differences(reported, exact), reported.qd - exact.qd
     way = _integrals(time, qd, _SAMPLES)
     unsure = sum(np.abs(way - _integrals(time, qd, fewer)) for fewer in (2, _SAMPLES - 2))

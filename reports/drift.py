@@ -53,7 +53,7 @@ class Verdict:
     ----------
     engine, quantity : str
     value, baseline, limit : float or None
-        The value holds within baseline +- limit; of a quantity that no baseline excuses the baseline is 0.
+        The value holds within baseline +- limit; without a baseline, within the limit of 0.
     status : str
         ``holds``, ``worse`` (an error larger beyond the limit, an earlier fall, a lower order), ``better`` (the
         opposite, with another version or other settings), ``changed`` (otherwise moved) or ``missing``.
@@ -162,10 +162,10 @@ def _absolute(
     value, limit = values.get(quantity), allowed[quantity]
     if value is None or limit is None:
         why = reasons.get(quantity, "not given by this run")
-        return Verdict(engine, quantity, value, 0.0, limit, "missing", why)
+        return Verdict(engine, quantity, value, None, limit, "missing", why)
     status = "holds" if value <= limit else "worse"
     reason = reasons.get(quantity, f"{value:.6g}, limit {limit:.2g}, whatever the baseline")
-    return Verdict(engine, quantity, value, 0.0, limit, status, reason)
+    return Verdict(engine, quantity, value, None, limit, status, reason)
 
 
 def _fall(engine: str, value: float | None, before: float | None, since: str, excused: bool) -> Verdict:

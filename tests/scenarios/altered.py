@@ -97,7 +97,7 @@ _OTHER_WHEEL = [0, 1, 3, 2]
 CONTRADICTIONS: dict[str, tuple[Callable[[Trajectory], Trajectory], set[str]]] = {
     "rear rate x 1.001": (with_fields(qd=_faster_wheel), {"qd", "slip", "kinetic_energy"}),
     "rates half a step late": (_late_rates, {"qd", "slip", "kinetic_energy"}),
-    "bodies 1 mm high": (with_fields(body_position=lambda p: p + [0, 0, 1e-3]), {"body_position"}),
+    "bodies 1 mm high": (with_fields(body_position=lambda p: p + np.array([0, 0, 1e-3])), {"body_position"}),
     "wheels swapped": (
         with_fields(
             body_position=lambda p: p[:, _OTHER_WHEEL],
@@ -111,7 +111,7 @@ CONTRADICTIONS: dict[str, tuple[Callable[[Trajectory], Trajectory], set[str]]] =
         {"kinetic_energy", "potential_energy"},
     ),
     "late contact points": (with_fields(contact_point=_late), {"contact_point"}),
-    "contact points mirrored": (with_fields(contact_point=lambda p: p * [1, -1, 1]), {"contact_point"}),
+    "contact points mirrored": (with_fields(contact_point=lambda p: p * np.array([1, -1, 1])), {"contact_point"}),
     "slip in mm/s off": (with_fields(slip=lambda s: s + 1e-3), {"slip"}),
     "gap 1 mm off": (with_fields(gap=lambda g: g + 1e-3), {"gap"}),
     "quaternions x, y, z, w": (with_fields(body_quaternion=lambda q: q[..., [1, 2, 3, 0]]), {"body_quaternion"}),

@@ -1,4 +1,4 @@
-"""What an engine says of itself must agree with its coordinates: each planted contradiction is named, no engine is accused."""
+"""What an engine says of itself must agree with its coordinates: contradictions are named, honest engines are not."""
 
 from __future__ import annotations
 

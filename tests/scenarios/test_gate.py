@@ -121,10 +121,10 @@ def test_round_off_of_the_start_stays_far_inside_the_limits(name: str) -> None:
         return replace(problem, q=problem.q * noise[0], qd=problem.qd * noise[1])
 
     for verdict in verdicts_on(name, altered(before=shaken)):
-        assert verdict.share is not None
         if verdict.quantity in ABSOLUTE:  # no move: it holds what the engine's own error leaves
             assert verdict.passes
             continue
+        assert verdict.share is not None
         assert verdict.share < (0.5 if name in ("reference", "mujoco-multipliers") else 0.1), verdict.quantity
 
 
