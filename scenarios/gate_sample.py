@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
@@ -15,26 +15,28 @@ from engines.convergence import observed_orders
 from engines.engine import Engine, EngineError, Problem, Settings, Trajectory
 from engines.identify import DISTURBANCES, STENCIL_WEIGHT, interval_of, jacobian_at
 from engines.steady import steady_trajectory
-from reference.contact import observe
 from reference.kinematics import YAW
 from reference.stability import growth_rate, linearise, sorted_eigenvalues
+from reports.consistency import LARGEST_NOISE, Mismatch, describe, follow, mismatches
 from reports.drift import BELOW_NOISE, RIDE_QUANTITIES
 from reports.fall import fell_at, until_fall
-from reports.inspection import report_mismatch, state_error
+from reports.inspection import state_error
 from reports.limits import Scale, eigenvalue_limits, noise, order_limit, ride_limits
 from reports.metrics import position_errors
 from reports.precision import match
 
-from .runner import measure_one
+from .runner import measure_one, why_failed
 from .start import Start
 
+Found = dict[str, tuple[float | None, float | None]]  # value and limit by quantity
+Measured = tuple[Found, dict[str, str]]  # and why there is no value
+
+EIGENVALUE_QUANTITIES = ("eigenvalue_error", "growth_rate_error")
 SHORT_HORIZON = 1.0  # of the first error and of the order [s]
 # Of the order: coarser steps than the settings' own, whose errors stand further above noise, and an interval that
 # four steps of common sizes divide [s].
 FACTORS = (4.0, 2.0, 1.0)
 ORDER_INTERVAL = 0.2
-# A step that may be off by more has no limits that would bite.
-LARGEST_NOISE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -103,51 +105,72 @@ def sample(
         raise EngineError(f"its step_noise is {own_noise!r}; it must be from 0 to {LARGEST_NOISE:g}")
     step_noise = own_noise if known_noise is None else min(own_noise, known_noise)
     trajectory = ride(engine, problem, settings, watch)
-    fall = fell_at(trajectory, problem.bicycle, problem.surface)
+    followed = follow(trajectory, problem.bicycle, problem.surface)
+    fall = fell_at(followed, problem.bicycle, problem.surface)
     if trajectory.ended is not None and fall is None:
         raise EngineError(trajectory.ended)
     if trajectory.unconverged_steps:
         raise EngineError(
             f"its iterations did not converge in {trajectory.unconverged_steps} of {trajectory.steps} steps"
         )
-    standing = until_fall(trajectory, problem.bicycle, problem.surface)
-    if standing.not_finite():
-        raise EngineError(f"not finite in some samples: {', '.join(standing.not_finite())}")
+    standing = until_fall(followed, problem.bicycle, problem.surface)
+    reported = trajectory.first(len(standing.time))
+    if reported.not_finite():
+        raise EngineError(f"not finite in some samples: {', '.join(reported.not_finite())}")
     scale = replace(_scale(start), duration=float(standing.time[-1]))
     # As many steps as the part that is measured took.
     steps = trajectory.steps * scale.duration / float(trajectory.time[-1])
-    values = _ride_values(start, standing, scale) | {"fell_at": fall, "steps": steps}
+    exact = steady_trajectory(problem.bicycle, motion, problem.times)
+    reports = mismatches(reported, standing, exact, start.size, step_noise)
+    values = _ride_values(start, reported, standing, exact, scale) | {
+        "report_mismatch": max(report.share for report in reports),
+        "fell_at": fall,
+        "steps": steps,
+    }
     limits: dict[str, float | None] = dict(
         ride_limits(scale, noise(scale, step_noise, trajectory.steps, fall is not None))
     )
-    reasons: dict[str, str] = {}
+    reasons = _disagreement(reports)
     if fall is None:
         rate = trajectory.steps / scale.duration
-        order, reasons = _order(start, engine, settings, step_noise)
-        for part in (order, _eigenvalues(start, engine, settings, rate, step_noise)):
+        for part, why in (
+            _measured(("observed_order",), lambda: _order(start, engine, settings, step_noise)),
+            _measured(EIGENVALUE_QUANTITIES, lambda: (_eigenvalues(start, engine, settings, rate, step_noise), {})),
+        ):
             values |= {name: value for name, (value, _) in part.items()}
             limits |= {name: limit for name, (_, limit) in part.items()}
+            reasons |= why
     values = {name: value if value is not None and np.isfinite(value) else None for name, value in values.items()}
     shown = settings.model_dump(mode="json")
     return Sample(values, limits, reasons, trajectory.steps, own_noise, engine.version, shown)
 
 
-def _ride_values(start: Start, standing: Trajectory, scale: Scale) -> dict[str, float | None]:
-    """Quantities of the part of a ride that is standing, with gaps and slip as they follow from its coordinates."""
-    problem, motion = start.problem, start.motion
-    assert motion is not None
-    exact = steady_trajectory(problem.bicycle, motion, problem.times)
-    seen = observe(problem.bicycle, problem.surface, standing.q, standing.qd)
-    gap, slip = (seen.gap, seen.slip) if seen.found else (None, None)
-    measured = measure_one(start, replace(standing, gap=gap, slip=slip), exact)
+def _disagreement(reports: Sequence[Mismatch]) -> dict[str, str]:
+    """Why the reports of an engine do not agree with its coordinates; none where they do."""
+    lines = [describe(report.as_json()) for report in reports if not report.holds]
+    return {"report_mismatch": "; ".join(lines)} if lines else {}
+
+
+def _measured(names: Sequence[str], measure: Callable[[], Measured]) -> Measured:
+    """What a further measurement finds; an engine that breaks in it has no such figures, but keeps its ride's."""
+    try:
+        return measure()
+    except Exception as error:  # an engine that rode may still break at other steps or from other starts
+        return dict.fromkeys(names, (None, None)), dict.fromkeys(names, why_failed(error))
+
+
+def _ride_values(
+    start: Start, reported: Trajectory, standing: Trajectory, exact: Trajectory, scale: Scale
+) -> dict[str, float | None]:
+    """Quantities of the part of a ride that is standing, as reported and as it follows from its coordinates."""
+    measured = measure_one(start, reported, exact, step_noise=0.0, followed=standing)
     errors = position_errors(standing, exact)
     found = measured | {
-        "short_error": float(errors[min(int(np.searchsorted(problem.times, SHORT_HORIZON)), len(errors) - 1)]),
+        "short_error": float(errors[min(int(np.searchsorted(exact.time, SHORT_HORIZON)), len(errors) - 1)]),
         "position_error": measured["position_error"]["max"],
         "state_error": state_error(standing, exact, scale),
-        "report_mismatch": report_mismatch(standing, seen, problem.bicycle, scale) if seen.found else None,
     }
-    return {name: found[name] for name in RIDE_QUANTITIES}
+    return {name: found[name] for name in RIDE_QUANTITIES if name in found}
 
 
 def _scale(start: Start) -> Scale:
@@ -155,10 +178,7 @@ def _scale(start: Start) -> Scale:
     return Scale.of(problem.bicycle, problem.qd, start.size, start.growth_rate, float(problem.times[-1]))
 
 
-Found = dict[str, tuple[float | None, float | None]]
-
-
-def _order(start: Start, engine: Engine, settings: Settings, step_noise: float) -> tuple[Found, dict[str, str]]:
+def _order(start: Start, engine: Engine, settings: Settings, step_noise: float) -> Measured:
     """Order of convergence over the short horizon with its limit, or why there is none."""
     short = replace(start.problem, times=ORDER_INTERVAL * np.arange(round(SHORT_HORIZON / ORDER_INTERVAL) + 1))
     none: Found = {"observed_order": (None, None)}
@@ -167,6 +187,9 @@ def _order(start: Start, engine: Engine, settings: Settings, step_noise: float) 
         rides = [ride(engine, short, refined, lambda _: None) for refined in ladder]
     except ValueError as error:  # settings without a step, or of a step at the end of its range or beside the interval
         return none, {"observed_order": " ".join(str(error).split())}
+    for one, factor in zip(rides, FACTORS, strict=True):
+        if one.ended is not None:
+            return none, {"observed_order": f"with {factor:g} times its step it ended: {one.ended}"}
     samples = min(len(one.time) for one in rides)
     paths = [one.q[:samples, :3] for one in rides]
     first, second = (float(np.abs(b - a).max()) for a, b in pairwise(paths))

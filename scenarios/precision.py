@@ -21,7 +21,7 @@ from reports.precision import Level, comparison_horizon, eigenvalue_document, en
 from .error import ScenarioError
 from .files import make_folder, write_json
 from .run_folder import Plan, library_versions
-from .runner import Trace, Watch, measure_one, plan_run
+from .runner import Trace, Watch, claimed_noise, measure_one, plan_run
 from .scenario import Scenario
 from .start import Start
 
@@ -208,7 +208,7 @@ def _runs(
             if trace is not None:
                 trace(engine.name, error)
             continue
-        measured = measure_one(start, trajectory, reference)
+        measured = measure_one(start, trajectory, reference, step_noise=claimed_noise(engine, settings))
         if trajectory.ended is not None:
             yield _Failure(step, f"ended at {trajectory.time[-1]:.6g} s: {trajectory.ended}", broke=False)
         elif measured["fell_at"] is not None:

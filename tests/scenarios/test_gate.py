@@ -21,7 +21,7 @@ from engines.engine import Engine, EngineError, Problem, Settings, Trajectory, e
 from engines.exudyn import joint
 from engines.mujoco import compiled
 from reference.kinematics import LEAN, PITCH, STEER
-from reports.drift import RIDE_QUANTITIES, Verdict
+from reports.drift import ABSOLUTE, RIDE_QUANTITIES, Verdict
 from scenarios import gate, gate_sample
 from scenarios.error import ScenarioError
 from scenarios.runner import configure
@@ -121,6 +121,9 @@ def test_round_off_of_the_start_stays_far_inside_the_limits(name: str) -> None:
         return replace(problem, q=problem.q * noise[0], qd=problem.qd * noise[1])
 
     for verdict in verdicts_on(name, altered(before=shaken)):
+        if verdict.quantity in ABSOLUTE:  # no move: it holds what the engine's own error leaves
+            assert verdict.passes
+            continue
         assert verdict.share is not None
         assert verdict.share < (0.5 if name in ("reference", "mujoco-multipliers") else 0.1), verdict.quantity
 
