@@ -84,3 +84,8 @@ def _faults(engine: Engine, problem: Problem, settings: Settings, trajectory: Tr
     for name in ("steps", "cpu_time"):
         if not np.isfinite(getattr(trajectory, name)):
             yield f"its {name} is {getattr(trajectory, name)!r}"
+    count, residual = trajectory.unconverged_steps, trajectory.largest_residual
+    if count is not None and not (isinstance(count, int) and 0 <= count <= trajectory.steps):
+        yield f"its unconverged_steps is {count!r}; it must be a number of its {trajectory.steps} steps, or None"
+    if residual is not None and not (isinstance(residual, float) and 0 <= residual < np.inf):
+        yield f"its largest_residual is {residual!r}; it must be a finite number that is not negative, or None"

@@ -99,6 +99,13 @@ class Trajectory:
         Why the run ended before the problem's last time; None if it did not.
     friction : float or None
         Coefficient of friction that its contacts have in every direction; None where wheels are bound to roll.
+    unconverged_steps : int or None
+        Steps in which an iteration, such as Newton's method or a contact solver, stopped before it met its
+        tolerance; 0 where nothing iterates, None where the engine does not say.
+    largest_residual : float or None
+        Largest relative residual that an iteration left in any step: of a contact problem the residual of the
+        forces over the largest force, of Newton's method the residual over the scale that its relative tolerance
+        multiplies. None where the engine does not say.
     """
 
     engine: str
@@ -119,6 +126,8 @@ class Trajectory:
     cpu_time: float
     ended: str | None = None
     friction: float | None = None
+    unconverged_steps: int | None = None
+    largest_residual: float | None = None
 
     def first(self, samples: int) -> Self:
         """The ride up to a number of samples; steps and CPU time stay those of the whole."""

@@ -38,6 +38,9 @@ class _Facts(BaseModel):
     cpu_time: Annotated[float, Field(ge=0)]
     ended: str | None
     friction: Annotated[float, Field(ge=0)] | None
+    # Files of earlier versions do not have them.
+    unconverged_steps: Annotated[int, Field(ge=0)] | None = None
+    largest_residual: Annotated[float, Field(ge=0)] | None = None
 
 
 FACTS = tuple(_Facts.model_fields)

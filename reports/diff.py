@@ -270,6 +270,9 @@ def _reasons(
         reasons.append("they end differently: " + " and ".join(ends))
     if rides[0].friction != rides[1].friction:
         reasons.append(f"friction: {_shown(rides[0].friction)} -> {_shown(rides[1].friction)}")
+    if rides[0].unconverged_steps != rides[1].unconverged_steps:
+        counts = (_shown(ride.unconverged_steps) for ride in rides)
+        reasons.append("steps whose iterations did not converge: " + " -> ".join(counts))
     for name, entry in metrics.items():
         if entry["holds"] is False:
             move = "" if entry["change"] is None else f", by {entry['change']:.2g}"

@@ -60,6 +60,8 @@ def metrics(
     result |= _friction(trajectory, trajectory if reference is None else reference, surface)
     result |= {
         "steps": trajectory.steps,
+        "unconverged_steps": trajectory.unconverged_steps,
+        "largest_residual": trajectory.largest_residual,
         "cpu_time": trajectory.cpu_time,
         "real_time_factor": simulated / trajectory.cpu_time if trajectory.cpu_time > 0 else None,
         "min_normal_force": least_normal_force(trajectory, surface),

@@ -46,6 +46,14 @@ def remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]
         lines.append(f"{name}: the ground pulls a wheel, by up to {pull:.3g} N; no contact could")
     if metrics["ended"] is not None:
         lines.append(f"{name} ended early: {metrics['ended']}")
+    # Folders of earlier versions do not have it.
+    if metrics.get("unconverged_steps"):
+        residual = metrics.get("largest_residual")
+        left = "" if residual is None else f", with a relative residual of up to {residual:.2g}"
+        lines.append(
+            f"{name}: its iterations did not converge in {metrics['unconverged_steps']} of {metrics['steps']} steps"
+            f"{left}; its figures are not those of its equations"
+        )
     if metrics["contact_force_error_at"] == 0:
         later = metrics["settled_force_error"]
         rest = "" if later is None else f"; once settled it is {later:.2g}"

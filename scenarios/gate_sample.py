@@ -106,6 +106,10 @@ def sample(
     fall = fell_at(trajectory, problem.bicycle, problem.surface)
     if trajectory.ended is not None and fall is None:
         raise EngineError(trajectory.ended)
+    if trajectory.unconverged_steps:
+        raise EngineError(
+            f"its iterations did not converge in {trajectory.unconverged_steps} of {trajectory.steps} steps"
+        )
     standing = until_fall(trajectory, problem.bicycle, problem.surface)
     if standing.not_finite():
         raise EngineError(f"not finite in some samples: {', '.join(standing.not_finite())}")

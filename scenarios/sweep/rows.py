@@ -35,6 +35,8 @@ METRICS: dict[str, pa.DataType] = {
     **dict.fromkeys(("required_friction", "friction", "friction_left_at", "min_normal_force"), pa.float64()),
     "not_finite": pa.string(),
     "steps": pa.int64(),
+    "unconverged_steps": pa.int64(),
+    "largest_residual": pa.float64(),
     "fell_at": pa.float64(),
     "ended": pa.string(),
     "horizon": pa.float64(),

@@ -63,6 +63,11 @@ def test_a_whole_trajectory_is_taken_as_it_is() -> None:
         ({"slip": np.zeros((11, 2))}, "its slip has shape"),
         ({"time": np.arange(11) / 50}, "its times are not the problem's"),
         ({"cpu_time": float("nan")}, "its cpu_time is nan"),
+        ({"unconverged_steps": -1}, "its unconverged_steps is -1; it must be a number of its "),
+        ({"unconverged_steps": 10**9}, "its unconverged_steps is 1000000000; it must be a number of its "),
+        ({"unconverged_steps": 0.5}, "its unconverged_steps is 0.5; it must be a number of its "),
+        ({"largest_residual": -1e-9}, "its largest_residual is -1e-09; it must be a finite number"),
+        ({"largest_residual": float("nan")}, "its largest_residual is nan; it must be a finite number"),
     ],
 )
 def test_what_is_no_trajectory_of_the_problem_is_refused(changes: dict[str, Any], words: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -58,6 +59,19 @@ def test_everything_comes_back_to_the_bit(tmp_path: Path) -> None:
     written = trajectory(q=q)
     write_trajectory(written, tmp_path / "a.parquet")
     assert_same(written, read_trajectory(tmp_path / "a.parquet"))
+
+
+def test_what_iterations_left_comes_back_and_older_files_say_nothing_of_it(tmp_path: Path) -> None:
+    path = tmp_path / "a.parquet"
+    write_trajectory(trajectory(unconverged_steps=3, largest_residual=0.1 + 0.2), path)
+    read = read_trajectory(path)
+    assert (read.unconverged_steps, read.largest_residual) == (3, 0.1 + 0.2)
+    table = pq.read_table(path)
+    facts = json.loads(table.schema.metadata[METADATA_KEY])
+    older = {name: fact for name, fact in facts.items() if name not in ("unconverged_steps", "largest_residual")}
+    pq.write_table(table.replace_schema_metadata({METADATA_KEY: json.dumps(older).encode()}), path)
+    read = read_trajectory(path)
+    assert (read.unconverged_steps, read.largest_residual) == (None, None)
 
 
 @pytest.mark.parametrize("absent", [(name,) for name in OPTIONAL] + [OPTIONAL])

@@ -246,6 +246,8 @@ def test_what_an_engine_does_not_give_is_null() -> None:
         "real_time_factor",
         "fell_at",
         "ended",
+        "unconverged_steps",
+        "largest_residual",
     ):
         assert measured[name] is None, name
     alone = measure(EXACT, reference=None)

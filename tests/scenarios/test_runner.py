@@ -33,6 +33,8 @@ METRICS = {
         "friction",
         "friction_left_at",
         "steps",
+        "unconverged_steps",
+        "largest_residual",
         "cpu_time",
         "real_time_factor",
         "min_normal_force",
