@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
+from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -15,19 +17,19 @@ from reports.drift import Verdict, judge, missing
 
 from .error import ScenarioError
 from .files import make_folder, write_json
+from .gate_exact import find_exact
 from .gate_sample import SHORT_HORIZON, sample
 from .installed import installed
 from .run_folder import library_versions
 from .runner import Watch, configure
-from .scenario import OF_THE_MOTION, Scenario, library_names, load_scenario
+from .scenario import OF_THE_MOTION, Gate, Scenario, Simulation, library_names, load_scenario
 from .start import make_start
 from .stored import read_json
-from .table import one_line, shown
+from .table import one_line, read_toml, shown
 
 BASELINES = Path(next(iter(reports.__path__))) / "baselines"
 GATED_TAG = "gated"
-DURATION = 3.0  # a turn of q2 and a bit: seconds of work in the slowest engine
-OUTPUT_RATE = 50.0  # an interval that doubled steps divide as well: a coarser step is judged, not refused
+_SETTINGS = files("scenarios") / "gate.toml"
 
 
 class _Entry(BaseModel):
@@ -48,7 +50,8 @@ class _Baseline(BaseModel):
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
     scenario: str | None = None
-    duration: float = DURATION
+    duration: float = Gate.model_fields["duration"].default
+    output_rate: float = Gate.model_fields["output_rate"].default
     short_horizon: float = SHORT_HORIZON
     content: dict[str, Any] | None = None
     engines: dict[str, _Entry]
@@ -62,12 +65,19 @@ def gated_names() -> list[str]:
     return [name for name in library_names() if GATED_TAG in load_scenario(name)[1].tags]
 
 
+@cache
+def gate_settings() -> dict[str, dict[str, Any]]:
+    """Engines' settings on gated rides, by engine, where a scenario has no others."""
+    return read_toml(_SETTINGS.read_text(encoding="utf-8"))["engines"]
+
+
 def check(
     watch: Watch,
     sources: Sequence[str] | None = None,
     engines: Sequence[str] | None = None,
     baselines: Path | None = None,
     chosen: Chosen = configure,
+    hold_cpu: bool = False,
 ) -> tuple[list[tuple[str, Verdict]], dict[str, dict[str, Any]]]:
     """Run the gate.
 
@@ -83,6 +93,8 @@ def check(
         Folder of the baselines; the suite's own if not given.
     chosen : callable
         Maps an engine's name and its settings in the scenario to the engine and its settings.
+    hold_cpu : bool
+        Whether an engine's CPU time, relative to the reference's, is judged too.
 
     Returns
     -------
@@ -96,26 +108,37 @@ def check(
         If a scenario or a baseline is none, or an engine is neither installed nor in a baseline.
     """
     folder = BASELINES if baselines is None else baselines
-    changes = {"simulation.duration": DURATION, "simulation.output_rate": OUTPUT_RATE}
-    scenarios = [load_scenario(source, changes) for source in (sources or gated_names())]
-    known = {name: read_baseline(name, folder, content(scenario)) for name, scenario in scenarios}
+    scenarios = [_as_gated(*load_scenario(source)) for source in (sources or gated_names())]
+    known = {name: read_baseline(name, folder, scenario) for name, scenario in scenarios}
     judged = _to_judge(engines, known)
+    asked = bool(engines)
     verdicts: list[tuple[str, Verdict]] = []
     fresh: dict[str, dict[str, Any]] = {}
     for name, scenario in scenarios:
-        found, entries = _held(name, scenario, judged, known[name], watch, chosen, asked=bool(engines))
+        found, rest = _held(name, scenario, judged, known[name], watch, chosen, asked, hold_cpu)
         verdicts += [(name, verdict) for verdict in found]
-        fresh[name] = {
-            "scenario": name,
-            "duration": DURATION,
-            "short_horizon": SHORT_HORIZON,
-            "content": content(scenario),
-            "libraries": library_versions(),
-            "engines": entries,
-        }
+        fresh[name] = {"scenario": name} | _ride(scenario) | {"content": content(scenario)}
+        fresh[name] |= {"libraries": library_versions()} | rest
     if not verdicts:
         raise ScenarioError("nothing was judged: no engine and no scenario go together")
     return verdicts, fresh
+
+
+def _as_gated(name: str, scenario: Scenario) -> tuple[str, Scenario]:
+    """A scenario as the gate rides it."""
+    gate = scenario.gate or Gate()
+    simulation = Simulation(duration=gate.duration, output_rate=gate.output_rate)
+    return name, scenario.model_copy(update={"gate": gate, "simulation": simulation})
+
+
+def _ride(scenario: Scenario) -> dict[str, float]:
+    """How a gated scenario is ridden: what of it a baseline holds for."""
+    simulation = scenario.simulation
+    return {
+        "duration": simulation.duration,
+        "output_rate": simulation.output_rate,
+        "short_horizon": SHORT_HORIZON,
+    }
 
 
 def _to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -136,22 +159,35 @@ def _held(
     watch: Watch,
     chosen: Chosen,
     asked: bool,
+    hold_cpu: bool,
 ) -> tuple[list[Verdict], dict[str, Any]]:
-    """Verdicts on the engines on one scenario, and their entries of a new baseline.
+    """Verdicts on the engines on one scenario, and what a new baseline says of them and of the exact ride.
 
     An engine that the motion does not suit is passed over, unless it was ``asked`` for or has a baseline.
     """
     start = make_start(scenario)
-    if start.motion is None:
-        raise ScenarioError(f"{name}: only a circular motion can be gated: its exact solution is known")
+    try:
+        exact = find_exact(start)
+    except ScenarioError as error:
+        raise ScenarioError(f"{name}: {error}") from error
+    gate, duration = scenario.gate or Gate(), scenario.simulation.duration
     verdicts: list[Verdict] = []
     entries: dict[str, Any] = {}
     for engine_name in engines:
         entry = baseline.get(engine_name)
         try:
-            engine, settings = chosen(engine_name, scenario.engines.get(engine_name, {}))
-            known_noise = (entry or {}).get("step_noise")
-            found = sample(start, engine, settings, lambda t, e=engine_name: watch(e, t, DURATION), known_noise)
+            values = gate_settings().get(engine_name, {}) | scenario.engines.get(engine_name, {})
+            engine, settings = chosen(engine_name, values)
+            found = sample(
+                start,
+                exact,
+                gate,
+                engine,
+                settings,
+                watch=lambda t, e=engine_name: watch(e, t, duration),
+                known_noise=(entry or {}).get("step_noise"),
+                hold_cpu=hold_cpu,
+            )
         except Exception as error:  # an engine that breaks in any way did not run
             if entry is None and not asked and isinstance(error, UnsuitableProblem):
                 continue
@@ -167,7 +203,7 @@ def _held(
         }
         run = (found.settings, found.version, found.reasons)
         verdicts += judge(engine_name, found.values, entry, found.limits, *run)
-    return verdicts, entries
+    return verdicts, {"exact_error": exact.error, "engines": entries}
 
 
 def content(scenario: Scenario) -> dict[str, Any]:
@@ -175,23 +211,24 @@ def content(scenario: Scenario) -> dict[str, Any]:
     return scenario.model_dump(mode="json", exclude_none=True, include={*OF_THE_MOTION})
 
 
-def read_baseline(scenario: str, folder: Path | None = None, motion: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def read_baseline(name: str, folder: Path | None = None, scenario: Scenario | None = None) -> dict[str, Any]:
     """Committed entries of a scenario, by engine; empty where there is no baseline.
 
     Parameters
     ----------
-    scenario : str
+    name : str
+        Of the scenario.
     folder : Path, optional
-    motion : mapping, optional
-        Its `content`, which must be the baseline's.
+    scenario : Scenario, optional
+        As the gate rides it: the baseline must be of the same ride of the same motion.
 
     Raises
     ------
     ScenarioError
-        If the file is damaged, of another scenario, or of a ride of another length.
+        If the file is damaged, of another scenario, or of another ride.
     """
     within = BASELINES if folder is None else folder
-    path = within / f"{scenario}.json"
+    path = within / f"{name}.json"
     if within.exists() and not within.is_dir():
         raise ScenarioError(f"{within}: is no folder of baselines")
     if not path.exists():
@@ -204,14 +241,15 @@ def read_baseline(scenario: str, folder: Path | None = None, motion: Mapping[str
     except ValueError as error:
         why = one_line(error) if isinstance(error, ValidationError) else " ".join(str(error).split())
         raise ScenarioError(f"{path}: not a baseline: {why}") from error
-    if found.scenario not in (None, scenario):
-        raise ScenarioError(f"{path}: not the baseline of {scenario} but of {shown(repr(found.scenario))}")
-    for name, value in (("duration", DURATION), ("short_horizon", SHORT_HORIZON)):
-        if getattr(found, name) != value:
-            came = getattr(found, name)
-            raise ScenarioError(f"{path}: not a baseline of this gate: its {name} is {came!r} s, not {value!r} s")
-    if motion is not None and found.content not in (None, motion):
-        raise ScenarioError(f"{path}: not the baseline of this {scenario}: its motion, ground or bicycle is another")
+    if found.scenario not in (None, name):
+        raise ScenarioError(f"{path}: not the baseline of {name} but of {shown(repr(found.scenario))}")
+    if scenario is None:
+        return data["engines"]
+    for field, value in _ride(scenario).items():
+        if (came := getattr(found, field)) != value:
+            raise ScenarioError(f"{path}: not a baseline of this ride: its {field} is {came!r}, not {value!r}")
+    if found.content not in (None, content(scenario)):
+        raise ScenarioError(f"{path}: not the baseline of this {name}: its motion, ground or bicycle is another")
     return data["engines"]
 
 
@@ -244,7 +282,7 @@ def update(
     make_folder(folder)
     paths, there = [], installed()
     for name, baseline in fresh.items():
-        moved = [verdict for scenario, verdict in verdicts if scenario == name and verdict.status != "holds"]
+        moved = [verdict for scenario, verdict in verdicts if scenario == name and verdict.moved]
         kept = {engine: entry for engine, entry in read_baseline(name, folder).items() if engine in there}
         words = reason or "; ".join(f"{v.engine}: {v.quantity}: {v.status}" for v in moved) or "nothing moved"
         paths.append(folder / f"{name}.json")
