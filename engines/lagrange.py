@@ -8,7 +8,7 @@ from typing import Literal, Self
 from pydantic import Field
 
 from reference.contact import observe
-from reference.kinematics import body_positions, quaternions, rotations
+from reference.kinematics import body_positions, body_quaternions
 from reference.simulate import simulate, simulate_modified_euler, steps_per_output
 
 from .engine import REFERENCE, EngineError, Problem, Progress, Settings, Trajectory, package_version
@@ -78,7 +78,7 @@ class LagrangeEngine:
             q=motion.q,
             qd=motion.qd,
             body_position=body_positions(problem.bicycle, motion.q),
-            body_quaternion=quaternions(rotations(problem.bicycle, motion.q)),
+            body_quaternion=body_quaternions(problem.bicycle, motion.q),
             contact_point=seen.point,
             contact_force=motion.force,
             gap=seen.gap,

@@ -6,7 +6,7 @@ import numpy as np
 
 from reference.bicycle import Bicycle
 from reference.circular import CircularMotion
-from reference.kinematics import FRONT_ANGLE, REAR_ANGLE, YAW, body_positions, quaternions, rotations
+from reference.kinematics import FRONT_ANGLE, REAR_ANGLE, YAW, body_positions, body_quaternions
 
 from .engine import Trajectory
 
@@ -44,7 +44,7 @@ def steady_trajectory(bicycle: Bicycle, motion: CircularMotion, times: np.ndarra
         q=q,
         qd=qd,
         body_position=body_positions(bicycle, q),
-        body_quaternion=quaternions(rotations(bicycle, q)),
+        body_quaternion=body_quaternions(bicycle, q),
         contact_point=None,
         contact_force=force,
         gap=None,

@@ -61,20 +61,67 @@ def rotations(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
     ndarray, shape (n, 4, 3, 3)
         Body to inertial axes, bodies in the order of `BODIES`.
     """
-    x, y, z = np.eye(3)
-    rear = _axis_angle(z, q[:, YAW]) @ _axis_angle(x, q[:, LEAN]) @ _axis_angle(y, q[:, PITCH])
-    front = rear @ _axis_angle(bicycle.steer_axis, q[:, STEER])
+    _, y, _ = np.eye(3)
+    rear, front = _frame_rotations(bicycle, q)
     turned = (rear, front, rear @ _axis_angle(y, q[:, REAR_ANGLE]), front @ _axis_angle(y, q[:, FRONT_ANGLE]))
     return np.stack(turned, axis=1)
 
 
+def _frame_rotations(bicycle: Bicycle, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation matrices of the rear and the front frame, each of shape (n, 3, 3)."""
+    x, y, z = np.eye(3)
+    rear = _axis_angle(z, q[:, YAW]) @ _axis_angle(x, q[:, LEAN]) @ _axis_angle(y, q[:, PITCH])
+    return rear, rear @ _axis_angle(bicycle.steer_axis, q[:, STEER])
+
+
 def body_positions(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
     """Centres of mass of the four bodies, shape (n, 4, 3) [m], from coordinates (n, 9)."""
-    turned = rotations(bicycle, q)
-    offsets = np.stack([bicycle.centre(body) - bicycle.reference_point for body in BODIES])
     # A wheel's centre lies on its axle: turning it with the wheel would move it.
-    carriers = turned[:, [0, 1, 0, 1]]
-    return q[:, None, :3] + np.einsum("nbij,bj->nbi", carriers, offsets)
+    carriers = 2 * _frame_rotations(bicycle, q)
+    offsets = (bicycle.centre(body) - bicycle.reference_point for body in BODIES)
+    return q[:, None, :3] + np.stack([turned @ offset for turned, offset in zip(carriers, offsets, strict=True)], 1)
+
+
+def body_quaternions(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
+    """Orientations of the four bodies as unit quaternions, from coordinates.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    q : ndarray, shape (n, 9)
+        Generalised coordinates [m, rad].
+
+    Returns
+    -------
+    ndarray, shape (n, 4, 4)
+        (w, x, y, z), body to inertial axes, bodies in the order of `BODIES`; as continuous as the coordinates.
+    """
+    x, y, z = np.eye(3)
+    rear = _half_angle(z, q[:, YAW])
+    for axis, angle in ((x, q[:, LEAN]), (y, q[:, PITCH])):
+        rear = _product(rear, _half_angle(axis, angle))
+    front = _product(rear, _half_angle(bicycle.steer_axis, q[:, STEER]))
+    wheels = (_product(rear, _half_angle(y, q[:, REAR_ANGLE])), _product(front, _half_angle(y, q[:, FRONT_ANGLE])))
+    return np.stack([np.stack(quaternion, axis=-1) for quaternion in (rear, front, *wheels)], axis=1)
+
+
+_Quaternion = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # w, x, y, z, each of shape (n,)
+
+
+def _half_angle(axis: np.ndarray, angle: np.ndarray) -> _Quaternion:
+    """Quaternion of rotations about one unit axis."""
+    sine = np.sin(angle / 2)
+    return np.cos(angle / 2), axis[0] * sine, axis[1] * sine, axis[2] * sine
+
+
+def _product(a: _Quaternion, b: _Quaternion) -> _Quaternion:
+    """Hamilton's product."""
+    return (
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    )
 
 
 def angular_velocities(bicycle: Bicycle, q: np.ndarray, qd: np.ndarray) -> np.ndarray:

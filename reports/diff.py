@@ -24,6 +24,7 @@ from engines.engine import Trajectory
 from reference.bicycle import Bicycle
 from reference.surface import Surface
 
+from .consistency import follow
 from .diff_fields import field_differences
 from .fall import until_fall
 from .limits import Scale, noise, ride_limits
@@ -136,7 +137,7 @@ def _engine(name: str, before: StoredRun, after: StoredRun, ground: Ground, step
         reasons = [f"gave no trajectory in {run.name}: {_failure(run, name)}" for run in gone]
         return entry | {"verdict": DIFFERS, "reasons": reasons}
     rides = (before.trajectories[name], after.trajectories[name])
-    standing = [until_fall(ride, ground.bicycle, ground.surface) for ride in rides]
+    standing = [_until_fall(ride, ground) for ride in rides]
     # Where one falls and the other does not, the fall is no growth that both have: it is what differs.
     fell = all(len(short.time) < len(ride.time) for short, ride in zip(standing, rides, strict=True))
     # Of the run with the smaller steps, since each may err.
@@ -160,6 +161,12 @@ def _engine(name: str, before: StoredRun, after: StoredRun, ground: Ground, step
         "verdict": DIFFERS if reasons else same,
         "reasons": reasons,
     }
+
+
+def _until_fall(ride: Trajectory, ground: Ground) -> Trajectory:
+    """The ride as stored, up to the fall that its coordinates show."""
+    followed = follow(ride, ground.bicycle, ground.surface)
+    return ride.first(len(until_fall(followed, ground.bicycle, ground.surface).time))
 
 
 def _cpu_time(before: Trajectory, after: Trajectory) -> dict[str, float | None]:
@@ -248,6 +255,8 @@ def _flat(metrics: Mapping[str, Any]) -> dict[str, Any]:
     for name, value in metrics.items():
         if isinstance(value, Mapping):
             found |= {f"{name}.{part}": number for part, number in value.items()}
+        elif name == "inconsistent_reports":
+            found[name] = ", ".join(report["quantity"] for report in value) or None
         else:
             found[name] = value
     return found

@@ -40,6 +40,9 @@ BELOW_NOISE = "the errors of its steps cannot be told from what its iterations l
 
 CHANGES = "settings"  # under which other settings or another version are told, whatever they do
 
+# Held against a limit of its own, whatever the baseline says: no engine may contradict itself.
+ABSOLUTE = ("report_mismatch",)
+
 # Of these more is better; of all others, less in size.
 _MORE_IS_BETTER = ("fell_at", "observed_order")
 # Another number of steps is another computation, be it better or worse.
@@ -58,7 +61,7 @@ class Verdict:
     ----------
     engine, quantity : str
     value, baseline, limit : float or None
-        The value holds within baseline +- limit.
+        The value holds within baseline +- limit; without a baseline, within the limit of 0.
     status : str
         ``holds``, ``worse`` (an error larger beyond the limit, an earlier fall, a lower order), ``better`` (the
         opposite, with another version or other settings), ``changed`` (otherwise moved), ``missing`` or ``shown``
@@ -131,13 +134,18 @@ def judge(
     -------
     list of Verdict
     """
+    absolute = [_absolute(engine, name, values, allowed, reasons or {}) for name in ABSOLUTE if name in allowed]
     if baseline is None:
-        return [missing(engine, "no baseline; velodrome check --update writes one")]
+        without = missing(engine, "no baseline; velodrome check --update writes one")
+        return [without, *(verdict for verdict in absolute if not verdict.passes)]
     changes = _changes(baseline, settings, version)
     stored = " ".join(["the baseline", *(["of " + baseline["created"]] if "created" in baseline else [])])
     since = f"since {stored}: {changes}" if changes else f"same version and settings as {stored}"
     verdicts = [Verdict(engine, CHANGES, None, None, None, "holds", since)] if changes else []
+    verdicts += absolute
     for quantity, limit in allowed.items():
+        if quantity in ABSOLUTE:
+            continue
         value, before = values.get(quantity), baseline["quantities"].get(quantity)
         if value is None and before is None:
             continue  # the engine cannot give it, and never could
@@ -165,6 +173,23 @@ def _shown(engine: str, quantity: str, value: float, before: float | None) -> Ve
     """Verdict on a quantity that is not judged: it passes."""
     reason = f"{value:.3g}" if before is None else f"{before:.3g} -> {value:.3g}"
     return Verdict(engine, quantity, value, before, None, "shown", f"{reason}, not judged")
+
+
+def _absolute(
+    engine: str,
+    quantity: str,
+    values: Mapping[str, float | None],
+    allowed: Mapping[str, float | None],
+    reasons: Mapping[str, str],
+) -> Verdict:
+    """Verdict on a quantity that must be within its limit of zero."""
+    value, limit = values.get(quantity), allowed[quantity]
+    if value is None or limit is None:
+        why = reasons.get(quantity, "not given by this run")
+        return Verdict(engine, quantity, value, None, limit, "missing", why)
+    status = "holds" if value <= limit else "worse"
+    reason = reasons.get(quantity, f"{value:.6g}, limit {limit:.2g}, whatever the baseline")
+    return Verdict(engine, quantity, value, None, limit, status, reason)
 
 
 def _fall(engine: str, value: float | None, before: float | None, since: str, excused: bool) -> Verdict:

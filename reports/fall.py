@@ -1,4 +1,8 @@
-"""When a bicycle falls, and the ride up to there: nothing but wheels touches the ground, so no ride comes after."""
+"""When a bicycle falls, and the ride up to there: nothing but wheels touches the ground, so no ride comes after.
+
+All of it looks at the rear frame's position: give it rides as `reports.consistency.follow` does, or the engine says
+itself whether it fell.
+"""
 
 from __future__ import annotations
 

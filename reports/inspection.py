@@ -1,19 +1,14 @@
-"""A ride looked at with the suite's own eyes: its state against the exact one, its reports against its state."""
+"""A ride's state against the exact one."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from engines.engine import Trajectory
-from reference.bicycle import Bicycle
-from reference.contact import Observation
-from reference.kinematics import FRONT_ANGLE, REAR_ANGLE, YAW, body_positions, quaternions, rotations
 
+from .consistency import coordinate_differences
 from .limits import Scale
 from .metrics import SETTLED
-
-# Known up to whole turns.
-_TURNING = [YAW, REAR_ANGLE, FRONT_ANGLE]
 
 
 def state_error(trajectory: Trajectory, exact: Trajectory, scale: Scale) -> float:
@@ -40,8 +35,7 @@ def relative_differences(trajectory: Trajectory, exact: Trajectory, scale: Scale
     ndarray, shape (2, n, 9)
     """
     n = len(trajectory.time)
-    apart = trajectory.q - exact.q[:n]
-    apart[:, _TURNING] -= 2 * np.pi * np.round(apart[:, _TURNING] / (2 * np.pi))
+    apart = coordinate_differences(trajectory, exact)
     sizes = np.array([*3 * [scale.radius], *4 * [1.0], *2 * [scale.turned]])
     return np.array([apart / sizes, (trajectory.qd - exact.qd[:n]) / scale.rates])
 
@@ -58,35 +52,3 @@ def rms_force_error(trajectory: Trajectory, exact: Trajectory) -> float | None:
     force = exact.contact_force[: len(trajectory.time)]
     apart = np.linalg.norm(trajectory.contact_force - force, axis=2)[settled]
     return float(np.sqrt(np.mean(apart**2)) / np.linalg.norm(force, axis=2).max())
-
-
-def report_mismatch(trajectory: Trajectory, seen: Observation, bicycle: Bicycle, scale: Scale) -> float:
-    """How far what an engine reports is from what follows from its coordinates, relative to the motion's sizes.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-    seen : Observation
-        Of its coordinates and rates, by `reference.contact.observe`.
-    bicycle : Bicycle
-    scale : Scale
-
-    Returns
-    -------
-    float
-        The largest of poses, contact points, gaps, slip and energies, of those that are given.
-    """
-    own, followed = trajectory.body_quaternion, quaternions(rotations(bicycle, trajectory.q))
-    turned = np.minimum(np.linalg.norm(own - followed, axis=-1), np.linalg.norm(own + followed, axis=-1))
-    parts = [(trajectory.body_position - body_positions(bicycle, trajectory.q)) / scale.radius, turned]
-    size = np.abs(seen.kinetic_energy[0]) + np.abs(seen.potential_energy[0])
-    for given, found, unit in (
-        (trajectory.contact_point, seen.point, scale.radius),
-        (trajectory.gap, seen.gap, scale.radius),
-        (trajectory.slip, seen.slip, scale.speed),
-        (trajectory.kinetic_energy, seen.kinetic_energy, size),
-        (trajectory.potential_energy, seen.potential_energy, size),
-    ):
-        if given is not None:
-            parts.append((given - found) / unit)
-    return float(max(np.abs(part).max() for part in parts))

@@ -25,6 +25,7 @@ _SLOPE = 3.0
 # The start is a root of equations known to round-off, some 1e-13 of their rows, and their condition is
 # the inverse of the Jacobian's least singular value, some 1e2.
 START_ERROR = 1e-11
+ROUND_OFF = 2.0**-52
 
 # An order that cannot be told from its neighbours says nothing.
 _TELLING_ORDER = 0.5
@@ -151,7 +152,8 @@ def ride_limits(scale: Scale, noise: float, step_force: float = 0.0, borders: in
         "max_gap": noise * scale.radius,
         "max_slip": noise * scale.speed,
         "mean_slip": noise * scale.speed,
-        "report_mismatch": noise,
+        # A share of limits of its own, see `reports.consistency`.
+        "report_mismatch": 1.0,
         # Forces follow accelerations, whose sensitivity to the state is the square of its fastest rate, the
         # wheels', and which are measured against the weight.
         "contact_force_error": force,

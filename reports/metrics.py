@@ -1,4 +1,8 @@
-"""What a trajectory is worth: errors against the reference, drift, slip, energy."""
+"""What a trajectory is worth: errors against the reference, drift, slip, energy.
+
+Poses, contact points, gaps, slip and energies are those that follow from its coordinates and rates. What the engine
+reports of them is held against these, see `reports.consistency`.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +13,12 @@ import numpy as np
 from engines.engine import Trajectory
 from engines.friction import cone_is_left, normal_force, required_friction
 from reference.bicycle import Bicycle
-from reference.kinematics import REAR_ANGLE
+from reference.kinematics import REAR_ANGLE, YAW
 from reference.surface import Surface
 
+from .consistency import follow, largest_speed, mismatches
 from .fall import fell_at, until_fall
+from .limits import ROUND_OFF
 
 SETTLED = 0.2  # from here on contacts that start unsettled have settled, of any model here [s]
 
@@ -25,6 +31,9 @@ def metrics(
     growth_rate: float,
     size: float,
     circular: bool,
+    *,
+    step_noise: float = ROUND_OFF,
+    followed: Trajectory | None = None,
 ) -> dict[str, Any]:
     """Measure a trajectory, up to its fall if it falls.
 
@@ -42,6 +51,10 @@ def metrics(
         Radius of the circle, or the wheelbase for a straight motion [m].
     circular : bool
         Whether the motion circles the z axis, so that radius and phase mean something.
+    step_noise : float
+        Relative error that a step of the engine may add beyond its method.
+    followed : Trajectory, optional
+        The trajectory as `reports.consistency.follow` gives it, where that is at hand.
 
     Returns
     -------
@@ -49,14 +62,20 @@ def metrics(
         The quantities of ``metrics.json``, JSON values; None where an engine does not give what a
         quantity needs, or the quantity has no meaning.
     """
-    simulated, fall = float(trajectory.time[-1] - trajectory.time[0]), fell_at(trajectory, bicycle, surface)
+    reported = trajectory
+    simulated = float(reported.time[-1] - reported.time[0])
+    trajectory = follow(reported, bicycle, surface) if followed is None else followed
+    fall = fell_at(trajectory, bicycle, surface)
     trajectory = until_fall(trajectory, bicycle, surface)
+    reported = reported.first(len(trajectory.time))
     reference = None if reference is None else until_fall(reference, bicycle, surface)
     result = _errors(trajectory, reference)
     result |= _drifts(trajectory, reference, circular)
     result |= _energy(trajectory)
     result |= _constraints(trajectory)
-    result["not_finite"] = trajectory.not_finite()
+    result["not_finite"] = reported.not_finite()
+    found = mismatches(reported, trajectory, reference, size, step_noise)
+    result["inconsistent_reports"] = [mismatch.as_json() for mismatch in found if not mismatch.holds]
     result |= _friction(trajectory, trajectory if reference is None else reference, surface)
     result |= {
         "steps": trajectory.steps,
@@ -81,6 +100,8 @@ def _finite(value: Any) -> Any:
     """Replace what JSON cannot carry: a number that is none becomes None."""
     if isinstance(value, dict):
         return {name: _finite(part) for name, part in value.items()}
+    if isinstance(value, list):
+        return [_finite(part) for part in value]
     return number(value) if isinstance(value, float) else value
 
 
@@ -97,6 +118,19 @@ def orientation_errors(trajectory: Trajectory, reference: Trajectory) -> np.ndar
     # 2 asin(|a - +-b| / 2) resolves small angles, which the arc cosine of a product does not.
     chord = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
     return 4 * np.arcsin(np.minimum(chord / 2, 1.0))
+
+
+def rate_error(trajectory: Trajectory, reference: Trajectory) -> float | None:
+    """Largest difference of any of the nine rates from the reference's, relative to the motion's sizes.
+
+    Rates of D are measured by the reference's largest speed, the others by its largest angular rate. None where the
+    reference stands still.
+    """
+    n = _common(trajectory, reference)
+    sizes = np.array([largest_speed(reference)] * 3 + [float(np.abs(reference.qd[:, YAW:]).max())] * 6)
+    moving = sizes > 0
+    difference = np.abs(trajectory.qd[:n] - reference.qd[:n])[:, moving]
+    return float((difference / sizes[moving]).max()) if moving.any() else None
 
 
 def _friction(trajectory: Trajectory, rolling: Trajectory, surface: Surface) -> dict[str, float | None]:
@@ -149,7 +183,7 @@ def _extremes(values: np.ndarray) -> dict[str, float]:
 
 
 def _errors(trajectory: Trajectory, reference: Trajectory | None) -> dict[str, Any]:
-    names = ("position_error", "orientation_error", "rear_rate_error", "contact_force_error")
+    names = ("position_error", "orientation_error", "rate_error", "rear_rate_error", "contact_force_error")
     names += ("contact_force_error_at", "settled_force_error")
     result: dict[str, Any] = dict.fromkeys(names)
     if reference is None:
@@ -158,6 +192,7 @@ def _errors(trajectory: Trajectory, reference: Trajectory | None) -> dict[str, A
     rate = np.abs(trajectory.qd[:n, REAR_ANGLE] - reference.qd[:n, REAR_ANGLE])
     result["position_error"] = _extremes(position_errors(trajectory, reference))
     result["orientation_error"] = _extremes(orientation_errors(trajectory, reference))
+    result["rate_error"] = rate_error(trajectory, reference)
     result["rear_rate_error"] = float(rate.max())
     if trajectory.contact_force is not None and reference.contact_force is not None:
         difference = np.linalg.norm(trajectory.contact_force[:n] - reference.contact_force[:n], axis=2)
@@ -198,21 +233,23 @@ def _drifts(trajectory: Trajectory, reference: Trajectory | None, circular: bool
 
 
 def _energy(trajectory: Trajectory) -> dict[str, float | None]:
-    if trajectory.kinetic_energy is None or trajectory.potential_energy is None:
-        return {"energy_drift": None, "energy_drift_rate": None, "energy_variation": None}
+    assert trajectory.kinetic_energy is not None
+    assert trajectory.potential_energy is not None
     energy = trajectory.kinetic_energy + trajectory.potential_energy
+    size = abs(energy[0])
     return {
-        "energy_drift": float(np.abs(energy - energy[0]).max() / abs(energy[0])),
+        "energy_drift": float(np.abs(energy - energy[0]).max() / size) if size > 0 else None,
         "energy_drift_rate": _slope(trajectory.time, energy) if len(energy) > 1 else None,
-        "energy_variation": float(100 * np.ptp(energy) / abs(energy[0])),
+        "energy_variation": float(100 * np.ptp(energy) / size) if size > 0 else None,
     }
 
 
-def _constraints(trajectory: Trajectory) -> dict[str, float | None]:
-    result: dict[str, float | None] = dict.fromkeys(("max_gap", "max_slip", "mean_slip"))
-    if trajectory.gap is not None:
-        result["max_gap"] = float(np.abs(trajectory.gap).max())
-    if trajectory.slip is not None:
-        speed = np.linalg.norm(trajectory.slip, axis=2)
-        result["max_slip"], result["mean_slip"] = float(speed.max()), float(speed.mean())
-    return result
+def _constraints(trajectory: Trajectory) -> dict[str, float]:
+    assert trajectory.gap is not None
+    assert trajectory.slip is not None
+    speed = np.linalg.norm(trajectory.slip, axis=2)
+    return {
+        "max_gap": float(np.abs(trajectory.gap).max()),
+        "max_slip": float(speed.max()),
+        "mean_slip": float(speed.mean()),
+    }

@@ -7,12 +7,14 @@ from typing import Any
 
 from engines.engine import REFERENCE
 
+from .consistency import describe
 from .markdown import escaped
 
-# (title, unit, metric, part of a metric that has parts): seven, so that a terminal of 80 columns holds them.
+# (title, unit, metric, part of a metric that has parts): eight, so that a terminal of 80 columns holds them.
 COLUMNS: tuple[tuple[str, str, str, str | None], ...] = (
     ("position error", "m", "position_error", "max"),
     ("rotation error", "rad", "orientation_error", "max"),
+    ("rate error", "1", "rate_error", None),
     ("force error", "1", "contact_force_error", None),
     ("radius drift", "m/s", "radius_drift_rate", None),
     ("energy drift", "1", "energy_drift", None),
@@ -58,6 +60,8 @@ def remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]
         later = metrics["settled_force_error"]
         rest = "" if later is None else f"; once settled it is {later:.2g}"
         lines.append(f"{name}: the force error is largest in the first sample{rest}")
+    # Folders of earlier versions do not have it.
+    lines += [f"{name}: {describe(report)}" for report in metrics.get("inconsistent_reports") or ()]
     if metrics["not_finite"]:
         lines.append(f"{name}: not finite in some samples: {', '.join(metrics['not_finite'])}")
     if metrics["horizon"] is not None and metrics["horizon"] < duration:

@@ -14,9 +14,10 @@ from pydantic import ValidationError
 
 from engines.engine import REFERENCE, Trajectory, load_engine
 from reference.surface import SurfaceOfRevolution
+from reports.consistency import follow
 from reports.diff import DIFFERS, Ground, StoredRun, diff_document, diff_markdown
 from reports.fall import as_shown
-from reports.limits import START_ERROR, Scale
+from reports.limits import ROUND_OFF, START_ERROR, Scale
 from reports.palette import colours
 
 from .error import ScenarioError
@@ -25,8 +26,6 @@ from .installed import installed
 from .scenario import OF_THE_MOTION, CircularTable, Scenario, load_scenario
 from .start import make_start
 from .stored import document, part, ride
-
-ROUND_OFF = 2.0**-52
 
 
 @dataclass(frozen=True)
@@ -200,7 +199,8 @@ def _record(path: Path, pair: Pair, found: Mapping[str, Any], page: str) -> None
             (pair.before, pair.after), labels, (bright(hues[engine]), hues[engine]), strict=True
         ):
             if engine in run.trajectories:
-                rides[label] = as_shown(run.trajectories[engine], ground.bicycle, ground.surface)
+                followed = follow(run.trajectories[engine], ground.bicycle, ground.surface)
+                rides[label] = as_shown(followed, ground.bicycle, ground.surface)
                 paint[label] = hue
         if labels[0] != labels[1] and all(label in rides for label in labels):
             earlier[labels[1]] = labels[0]

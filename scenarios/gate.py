@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 import reports
 from engines.engine import Engine, Settings, UnsuitableProblem
-from reports.drift import Verdict, judge, missing
+from reports.drift import ABSOLUTE, Verdict, judge, missing
 
 from .error import ScenarioError
 from .files import make_folder, write_json
@@ -253,6 +253,11 @@ def read_baseline(name: str, folder: Path | None = None, scenario: Scenario | No
     return data["engines"]
 
 
+def refused(verdicts: Sequence[tuple[str, Verdict]]) -> list[tuple[str, Verdict]]:
+    """Verdicts on engines that contradict themselves: no baseline is written of their run."""
+    return [(name, verdict) for name, verdict in verdicts if verdict.quantity in ABSOLUTE and not verdict.passes]
+
+
 def update(
     fresh: Mapping[str, Mapping[str, Any]],
     verdicts: Sequence[tuple[str, Verdict]],
@@ -261,7 +266,7 @@ def update(
 ) -> list[Path]:
     """Write new baselines, with why they were written, and return their paths.
 
-    Engines that were not run keep their entries, unless they are not installed any more.
+    Engines that were not run, or that are `refused`, keep their entries, unless they are not installed any more.
 
     Parameters
     ----------
@@ -281,10 +286,14 @@ def update(
     folder = BASELINES if baselines is None else baselines
     make_folder(folder)
     paths, there = [], installed()
+    out = {(scenario, verdict.engine) for scenario, verdict in refused(verdicts)}
     for name, baseline in fresh.items():
+        entries = {engine: entry for engine, entry in baseline["engines"].items() if (name, engine) not in out}
+        if baseline["engines"] and not entries:
+            continue
         moved = [verdict for scenario, verdict in verdicts if scenario == name and verdict.moved]
         kept = {engine: entry for engine, entry in read_baseline(name, folder).items() if engine in there}
         words = reason or "; ".join(f"{v.engine}: {v.quantity}: {v.status}" for v in moved) or "nothing moved"
         paths.append(folder / f"{name}.json")
-        write_json(paths[-1], {**baseline, "reason": words, "engines": kept | baseline["engines"]})
+        write_json(paths[-1], {**baseline, "reason": words, "engines": kept | entries})
     return paths

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
@@ -15,22 +15,26 @@ from engines.convergence import observed_orders
 from engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory, load_engine
 from engines.friction import required_friction
 from engines.identify import DISTURBANCES, STENCIL_WEIGHT, interval_of, jacobian_at
-from reference.contact import Observation, observe
 from reference.kinematics import YAW
 from reference.stability import growth_rate, linearise, sorted_eigenvalues
 from reference.surface import Surface
+from reports.consistency import LARGEST_NOISE, Mismatch, describe, follow, mismatches
 from reports.drift import BELOW_NOISE, HELD_CPU, RIDE_QUANTITIES, SHOWN
 from reports.fall import fell_at, until_fall
-from reports.inspection import report_mismatch, rms_force_error, state_error
+from reports.inspection import rms_force_error, state_error
 from reports.limits import Scale, eigenvalue_limits, noise, order_limit, ride_limits, step_force
 from reports.metrics import position_errors
 from reports.precision import match
 
 from .gate_exact import Exact, scale_of
-from .runner import measure_one
+from .runner import measure_one, why_failed
 from .scenario import Gate
 from .start import Start
 
+Found = dict[str, tuple[float | None, float | None]]  # value and limit by quantity
+Measured = tuple[Found, dict[str, str]]  # and why there is no value
+
+EIGENVALUE_QUANTITIES = ("eigenvalue_error", "growth_rate_error")
 SHORT_HORIZON = 1.0  # of the first error and of the order [s]
 # Of the order: coarser steps than the settings' own, whose errors stand further above noise, and an interval that
 # four steps of common sizes divide [s].
@@ -41,8 +45,6 @@ ORDER_INTERVAL = 0.2
 # them.
 _CPU_PAIRS = 7
 CPU_FACTOR = 2.0
-# A step that may be off by more has no limits that would bite.
-LARGEST_NOISE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -119,22 +121,26 @@ def sample(
         raise EngineError(f"its step_noise is {own_noise!r}; it must be from 0 to {LARGEST_NOISE:g}")
     step_noise = own_noise if known_noise is None else min(own_noise, known_noise)
     trajectory = ride(engine, problem, settings, watch)
-    fall = fell_at(trajectory, problem.bicycle, problem.surface)
+    followed = follow(trajectory, problem.bicycle, problem.surface)
+    fall = fell_at(followed, problem.bicycle, problem.surface)
     if trajectory.ended is not None and fall is None:
         raise EngineError(trajectory.ended)
     if trajectory.unconverged_steps:
         raise EngineError(
             f"its iterations did not converge in {trajectory.unconverged_steps} of {trajectory.steps} steps"
         )
-    standing = until_fall(trajectory, problem.bicycle, problem.surface)
-    if standing.not_finite():
-        raise EngineError(f"not finite in some samples: {', '.join(standing.not_finite())}")
+    standing = until_fall(followed, problem.bicycle, problem.surface)
+    reported = trajectory.first(len(standing.time))
+    if reported.not_finite():
+        raise EngineError(f"not finite in some samples: {', '.join(reported.not_finite())}")
     scale = replace(scale_of(start), duration=float(standing.time[-1]))
     if engine.name != REFERENCE and exact.is_copied_by(standing, scale):
         raise EngineError("it returned the reference's own trajectory")
     # As many steps as the part that is measured took.
     steps = trajectory.steps * scale.duration / float(trajectory.time[-1])
-    values = _ride_values(start, exact, standing, scale) | {
+    reports = mismatches(reported, standing, exact.trajectory, start.size, step_noise)
+    values = _ride_values(start, reported, standing, exact.trajectory, scale) | {
+        "report_mismatch": max(report.share for report in reports),
         "fell_at": fall,
         "steps": steps,
         "cpu_ratio": _ratio(trajectory.cpu_time, exact.cpu_time),
@@ -146,43 +152,57 @@ def sample(
         cost = _cpu_ratio(engine, problem, settings)
         values[HELD_CPU] = cost
         limits[HELD_CPU] = None if cost is None else (1 - 1 / CPU_FACTOR) * cost
-    reasons: dict[str, str] = {}
+    reasons = _disagreement(reports)
+    further: list[Measured] = []
     if fall is None and gate.order:
-        order, reasons = _order(start, engine, settings, step_noise)
-        values |= {name: value for name, (value, _) in order.items()}
-        limits |= {name: limit for name, (_, limit) in order.items()}
+        further.append(_measured(("observed_order",), lambda: _order(start, engine, settings, step_noise)))
     if fall is None and gate.eigenvalues and start.motion is not None:
-        part = _eigenvalues(start, engine, settings, trajectory.steps / scale.duration, step_noise)
+        rate = trajectory.steps / scale.duration
+        further.append(
+            _measured(EIGENVALUE_QUANTITIES, lambda: (_eigenvalues(start, engine, settings, rate, step_noise), {}))
+        )
+    for part, why in further:
         values |= {name: value for name, (value, _) in part.items()}
         limits |= {name: limit for name, (_, limit) in part.items()}
+        reasons |= why
     values = {name: value if value is not None and np.isfinite(value) else None for name, value in values.items()}
     shown = settings.model_dump(mode="json")
     return Sample(values, limits, reasons, trajectory.steps, own_noise, engine.version, shown)
 
 
-def _ride_values(start: Start, exact: Exact, standing: Trajectory, scale: Scale) -> dict[str, float | None]:
-    """Quantities of the part of a ride that is standing, with gaps and slip as they follow from its coordinates."""
-    problem, true = start.problem, exact.trajectory
-    seen = observe(problem.bicycle, problem.surface, standing.q, standing.qd)
-    gap, slip = (seen.gap, seen.slip) if seen.found else (None, None)
-    measured = measure_one(start, replace(standing, gap=gap, slip=slip), true)
-    errors = position_errors(standing, true)
+def _disagreement(reports: Sequence[Mismatch]) -> dict[str, str]:
+    """Why the reports of an engine do not agree with its coordinates; none where they do."""
+    lines = [describe(report.as_json()) for report in reports if not report.holds]
+    return {"report_mismatch": "; ".join(lines)} if lines else {}
+
+
+def _measured(names: Sequence[str], measure: Callable[[], Measured]) -> Measured:
+    """What a further measurement finds; an engine that breaks in it has no such figures, but keeps its ride's."""
+    try:
+        return measure()
+    except Exception as error:  # an engine that rode may still break at other steps or from other starts
+        return dict.fromkeys(names, (None, None)), dict.fromkeys(names, why_failed(error))
+
+
+def _ride_values(
+    start: Start, reported: Trajectory, standing: Trajectory, exact: Trajectory, scale: Scale
+) -> dict[str, float | None]:
+    """Quantities of the part of a ride that is standing, as reported and as it follows from its coordinates."""
+    measured = measure_one(start, reported, exact, step_noise=0.0, followed=standing)
+    errors = position_errors(standing, exact)
     found = measured | {
-        "short_error": float(errors[min(int(np.searchsorted(problem.times, SHORT_HORIZON)), len(errors) - 1)]),
+        "short_error": float(errors[min(int(np.searchsorted(exact.time, SHORT_HORIZON)), len(errors) - 1)]),
         "position_error": measured["position_error"]["max"],
-        "state_error": state_error(standing, true, scale),
-        "report_mismatch": report_mismatch(standing, seen, problem.bicycle, scale) if seen.found else None,
-        "rms_force_error": rms_force_error(standing, true),
-        "required_friction": _required_friction(standing, seen, problem.surface),
+        "state_error": state_error(standing, exact, scale),
+        "rms_force_error": rms_force_error(standing, exact),
+        "required_friction": _required_friction(standing, start.problem.surface),
     }
     return {name: found[name] for name in (*RIDE_QUANTITIES, *SHOWN) if name in found}
 
 
-def _required_friction(standing: Trajectory, seen: Observation, surface: Surface) -> float | None:
+def _required_friction(standing: Trajectory, surface: Surface) -> float | None:
     """Coefficient of friction that an engine's own contact forces need; None where it gives none."""
-    if standing.contact_force is None or not seen.found:
-        return None
-    return float(required_friction(replace(standing, contact_point=seen.point), surface).max())
+    return None if standing.contact_force is None else float(required_friction(standing, surface).max())
 
 
 def _cpu_ratio(engine: Engine, problem: Problem, settings: Settings) -> float | None:
@@ -200,10 +220,7 @@ def _ratio(time: float, reference: float) -> float | None:
     return time / reference if reference > 0 else None
 
 
-Found = dict[str, tuple[float | None, float | None]]
-
-
-def _order(start: Start, engine: Engine, settings: Settings, step_noise: float) -> tuple[Found, dict[str, str]]:
+def _order(start: Start, engine: Engine, settings: Settings, step_noise: float) -> Measured:
     """Order of convergence over the short horizon with its limit, or why there is none."""
     short = replace(start.problem, times=ORDER_INTERVAL * np.arange(round(SHORT_HORIZON / ORDER_INTERVAL) + 1))
     none: Found = {"observed_order": (None, None)}
@@ -212,6 +229,9 @@ def _order(start: Start, engine: Engine, settings: Settings, step_noise: float) 
         rides = [ride(engine, short, refined, lambda _: None) for refined in ladder]
     except ValueError as error:  # settings without a step, or of a step at the end of its range or beside the interval
         return none, {"observed_order": " ".join(str(error).split())}
+    for one, factor in zip(rides, FACTORS, strict=True):
+        if one.ended is not None:
+            return none, {"observed_order": f"with {factor:g} times its step it ended: {one.ended}"}
     samples = min(len(one.time) for one in rides)
     paths = [one.q[:samples, :3] for one in rides]
     first, second = (float(np.abs(b - a).max()) for a, b in pairwise(paths))

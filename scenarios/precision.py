@@ -20,7 +20,7 @@ from reports.precision import Level, comparison_horizon, eigenvalue_document, en
 from .error import ScenarioError
 from .files import make_folder, write_json
 from .run_folder import Plan, library_versions
-from .runner import Watch, measure_one, plan_run
+from .runner import Watch, claimed_noise, measure_one, plan_run
 from .scenario import Scenario
 from .start import Start
 
@@ -149,7 +149,7 @@ def _runs(
         except (EngineError, ValueError, ArithmeticError) as error:
             yield {"step": step, "reason": " ".join(str(error).split())}
             continue
-        measured = measure_one(start, trajectory, reference)
+        measured = measure_one(start, trajectory, reference, step_noise=claimed_noise(engine, settings))
         if trajectory.ended is not None:
             yield {"step": step, "reason": f"ended at {trajectory.time[-1]:.6g} s: {trajectory.ended}"}
         elif measured["fell_at"] is not None:

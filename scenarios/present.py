@@ -35,8 +35,7 @@ if TYPE_CHECKING:
     from .run_folder import Plan
     from .runner import Outcome
 
-# Of a terminal: from here on engines' names stand on one line.
-_WIDE, _NAME_WIDTH = 95, 14
+_NAME_WIDTH = 13  # of an engine's name on a narrow terminal, where that holds the table in one piece
 
 
 class Progress:
@@ -90,14 +89,11 @@ def show_outcome(console: Console, plan: Plan, outcome: Outcome) -> None:
     duration = plan.scenario.simulation.duration
     console.print()
     console.print(f"{plan.name}: {plan.scenario.title}, {duration:g} s", style="bold", markup=False)
-    table = Table("engine", box=None, pad_edge=False)
-    for title, unit, _, _ in COLUMNS:
-        table.add_column("{}\n{}\n[dim]{}[/dim]".format(*title.split(), unit), justify="right", no_wrap=True)
-    for name, values in outcome.metrics.items():
-        # A long name must not push the figures off a narrow terminal.
-        shown = name if console.width >= _WIDE else "\n".join(wrap(name, _NAME_WIDTH))
-        table.add_row(shown, *(cell(values, metric, part) for _, _, metric, part in COLUMNS))
-    console.print(table)
+    cells = {
+        name: [cell(values, metric, part) for _, _, metric, part in COLUMNS] for name, values in outcome.metrics.items()
+    }
+    for table in _metric_tables(cells, console.width):
+        console.print(table)
     for name, values in outcome.metrics.items():
         for line in remarks(name, values, duration):
             console.print(line, style="yellow", markup=False, soft_wrap=True)
@@ -115,6 +111,37 @@ def show_outcome(console: Console, plan: Plan, outcome: Outcome) -> None:
     console.print(f"report:     {outcome.folder / 'report.html'}", markup=False, highlight=False, soft_wrap=True)
     if (outcome.folder / "comparison.rrd").exists():
         console.print(f"recording:  {command} view {outcome.folder}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _metric_tables(cells: Mapping[str, list[str]], width: int) -> Iterator[Table]:
+    """The table of a run, or several one below the other where it is wider than the terminal.
+
+    Every engine's name and every figure is whole at any width.
+    """
+    texts = [(*title.split(), unit) for title, unit, _, _ in COLUMNS]
+    widths = [max(map(len, (*text, *(row[k] for row in cells.values())))) for k, text in enumerate(texts)]
+    names = {name: name for name in cells}
+    gap, room = 2, width - max((len(name) for name in cells), default=0)
+    if sum(widths) + gap * len(widths) > room:
+        short = {name: wrap(name, _NAME_WIDTH, break_long_words=False) for name in cells}
+        longest = max((len(line) for lines in short.values() for line in lines), default=0)
+        if longest + sum(widths) + len(widths) <= width:
+            names, gap, room = {name: "\n".join(lines) for name, lines in short.items()}, 1, width - longest
+    parts, used = [[]], 0
+    for k, column in enumerate(widths):
+        if parts[-1] and used + gap + column > room:
+            parts.append([])
+            used = 0
+        parts[-1].append(k)
+        used += gap + column
+    for part in parts:
+        table = Table(box=None, pad_edge=False, padding=(0, gap, 0, 0))
+        table.add_column("engine", no_wrap=True)
+        for k in part:
+            table.add_column("{}\n{}\n[dim]{}[/dim]".format(*texts[k]), justify="right", no_wrap=True)
+        for name, row in cells.items():
+            table.add_row(names[name], *(row[k] for k in part))
+        yield table
 
 
 def outcome_json(plan: Plan, outcome: Outcome) -> dict[str, Any]:

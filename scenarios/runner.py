@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomli_w
 from pydantic import ValidationError
 
@@ -25,7 +26,9 @@ from engines.engine import (
     load_engine,
 )
 from engines.storage import write_trajectory
+from reports.consistency import follow
 from reports.fall import as_shown
+from reports.limits import ROUND_OFF
 from reports.metrics import metrics
 
 from .error import ScenarioError
@@ -161,10 +164,12 @@ def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None]) -> Out
         interrupted = True
         note("interrupted: finished engines are kept")
     with _deaf_to_interrupts():
-        measured = measure(plan, trajectories)
+        where = (problem.bicycle, problem.surface)
+        followed = {name: follow(one, *where) for name, one in trajectories.items()}
+        measured = measure(plan, trajectories, followed)
         verdicts = judge(plan, measured)
         write_json(folder / "metrics.json", measured)
-        shown = {name: as_shown(one, problem.bicycle, problem.surface) for name, one in trajectories.items()}
+        shown = {name: as_shown(one, *where) for name, one in followed.items()}
         record(folder, plan, shown, measured, failures, verdicts)
         found = write_manifest(folder, plan, trajectories, failures, verdicts, complete=not interrupted)
         write_page(folder, plan, shown, measured, found)
@@ -177,20 +182,55 @@ def why_failed(error: Exception) -> str:
     return " ".join(words.split())
 
 
-def measure_one(start: Start, trajectory: Trajectory, reference: Trajectory | None) -> dict[str, Any]:
-    """Metrics of a trajectory from a start, against a reference where there is one."""
-    problem, circular = start.problem, start.motion is not None
-    where = (problem.bicycle, problem.surface, start.growth_rate, start.size)
-    return metrics(trajectory, reference, *where, circular)
+def measure_one(
+    start: Start,
+    trajectory: Trajectory,
+    reference: Trajectory | None,
+    *,
+    step_noise: float,
+    followed: Trajectory | None = None,
+) -> dict[str, Any]:
+    """Metrics of a trajectory from a start, against a reference where there is one; see `reports.metrics.metrics`."""
+    return metrics(
+        trajectory,
+        reference,
+        start.problem.bicycle,
+        start.problem.surface,
+        start.growth_rate,
+        start.size,
+        start.motion is not None,
+        step_noise=step_noise,
+        followed=followed,
+    )
 
 
-def measure(plan: Plan, trajectories: Mapping[str, Trajectory]) -> dict[str, dict[str, Any]]:
-    """Metrics of every trajectory against the reference's; without a reference, of each by itself."""
-    reference = trajectories.get(REFERENCE)
+def measure(
+    plan: Plan, trajectories: Mapping[str, Trajectory], followed: Mapping[str, Trajectory]
+) -> dict[str, dict[str, Any]]:
+    """Metrics of every trajectory against the reference's; without a reference, of each by itself.
+
+    ``followed`` are the trajectories as `reports.consistency.follow` gives them.
+    """
+    reference = followed.get(REFERENCE)
     return {
-        name: measure_one(plan.start, trajectory, None if name == REFERENCE else reference)
+        name: measure_one(
+            plan.start,
+            trajectory,
+            None if name == REFERENCE else reference,
+            step_noise=claimed_noise(*plan.engines[name]),
+            followed=followed[name],
+        )
         for name, trajectory in trajectories.items()
     }
+
+
+def claimed_noise(engine: Engine, settings: Settings) -> float:
+    """Relative error that a step may add by an engine's own word; round-off where it has none that could be meant."""
+    try:
+        value = float(engine.step_noise(settings))
+    except Exception:  # a plug-in may break in any way, and its ride is done
+        return ROUND_OFF
+    return value if np.isfinite(value) and value >= 0 else ROUND_OFF
 
 
 def judge(plan: Plan, measured: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:

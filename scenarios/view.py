@@ -6,6 +6,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+from reports.consistency import follow
 from reports.fall import as_shown
 
 from .error import ScenarioError
@@ -118,7 +119,8 @@ def stored_page(folder: Path) -> str:
     _, scenario = load_scenario(str(part(folder, "scenario.toml")))
     try:
         where = scenario.make_bicycle(), scenario.surface.make()
-        runs = {name: as_shown(ride(folder, manifest, measured, name), *where) for name in measured}
+        rides = {name: follow(ride(folder, manifest, measured, name), *where) for name in measured}
+        runs = {name: as_shown(one, *where) for name, one in rides.items()}
         verdicts = manifest.get("verdicts", [])
         return page(manifest, scenario.model_dump(), measured, verdicts, runs, where[1])
     except ScenarioError:

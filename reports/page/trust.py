@@ -13,6 +13,8 @@ MEANINGS = {
     "position_error": "Largest distance of the point D, on the steering axis, from where the reference has it at the "
     "same time.",
     "orientation_error": "Largest angle between the rear frame and the reference's.",
+    "rate_error": "Largest difference of any of the nine rates from the reference's: rates of D relative to its "
+    "largest speed, the others to the largest angular rate.",
     "contact_force_error": "Largest difference of a contact force from the reference's, relative to the largest force "
     "that the reference needs.",
     "radius_drift_rate": "Slope of the distance from the bowl's axis, less the reference's: does the circle widen or "

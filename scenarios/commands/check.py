@@ -71,7 +71,8 @@ def check_command(
         if absent:
             raise ScenarioError(f"no baseline written: {absent[0].engine} {absent[0].reason}")
         written = [str(path) for path in gate.update(fresh, verdicts, reason, baselines)]
-    passes = update or all(verdict.passes for _, verdict in verdicts)
+    refused = gate.refused(verdicts) if update else []
+    passes = not refused if update else all(verdict.passes for _, verdict in verdicts)
     if as_json:
         rows = [{"scenario": name} | verdict.as_json() for name, verdict in verdicts]
         print_json({"passes": passes, "updated": written, "verdicts": rows})
@@ -79,6 +80,9 @@ def check_command(
         present.show_verdicts(console, verdicts, renewed=update)
         for path in written:
             console.print(f"baseline written: {path}", soft_wrap=True)
+        for name, verdict in refused:
+            line = f"no baseline written of {verdict.engine} on {name}: {verdict.reason}"
+            console.print(line, style="red", markup=False, highlight=False, soft_wrap=True)
     if not passes:
         raise typer.Exit(1)
 

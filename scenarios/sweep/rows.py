@@ -27,13 +27,15 @@ METRICS: dict[str, pa.DataType] = {
     "size": pa.float64(),
     **dict.fromkeys(_ERRORS, pa.float64()),
     **dict.fromkeys(
-        ("rear_rate_error", "contact_force_error", "contact_force_error_at", "settled_force_error"), pa.float64()
+        ("rate_error", "rear_rate_error", "contact_force_error", "contact_force_error_at", "settled_force_error"),
+        pa.float64(),
     ),
     **dict.fromkeys(("radius_drift_rate", "phase_drift_rate", "rear_rate_drift_rate"), pa.float64()),
     **dict.fromkeys(("energy_drift", "energy_drift_rate", "energy_variation"), pa.float64()),
     **dict.fromkeys(("max_gap", "max_slip", "mean_slip"), pa.float64()),
     **dict.fromkeys(("required_friction", "friction", "friction_left_at", "min_normal_force"), pa.float64()),
     "not_finite": pa.string(),
+    "inconsistent_reports": pa.string(),
     "steps": pa.int64(),
     "unconverged_steps": pa.int64(),
     "largest_residual": pa.float64(),
@@ -63,7 +65,7 @@ def flat(metrics: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(value, Mapping):
             found |= {f"{name}_{part}": number for part, number in value.items()}
         elif isinstance(value, list):
-            found[name] = ", ".join(value) or None
+            found[name] = ", ".join(part if isinstance(part, str) else part["quantity"] for part in value) or None
         else:
             found[name] = value
     return found

@@ -15,7 +15,7 @@ import numpy as np
 from engines.admission import ride
 from engines.engine import REFERENCE, Engine, Settings, Trajectory
 from scenarios.error import ScenarioError
-from scenarios.runner import configure, measure_one, why_failed
+from scenarios.runner import claimed_noise, configure, measure_one, why_failed
 from scenarios.scenario import OF_THE_MOTION, Scenario, validate
 from scenarios.start import Start, make_start
 from scenarios.table import placed
@@ -91,7 +91,8 @@ class Tasks:
             return facts | _broken(error)
         finally:
             timing["engine_time"] = time.process_time() - begin
-        measured = flat(measure_one(start, trajectory, None if isinstance(reference, str) else reference))
+        known = None if isinstance(reference, str) else reference
+        measured = flat(measure_one(start, trajectory, known, step_noise=claimed_noise(engine, settings)))
         timing |= {key: measured.get(key) for key in ("cpu_time", "real_time_factor")}
         facts |= {key: measured.get(key) for key in METRICS if key not in facts}
         reason = f"nothing to compare with: the reference: {reference}" if isinstance(reference, str) else None

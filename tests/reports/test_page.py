@@ -389,9 +389,9 @@ def test_bounds_of_the_reference_are_rounded_up():
 
 
 def test_a_fall_is_said_where_the_figures_count_a_sample_more():
-    lying = RUNS["one"].body_position.copy()
-    lying[200:, 0, 2] = 0.0
-    fallen = made({REFERENCE: RUNS[REFERENCE], "one": replace(RUNS["one"], body_position=lying)})
+    lying = RUNS["one"].q.copy()
+    lying[200:, 2] -= 1.0
+    fallen = made({REFERENCE: RUNS[REFERENCE], "one": replace(RUNS["one"], q=lying)})
     words = "What fell (one) is drawn up to the first sample after its fall"
     assert words in " ".join(fallen.split())
     assert "What fell" not in made()

@@ -1,12 +1,15 @@
-"""An engine with one thing changed: what it is given, what it gives, or how it breaks."""
+"""An engine with one thing changed: what it is given, what it gives, how it breaks, or what it says of itself."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from engines.engine import Engine, Problem, Progress, Settings, Trajectory
+from reference.kinematics import REAR_ANGLE
 
 
 @dataclass(frozen=True)
@@ -20,15 +23,18 @@ class Altered:
         Applied to the problem.
     after : callable, optional
         Applied to the trajectory; it may raise.
+    called : str, optional
+        Another name, to ride beside the engine itself.
     """
 
     inner: Engine
     before: Callable[[Problem], Problem] = lambda problem: problem
     after: Callable[[Trajectory], Trajectory] = lambda trajectory: trajectory
+    called: str = ""
 
     @property
     def name(self) -> str:
-        return self.inner.name
+        return self.called or self.inner.name
 
     @property
     def version(self) -> str:
@@ -49,7 +55,8 @@ class Altered:
         return self.inner.step_noise(settings)
 
     def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
-        return self.after(self.inner.simulate(self.before(problem), settings, progress))
+        trajectory = self.after(self.inner.simulate(self.before(problem), settings, progress))
+        return replace(trajectory, engine=self.name)
 
 
 def raising(error: BaseException) -> Callable[[Trajectory], Trajectory]:
@@ -59,3 +66,55 @@ def raising(error: BaseException) -> Callable[[Trajectory], Trajectory]:
         raise error
 
     return fail
+
+
+def with_fields(**changes: Callable[[np.ndarray], np.ndarray]) -> Callable[[Trajectory], Trajectory]:
+    """An `after` that changes fields of the trajectory."""
+
+    def changed(trajectory: Trajectory) -> Trajectory:
+        return replace(trajectory, **{name: change(getattr(trajectory, name)) for name, change in changes.items()})
+
+    return changed
+
+
+def _late(values: np.ndarray) -> np.ndarray:
+    """One sample late."""
+    return np.concatenate([values[:1], values[:-1]])
+
+
+def _faster_wheel(qd: np.ndarray) -> np.ndarray:
+    return qd * np.where(np.arange(9) == REAR_ANGLE, 1.001, 1.0)
+
+
+def _late_rates(trajectory: Trajectory) -> Trajectory:
+    """Rates half a millisecond late, as a leapfrog method has them."""
+    change = np.gradient(trajectory.qd, trajectory.time, axis=0, edge_order=2)
+    return replace(trajectory, qd=trajectory.qd - 0.5e-3 * change)
+
+
+_OTHER_WHEEL = [0, 1, 3, 2]
+# What an engine may say wrongly of itself while its coordinates are exact, and the reports to be named.
+CONTRADICTIONS: dict[str, tuple[Callable[[Trajectory], Trajectory], set[str]]] = {
+    "rear rate x 1.001": (with_fields(qd=_faster_wheel), {"qd", "slip", "kinetic_energy"}),
+    "rates half a step late": (_late_rates, {"qd", "slip", "kinetic_energy"}),
+    "bodies 1 mm high": (with_fields(body_position=lambda p: p + np.array([0, 0, 1e-3])), {"body_position"}),
+    "wheels swapped": (
+        with_fields(
+            body_position=lambda p: p[:, _OTHER_WHEEL],
+            body_quaternion=lambda q: q[:, _OTHER_WHEEL],
+            contact_point=lambda p: p[:, ::-1],
+        ),
+        {"body_position", "body_quaternion", "contact_point"},
+    ),
+    "late energies": (
+        with_fields(kinetic_energy=_late, potential_energy=_late),
+        {"kinetic_energy", "potential_energy"},
+    ),
+    "late contact points": (with_fields(contact_point=_late), {"contact_point"}),
+    "contact points mirrored": (with_fields(contact_point=lambda p: p * np.array([1, -1, 1])), {"contact_point"}),
+    "slip in mm/s off": (with_fields(slip=lambda s: s + 1e-3), {"slip"}),
+    "gap 1 mm off": (with_fields(gap=lambda g: g + 1e-3), {"gap"}),
+    "quaternions x, y, z, w": (with_fields(body_quaternion=lambda q: q[..., [1, 2, 3, 0]]), {"body_quaternion"}),
+    "kinetic energy 1 J off": (with_fields(kinetic_energy=lambda e: e + 1.0), {"kinetic_energy"}),
+    "potential energy 1 J off": (with_fields(potential_energy=lambda e: e + 1.0), {"potential_energy"}),
+}

@@ -8,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ from gating import (
     failing,
     measure_rides_only,
     set_to,
-    verdicts_of,
     verdicts_on,
 )
 from numba import cfunc
@@ -31,12 +29,11 @@ from engines.engine import Engine, EngineError, Problem, Settings, Trajectory, e
 from engines.exudyn import joint
 from engines.mujoco import compiled
 from reference.kinematics import LEAN, PITCH, STEER
-from reports.drift import RIDE_QUANTITIES, Verdict
-from scenarios import gate, gate_sample
+from reports.drift import ABSOLUTE, RIDE_QUANTITIES, Verdict
+from scenarios import gate
 from scenarios.error import ScenarioError
 from scenarios.runner import configure
-from scenarios.scenario import LIBRARY, Scenario
-from scenarios.start import Start, make_start
+from scenarios.scenario import LIBRARY
 
 NAMES = engine_names()
 GATED = [("q2", name) for name in NAMES if name != "exudyn-builtin"] + [("plane-circle", name) for name in NAMES]
@@ -97,6 +94,9 @@ def test_round_off_of_the_start_stays_far_inside_the_limits(name: str) -> None:
         return replace(problem, q=problem.q * noise[0], qd=problem.qd * noise[1])
 
     for verdict in verdicts_on(name, altered(before=shaken)):
+        if verdict.quantity in ABSOLUTE:  # no move: it holds what the engine's own error leaves
+            assert verdict.passes
+            continue
         assert verdict.share is not None
         assert verdict.share < (0.5 if name in ("reference", "mujoco-multipliers") else 0.1), verdict.quantity
 

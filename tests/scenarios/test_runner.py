@@ -23,12 +23,20 @@ from scenarios.scenario import load_scenario
 
 NATIVE = "mujoco-native"
 METRICS = {
-    *("position_error", "orientation_error", "rear_rate_error", "contact_force_error", "contact_force_error_at"),
+    *(
+        "position_error",
+        "orientation_error",
+        "rate_error",
+        "rear_rate_error",
+        "contact_force_error",
+        "contact_force_error_at",
+    ),
     *("radius_drift_rate", "phase_drift_rate", "rear_rate_drift_rate"),
     *("energy_drift", "energy_drift_rate", "energy_variation", "max_gap", "max_slip", "mean_slip"),
     *(
         "settled_force_error",
         "not_finite",
+        "inconsistent_reports",
         "required_friction",
         "friction",
         "friction_left_at",
