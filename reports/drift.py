@@ -1,7 +1,7 @@
 """The drift gate: what engines measure on a gated scenario against their baselines, and the verdict.
 
-A baseline holds what each engine measured on a circular motion, whose exact solution is known; what it may
-move by is derived in `reports.limits`. Drift rates are held with their signs, and a move to smaller values is
+A baseline holds what each engine measured against the exact ride; what it may move by is derived in
+`reports.limits`. Drift rates are held with their signs, and a move to smaller values is
 no excuse while version and settings are the baseline's: a fault may well cancel part of an engine's own error.
 """
 
@@ -26,10 +26,14 @@ RIDE_QUANTITIES = (
     "report_mismatch",
     "contact_force_error",
     "settled_force_error",
+    "rms_force_error",
     "fell_at",
     "steps",
 )
 
+# Shown beside them: the friction follows from the forces, which are judged; the CPU time, relative to the reference's
+# in the same run, depends on the machine.
+SHOWN = ("required_friction", "cpu_ratio")
 
 # Why an order may not be seen; of another version that is an improvement.
 BELOW_NOISE = "the errors of its steps cannot be told from what its iterations leave"
@@ -43,6 +47,10 @@ ABSOLUTE = ("report_mismatch",)
 _MORE_IS_BETTER = ("fell_at", "observed_order")
 # Another number of steps is another computation, be it better or worse.
 _NEITHER = ("steps",)
+# Judged only if asked for: the CPU time of several rides, relative to the reference's.
+HELD_CPU = "held_cpu_ratio"
+# Less of it hides no fault.
+_NEVER_TOO_SMALL = (HELD_CPU,)
 
 
 @dataclass(frozen=True)
@@ -56,7 +64,8 @@ class Verdict:
         The value holds within baseline +- limit; without a baseline, within the limit of 0.
     status : str
         ``holds``, ``worse`` (an error larger beyond the limit, an earlier fall, a lower order), ``better`` (the
-        opposite, with another version or other settings), ``changed`` (otherwise moved) or ``missing``.
+        opposite, with another version or other settings), ``changed`` (otherwise moved), ``missing`` or ``shown``
+        (not judged).
     reason : str
         One line for a reader.
     """
@@ -72,12 +81,17 @@ class Verdict:
     @property
     def passes(self) -> bool:
         """Whether the gate stays open."""
-        return self.status in ("holds", "better")
+        return self.status in ("holds", "better", "shown")
+
+    @property
+    def moved(self) -> bool:
+        """Whether it was judged and does not hold."""
+        return self.status not in ("holds", "shown")
 
     @property
     def told(self) -> bool:
         """Whether a reader is told of it in words: of what moved, and of other settings or another version."""
-        return self.status != "holds" or self.quantity == CHANGES
+        return self.moved or self.quantity == CHANGES
 
     @property
     def share(self) -> float | None:
@@ -148,7 +162,17 @@ def judge(
         move = f"{before:.6g} -> {value:.6g}, limit {limit:.2g}"
         reason = move if status == "holds" else f"{move}; {since}"
         verdicts.append(Verdict(engine, quantity, value, before, limit, status, reason))
-    return verdicts
+    return verdicts + [
+        _shown(engine, quantity, value, baseline["quantities"].get(quantity))
+        for quantity in SHOWN
+        if quantity not in allowed and (value := values.get(quantity)) is not None
+    ]
+
+
+def _shown(engine: str, quantity: str, value: float, before: float | None) -> Verdict:
+    """Verdict on a quantity that is not judged: it passes."""
+    reason = f"{value:.3g}" if before is None else f"{before:.3g} -> {value:.3g}"
+    return Verdict(engine, quantity, value, before, None, "shown", f"{reason}, not judged")
 
 
 def _absolute(
@@ -179,7 +203,7 @@ def _fall(engine: str, value: float | None, before: float | None, since: str, ex
 
 def _status(quantity: str, value: float, before: float, limit: float, excused: bool) -> str:
     """Status of a value; ``excused`` where another version or other settings may have improved it."""
-    if abs(value - before) <= limit:
+    if abs(value - before) <= limit or (quantity in _NEVER_TOO_SMALL and value < before):
         return "holds"
     if quantity in _NEITHER:
         return "changed"

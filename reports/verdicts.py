@@ -11,7 +11,7 @@ from .markdown import escaped, printable
 
 Verdicts = Sequence[tuple[str, Verdict]]
 # What a reader must see first.
-_WORST_FIRST = ("missing", "worse", "changed", "better", "holds")
+_WORST_FIRST = ("missing", "worse", "changed", "better", "holds", "shown")
 
 
 UNFINISHED_MARKDOWN = "# Drift gate: not finished\n\nThe check has not come to its verdicts.\n"
@@ -71,7 +71,8 @@ def markdown_page(verdicts: Verdicts) -> str:
     """
     passes = all(verdict.passes for _, verdict in verdicts)
     held = sum(verdict.status == "holds" for _, verdict in verdicts)
-    lines = [f"# Drift gate: {'holds' if passes else 'fails'}", "", f"{held} of {len(verdicts)} quantities hold.", ""]
+    judged = sum(verdict.status != "shown" for _, verdict in verdicts)
+    lines = [f"# Drift gate: {'holds' if passes else 'fails'}", "", f"{held} of {judged} quantities hold.", ""]
     ordered = sorted(verdicts, key=lambda item: _WORST_FIRST.index(item[1].status))
     moved = [(name, one) for name, one in ordered if one.told]
     for name, verdict in moved:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import partial
+from functools import cache, partial
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -18,19 +19,19 @@ from reports.drift import ABSOLUTE, CHANGES, Verdict, judge, missing
 
 from .error import ScenarioError
 from .files import make_folder, write_json
+from .gate_exact import find_exact
 from .gate_sample import SHORT_HORIZON, sample
 from .installed import installed
 from .run_folder import library_versions
 from .runner import Trace, Watch, configure
-from .scenario import OF_THE_MOTION, Scenario, library_names, load_scenario
+from .scenario import OF_THE_MOTION, Gate, Scenario, Simulation, library_names, load_scenario
 from .start import make_start
 from .stored import read_json
-from .table import one_line, shown
+from .table import one_line, read_toml, shown
 
 BASELINES = Path(next(iter(reports.__path__))) / "baselines"
 GATED_TAG = "gated"
-DURATION = 3.0  # a turn of q2 and a bit: seconds of work in the slowest engine
-OUTPUT_RATE = 50.0  # an interval that doubled steps divide as well: a coarser step is judged, not refused
+_SETTINGS = files("scenarios") / "gate.toml"
 
 
 class _Entry(BaseModel):
@@ -51,7 +52,8 @@ class _Baseline(BaseModel):
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
     scenario: str | None = None
-    duration: float = DURATION
+    duration: float = Gate.model_fields["duration"].default
+    output_rate: float = Gate.model_fields["output_rate"].default
     short_horizon: float = SHORT_HORIZON
     content: dict[str, Any] | None = None
     engines: dict[str, _Entry]
@@ -65,6 +67,12 @@ def gated_names() -> list[str]:
     return [name for name in library_names() if GATED_TAG in load_scenario(name)[1].tags]
 
 
+@cache
+def gate_settings() -> dict[str, dict[str, Any]]:
+    """Engines' settings on gated rides, by engine, where a scenario has no others."""
+    return read_toml(_SETTINGS.read_text(encoding="utf-8"))["engines"]
+
+
 def check(
     watch: Watch,
     sources: Sequence[str] | None = None,
@@ -72,6 +80,7 @@ def check(
     baselines: Path | None = None,
     chosen: Chosen = configure,
     trace: Trace | None = None,
+    hold_cpu: bool = False,
 ) -> tuple[list[tuple[str, Verdict]], dict[str, dict[str, Any]]]:
     """Run the gate.
 
@@ -92,6 +101,8 @@ def check(
         Maps an engine's name and its settings in the scenario to the engine and its settings.
     trace : callable, optional
         Called with an engine that broke and what it raised.
+    hold_cpu : bool
+        Whether an engine's CPU time, relative to the reference's, is judged too.
 
     Returns
     -------
@@ -105,26 +116,36 @@ def check(
         If a scenario or a baseline is none, or an engine is neither installed nor in a baseline.
     """
     folder = BASELINES if baselines is None else baselines
-    changes = {"simulation.duration": DURATION, "simulation.output_rate": OUTPUT_RATE}
-    scenarios = [load_scenario(source, changes) for source in (sources or gated_names())]
-    known = {name: read_baseline(name, folder, content(scenario)) for name, scenario in scenarios}
+    scenarios = [_as_gated(*load_scenario(source)) for source in (sources or gated_names())]
+    known = {name: read_baseline(name, folder, scenario) for name, scenario in scenarios}
     judged = _to_judge(engines, known)
     verdicts: list[tuple[str, Verdict]] = []
     fresh: dict[str, dict[str, Any]] = {}
     for name, scenario in scenarios:
-        held = _hold(name, scenario, judged, known[name], watch, chosen, trace, asked=bool(engines))
+        held = _hold(name, scenario, judged, known[name], watch, chosen, trace, asked=bool(engines), hold_cpu=hold_cpu)
         verdicts += [(name, verdict) for verdict in [*held.verdicts, *_without_verdict(judged, held)]]
-        fresh[name] = {
-            "scenario": name,
-            "duration": DURATION,
-            "short_horizon": SHORT_HORIZON,
-            "content": content(scenario),
-            "libraries": library_versions(),
-            "engines": held.entries,
-        }
+        fresh[name] = {"scenario": name} | _ride(scenario) | {"content": content(scenario)}
+        fresh[name] |= {"libraries": library_versions(), "exact_error": held.exact_error, "engines": held.entries}
     if not verdicts:
         raise ScenarioError("nothing was judged: no engine and no scenario go together")
     return verdicts, fresh
+
+
+def _as_gated(name: str, scenario: Scenario) -> tuple[str, Scenario]:
+    """A scenario as the gate rides it."""
+    gate = scenario.gate or Gate()
+    simulation = Simulation(duration=gate.duration, output_rate=gate.output_rate)
+    return name, scenario.model_copy(update={"gate": gate, "simulation": simulation})
+
+
+def _ride(scenario: Scenario) -> dict[str, float]:
+    """How a gated scenario is ridden: what of it a baseline holds for."""
+    simulation = scenario.simulation
+    return {
+        "duration": simulation.duration,
+        "output_rate": simulation.output_rate,
+        "short_horizon": SHORT_HORIZON,
+    }
 
 
 def _to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -139,11 +160,15 @@ def _to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[str, Any
 
 @dataclass(frozen=True)
 class _Held:
-    """What came of all engines on one scenario: verdicts, entries of a new baseline, engines that were passed over."""
+    """What came of all engines on one scenario.
+
+    Verdicts, entries of a new baseline, engines that were passed over, and the exact ride's own error.
+    """
 
     verdicts: list[Verdict]
     entries: dict[str, Any]
     passed_over: list[str]
+    exact_error: float
 
 
 def _hold(
@@ -155,22 +180,35 @@ def _hold(
     chosen: Chosen,
     trace: Trace | None,
     asked: bool,
+    hold_cpu: bool,
 ) -> _Held:
     """Hold the engines on one scenario against the baseline.
 
     An engine that the motion does not suit is passed over, unless it was ``asked`` for or has a baseline.
     """
     start = make_start(scenario)
-    if start.motion is None:
-        raise ScenarioError(f"{name}: only a circular motion can be gated: its exact solution is known")
-    held = _Held([], {}, [])
+    try:
+        exact = find_exact(start)
+    except ScenarioError as error:
+        raise ScenarioError(f"{name}: {error}") from error
+    gate, duration = scenario.gate or Gate(), scenario.simulation.duration
+    held = _Held([], {}, [], exact.error)
     for engine_name in engines:
         entry = baseline.get(engine_name)
         try:
-            engine, settings = chosen(engine_name, scenario.engines.get(engine_name, {}))
-            known_noise = (entry or {}).get("step_noise")
-            progress = partial(_report, watch, engine_name)
-            found = call_engine(sample, start, engine, settings, progress, known_noise)
+            values = gate_settings().get(engine_name, {}) | scenario.engines.get(engine_name, {})
+            engine, settings = chosen(engine_name, values)
+            found = call_engine(
+                sample,
+                start,
+                exact,
+                gate,
+                engine,
+                settings,
+                watch=partial(_report, watch, engine_name, duration),
+                known_noise=(entry or {}).get("step_noise"),
+                hold_cpu=hold_cpu,
+            )
         except Exception as error:  # an engine that breaks in any way did not run
             if entry is None and not asked and isinstance(error, UnsuitableProblem):
                 held.passed_over.append(engine_name)
@@ -194,8 +232,8 @@ def _hold(
     return held
 
 
-def _report(watch: Watch, engine: str, time: float) -> None:
-    watch(engine, time, DURATION)
+def _report(watch: Watch, engine: str, duration: float, time: float) -> None:
+    watch(engine, time, duration)
 
 
 def _without_verdict(engines: Sequence[str], held: _Held) -> list[Verdict]:
@@ -210,23 +248,24 @@ def content(scenario: Scenario) -> dict[str, Any]:
     return scenario.model_dump(mode="json", exclude_none=True, include={*OF_THE_MOTION})
 
 
-def read_baseline(scenario: str, folder: Path | None = None, motion: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def read_baseline(name: str, folder: Path | None = None, scenario: Scenario | None = None) -> dict[str, Any]:
     """Committed entries of a scenario, by engine; empty where there is no baseline.
 
     Parameters
     ----------
-    scenario : str
+    name : str
+        Of the scenario.
     folder : Path, optional
-    motion : mapping, optional
-        Its `content`, which must be the baseline's.
+    scenario : Scenario, optional
+        As the gate rides it: the baseline must be of the same ride of the same motion.
 
     Raises
     ------
     ScenarioError
-        If the file is damaged, of another scenario, or of a ride of another length.
+        If the file is damaged, of another scenario, or of another ride.
     """
     within = BASELINES if folder is None else folder
-    path = within / f"{scenario}.json"
+    path = within / f"{name}.json"
     if within.exists() and not within.is_dir():
         raise ScenarioError(f"{within}: is no folder of baselines")
     if not path.exists():
@@ -239,14 +278,15 @@ def read_baseline(scenario: str, folder: Path | None = None, motion: Mapping[str
     except ValueError as error:
         why = one_line(error) if isinstance(error, ValidationError) else " ".join(str(error).split())
         raise ScenarioError(f"{path}: not a baseline: {why}") from error
-    if found.scenario not in (None, scenario):
-        raise ScenarioError(f"{path}: not the baseline of {scenario} but of {shown(repr(found.scenario))}")
-    for name, value in (("duration", DURATION), ("short_horizon", SHORT_HORIZON)):
-        if getattr(found, name) != value:
-            came = getattr(found, name)
-            raise ScenarioError(f"{path}: not a baseline of this gate: its {name} is {came!r} s, not {value!r} s")
-    if motion is not None and found.content not in (None, motion):
-        raise ScenarioError(f"{path}: not the baseline of this {scenario}: its motion, ground or bicycle is another")
+    if found.scenario not in (None, name):
+        raise ScenarioError(f"{path}: not the baseline of {name} but of {shown(repr(found.scenario))}")
+    if scenario is None:
+        return data["engines"]
+    for field, value in _ride(scenario).items():
+        if (came := getattr(found, field)) != value:
+            raise ScenarioError(f"{path}: not a baseline of this ride: its {field} is {came!r}, not {value!r}")
+    if found.content not in (None, content(scenario)):
+        raise ScenarioError(f"{path}: not the baseline of this {name}: its motion, ground or bicycle is another")
     return data["engines"]
 
 
@@ -288,7 +328,7 @@ def update(
         entries = {engine: entry for engine, entry in baseline["engines"].items() if (name, engine) not in out}
         if baseline["engines"] and not entries:
             continue
-        moved = [verdict for scenario, verdict in verdicts if scenario == name and verdict.status != "holds"]
+        moved = [verdict for scenario, verdict in verdicts if scenario == name and verdict.moved]
         kept = {engine: entry for engine, entry in read_baseline(name, folder).items() if engine in there}
         words = reason or "; ".join(f"{v.engine}: {v.quantity}: {v.status}" for v in moved) or "nothing moved"
         paths.append(folder / f"{name}.json")

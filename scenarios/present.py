@@ -23,6 +23,7 @@ from reference.families import find_motion
 from reference.kinematics import YAW
 from reference.stability import growth_rate, linearise
 from reference.surface import Surface
+from reports.drift import SHOWN
 from reports.summary import COLUMNS, cell, remarks, verdict_line
 
 from .error import ScenarioError
@@ -65,7 +66,7 @@ class Progress:
         """Show that an engine has reached a simulated time."""
         if engine not in self._tasks:
             self._tasks[engine] = self._bars.add_task(engine, total=duration)
-        self._bars.update(self._tasks[engine], completed=time)
+        self._bars.update(self._tasks[engine], completed=time, total=duration)
 
     def note(self, line: str) -> None:
         """Say a line without disturbing the bars."""
@@ -341,7 +342,14 @@ def _precision_lines(entry: Mapping[str, Any]) -> Iterator[str]:
         yield f"its own eigenvalues: {found['error']:.2g} 1/s from the reference's at the most"
 
 
-STATUS_STYLES = {"holds": "green", "better": "cyan", "changed": "red", "worse": "red", "missing": "red"}
+STATUS_STYLES = {
+    "holds": "green",
+    "shown": "green",
+    "better": "cyan",
+    "changed": "red",
+    "worse": "red",
+    "missing": "red",
+}
 
 
 def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed: bool = False) -> None:
@@ -353,6 +361,8 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed
         console.print(name, style="bold", markup=False)
         table = Table("engine", box=None, pad_edge=False)
         table.add_column("hold", justify="right")
+        table.add_column("friction\nneeded", justify="right")
+        table.add_column("CPU time,\nreference 1", justify="right")
         table.add_column("moved most, against its limit")
         for engine, rows in groupby((verdict for _, verdict in group), key=lambda verdict: verdict.engine):
             table.add_row(*_engine_row(engine, list(rows)))
@@ -367,12 +377,15 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed
     console.print("the gate holds" if passes else "the gate fails", style="bold green" if passes else "bold red")
 
 
-def _engine_row(engine: str, verdicts: list[Verdict]) -> tuple[str, Text, str]:
+def _engine_row(engine: str, verdicts: list[Verdict]) -> tuple[str, Text, str, str, str]:
     held = sum(verdict.status == "holds" for verdict in verdicts)
+    judged = sum(verdict.status != "shown" for verdict in verdicts)
     passes = all(verdict.passes for verdict in verdicts)
     shares = {verdict.quantity: share for verdict in verdicts if (share := verdict.share) is not None}
     moved = "nothing moved" if shares else "–"
     if any(shares.values()):
         most = max(shares, key=lambda quantity: shares[quantity])
         moved = f"{most}, {shares[most]:.2g}"
-    return engine, Text(f"{held} of {len(verdicts)}", "green" if passes else "red"), moved
+    values = {verdict.quantity: verdict.value for verdict in verdicts}
+    friction, cpu = ("–" if (value := values.get(name)) is None else f"{value:.2g}" for name in SHOWN)
+    return engine, Text(f"{held} of {judged}", "green" if passes else "red"), friction, cpu, moved

@@ -83,6 +83,17 @@ class Simulation(Table):
         return self
 
 
+class Gate(Simulation):
+    """How the drift gate rides a scenario, and what it measures beside the ride."""
+
+    # Seconds of work in the slowest engine.
+    duration: float = Field(default=3.0, gt=0, le=1e5, description="[s]")
+    # An interval that doubled steps divide as well: a coarser step is judged, not refused.
+    output_rate: float = Field(default=50.0, gt=0, le=1e5, description="[1/s]")
+    order: bool = Field(default=True, description="measure the order of convergence")
+    eigenvalues: bool = Field(default=True, description="measure the engine's own eigenvalues, of a circular motion")
+
+
 class Criterion(Table):
     """A verdict that a benchmark asks of every engine."""
 
@@ -98,6 +109,7 @@ class Scenario(Table):
     motion: Annotated[CircularTable | UprightTable, Field(discriminator="kind")]
     perturbation: Perturbation = Perturbation()
     simulation: Simulation
+    gate: Gate | None = None
     criterion: Criterion | None = None
     bicycle: dict[str, _Moderate] = Field(default_factory=dict)
     engines: dict[str, dict[str, Any]] = Field(default_factory=dict)

@@ -28,6 +28,14 @@ def check_command(
     baselines: Annotated[Path | None, typer.Option(help="Folder of the baselines instead of the suite's own.")] = None,
     update: Annotated[bool, typer.Option("--update", help="Write this run's values as the new baselines.")] = False,
     reason: Annotated[str | None, typer.Option(help="Why, for the new baselines; what moved if not given.")] = None,
+    hold_cpu: Annotated[
+        bool,
+        typer.Option(
+            "--hold-cpu",
+            help="Judge CPU times too: relative to the reference's in the same run, an engine's may at most double. "
+            "The baselines must have been written with this option, on the same machine.",
+        ),
+    ] = False,
     junit: Annotated[Path | None, typer.Option(help="Write the verdicts as JUnit XML.")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Write the verdicts as Markdown, worst first.")] = None,
     traceback: ShowTraceback = False,
@@ -53,7 +61,9 @@ def check_command(
     unfinished = _unfinished({junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN})
     with showing_traceback(traceback), unfinished, present.Progress() as progress:
         trace = print_traceback if traceback else None
-        verdicts, fresh = gate.check(progress.watch, scenario, engine, baselines, configure, trace)
+        verdicts, fresh = gate.check(
+            progress.watch, scenario, engine, baselines, configure, trace=trace, hold_cpu=hold_cpu
+        )
     for path, page in files:
         if path is not None:
             write_text(path, page(verdicts))

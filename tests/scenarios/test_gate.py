@@ -8,13 +8,21 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from altered import Altered, raising
+from gating import (
+    Chosen,
+    altered,
+    compute_starts_once,
+    failing,
+    measure_rides_only,
+    set_to,
+    verdicts_on,
+)
 from numba import cfunc
 
 from engines.engine import Engine, EngineError, Problem, Settings, Trajectory, engine_names
@@ -22,11 +30,10 @@ from engines.exudyn import joint
 from engines.mujoco import compiled
 from reference.kinematics import LEAN, PITCH, STEER
 from reports.drift import ABSOLUTE, RIDE_QUANTITIES, Verdict
-from scenarios import gate, gate_sample
+from scenarios import gate
 from scenarios.error import ScenarioError
 from scenarios.runner import configure
-from scenarios.scenario import LIBRARY, Scenario
-from scenarios.start import Start, make_start
+from scenarios.scenario import LIBRARY
 
 NAMES = engine_names()
 GATED = [("q2", name) for name in NAMES if name != "exudyn-builtin"] + [("plane-circle", name) for name in NAMES]
@@ -38,50 +45,16 @@ FIXED_STEP = {
     "mujoco-multipliers": 0.004,
     "mujoco-native": 0.004,
 }  # twice their baselines'
-Chosen = Callable[[str, Mapping[str, Any]], tuple[Engine, Settings]]
-
-
-@cache
-def starting(scenario: str) -> Start:
-    return make_start(Scenario.model_validate_json(scenario))
 
 
 @pytest.fixture(autouse=True)
 def one_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compute the gated motions once: it is the engines that are altered."""
-    monkeypatch.setattr(gate, "make_start", lambda scenario: starting(scenario.model_dump_json()))
+    compute_starts_once(monkeypatch)
 
 
 @pytest.fixture
 def rides_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Measure the ride alone: orders and eigenvalues take the longest, and faults must show without them."""
-    monkeypatch.setattr(gate_sample, "_order", lambda *_: ({}, {}))
-    monkeypatch.setattr(gate_sample, "_eigenvalues", lambda *_: {})
-
-
-def verdicts_on(engine: str, chosen: Chosen = configure, scenario: str = "q2") -> list[Verdict]:
-    verdicts, _ = gate.check(lambda *_: None, [scenario], [engine], chosen=chosen)
-    assert {(name, verdict.engine) for name, verdict in verdicts} == {(scenario, engine)}
-    return [verdict for _, verdict in verdicts]
-
-
-def altered(
-    before: Callable[[Problem], Problem] = lambda problem: problem,
-    after: Callable[[Trajectory], Trajectory] = lambda trajectory: trajectory,
-) -> Chosen:
-    def chosen(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
-        engine, settings = configure(name, values)
-        return Altered(engine, before, after), settings
-
-    return chosen
-
-
-def set_to(**changes: Any) -> Chosen:
-    return lambda name, values: configure(name, {**values, **changes})
-
-
-def failing(verdicts: list[Verdict]) -> set[str]:
-    return {verdict.quantity for verdict in verdicts if not verdict.passes}
+    measure_rides_only(monkeypatch)
 
 
 @pytest.mark.parametrize(("scenario", "name"), GATED)

@@ -1,0 +1,113 @@
+"""Engines that are altered on their way to the gate, and the gate's verdicts on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from altered import Altered
+
+from engines.engine import Engine, Problem, Progress, Settings, Trajectory
+from reports.drift import Verdict
+from scenarios import gate, gate_sample
+from scenarios.gate_exact import Exact, find_exact
+from scenarios.runner import configure
+from scenarios.scenario import Scenario
+from scenarios.start import Start, make_start
+
+Chosen = Callable[[str, Mapping[str, Any]], tuple[Engine, Settings]]
+Simulate = Callable[[Engine, Problem, Any, Progress], Trajectory]
+
+
+@cache
+def _starting(scenario: str) -> tuple[Start, Exact]:
+    start = make_start(Scenario.model_validate_json(scenario))
+    return start, find_exact(start)
+
+
+def compute_starts_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compute the gated motions once: it is the engines that are altered."""
+    exact = {}
+
+    def start_of(scenario: Scenario) -> Start:
+        start, found = _starting(scenario.model_dump_json())
+        exact[id(start)] = found
+        return start
+
+    monkeypatch.setattr(gate, "make_start", start_of)
+    monkeypatch.setattr(gate, "find_exact", lambda start: exact[id(start)])
+
+
+def measure_rides_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measure the ride alone: orders and eigenvalues take the longest, and faults must show without them."""
+    monkeypatch.setattr(gate_sample, "_order", lambda *_: ({}, {}))
+    monkeypatch.setattr(gate_sample, "_eigenvalues", lambda *_: {})
+
+
+def verdicts_of(
+    engine: str,
+    chosen: Chosen = configure,
+    scenarios: Sequence[str] | None = None,
+    baselines: Path | None = None,
+    **options: Any,
+) -> dict[str, list[Verdict]]:
+    """Verdicts on an engine by scenario; on all that are gated if none is named."""
+    verdicts, _ = gate.check(lambda *_: None, scenarios, [engine], baselines, chosen, **options)
+    assert {verdict.engine for _, verdict in verdicts} == {engine}
+    found: dict[str, list[Verdict]] = {}
+    for name, verdict in verdicts:
+        found.setdefault(name, []).append(verdict)
+    return found
+
+
+def verdicts_on(engine: str, chosen: Chosen = configure, scenario: str = "q2") -> list[Verdict]:
+    """Verdicts on an engine in one scenario."""
+    return verdicts_of(engine, chosen, [scenario])[scenario]
+
+
+def failing(verdicts: Sequence[Verdict]) -> set[str]:
+    """Quantities that close the gate."""
+    return {verdict.quantity for verdict in verdicts if not verdict.passes}
+
+
+def altered(
+    before: Callable[[Problem], Problem] = lambda problem: problem,
+    after: Callable[[Trajectory], Trajectory] = lambda trajectory: trajectory,
+) -> Chosen:
+    """An engine with another problem, or another trajectory."""
+
+    def chosen(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
+        engine, settings = configure(name, values)
+        return Altered(engine, before, after), settings
+
+    return chosen
+
+
+@dataclass(frozen=True)
+class _Simulated(Altered):
+    """An engine whose `simulate` is another."""
+
+    replaced: Simulate | None = None
+
+    def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
+        assert self.replaced is not None
+        return self.replaced(self.inner, problem, settings, progress)
+
+
+def simulated(simulate: Simulate) -> Chosen:
+    """An engine that computes its trajectory in another way, and says nothing of it."""
+
+    def chosen(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
+        engine, settings = configure(name, values)
+        return _Simulated(engine, replaced=simulate), settings
+
+    return chosen
+
+
+def set_to(**changes: Any) -> Chosen:
+    """An engine with other settings."""
+    return lambda name, values: configure(name, {**values, **changes})
