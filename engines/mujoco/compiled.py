@@ -15,6 +15,9 @@ prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `correct`
 
 and applies Jp^T F; s is a rate of stabilisation, which on the constraints adds nothing.
 
+`watch` looks on: what MuJoCo's solver makes of one evaluation is judged when the next one begins, which is the first
+moment after it that a callback sees (`convergence` says what it is judged by). `correct` does so too.
+
 What the callbacks work on is one `BLACKBOARD` a process: numbers, and addresses of arrays that stay where
 they are while a model lives. Its own address comes from a function that the linker resolves, so that the
 code can be kept on disk. All of it is in one file, because a changed file is what renews numba's cache.

@@ -67,9 +67,10 @@ class Convergence:
         return int(compiled.board["unconverged"][0])
 
     @property
-    def largest(self) -> float:
-        """Largest relative residual."""
-        return float(compiled.board["largest_residual"][0])
+    def largest(self) -> float | None:
+        """Largest relative residual; None where no solver was judged."""
+        residual = float(compiled.board["largest_residual"][0])
+        return residual if residual >= 0 else None
 
     @property
     def wrong(self) -> tuple[int, float] | None:
@@ -97,9 +98,9 @@ def judged(model: mujoco.MjModel, data: mujoco.MjData, converged_below: float) -
     board["kept_M"], board["M_entries"], board["speeds"] = kept.ctypes.data, len(kept), model.nv
     board["evaluations_per_step"] = 4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1
     board["converged_below"], board["wrong_above"] = converged_below, WRONG
-    for name in ("pending", "evaluations", "since_step", "unconverged", "largest_residual", "wrong_residual"):
+    for name in ("pending", "evaluations", "since_step", "unconverged", "wrong_residual"):
         board[name] = 0
-    board["last_unconverged"] = board["wrong_step"] = -1
+    board["last_unconverged"] = board["wrong_step"] = board["largest_residual"] = -1
     board["model"], board["data"] = model._address, data._address
     try:
         yield Convergence()

@@ -2,7 +2,8 @@
 
 Distance, point and normal of each contact are exact in every stage of the integrator, and the reference
 accelerations get the contact's own acceleration, which MuJoCo leaves out (`knife_edge`). Friction cone,
-lift-off and solver are MuJoCo's own. What is left is the softness of the rows, a slip of R F / b.
+lift-off and solver are MuJoCo's own; the solver starts where wheels neither slide nor lift off, and what it leaves
+is looked at in every evaluation (`convergence`). What is left is the softness of the rows, a slip of R F / b.
 """
 
 from __future__ import annotations

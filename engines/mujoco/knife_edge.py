@@ -13,6 +13,9 @@ exact point of closest approach, with the exact normal, in every stage of every 
 reference accelerations get the contact's own acceleration, which they lack; solver, friction cone and
 lift-off stay MuJoCo's own. The plane is only a name for the ground, wherever it lies.
 
+MuJoCo's solver starts, in every evaluation, from the forces of wheels that neither slide nor lift off. Where it
+stops at forces that are wrong, the block ends with an error (`convergence`).
+
 MuJoCo's rows stay soft, if only by the factor (1 - impedance) / impedance: a force F on a row leaves
 
     slip = R F / b,    gap = R F / k
