@@ -3,7 +3,7 @@ BIN := .venv/bin
 # The stamp's time is that of the last set-up: a changed list of packages sets up again.
 STAMP := .venv/set-up
 
-.PHONY: run test test-all lint check
+.PHONY: run test test-all test-machines test-machines-short lint check
 
 run: $(STAMP)
 	$(BIN)/velodrome run q2-plus
@@ -13,6 +13,13 @@ test: $(STAMP)
 
 test-all: $(STAMP)
 	$(BIN)/python -m pytest -m ""
+
+# The tests that round-off could sway, as other CPUs would run them.
+test-machines: $(STAMP)
+	$(BIN)/python -m tests.machines
+
+test-machines-short: $(STAMP)
+	$(BIN)/python -m tests.machines --short
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
