@@ -249,7 +249,7 @@ def _integrals(time: np.ndarray, values: np.ndarray, samples: int) -> np.ndarray
     nodes = (time[nearest] - time[:-1, None]) / interval[:, None]
     moments = 1 / np.arange(1, samples + 1)
     # On an even grid all stencils but those at the ends are one.
-    kinds, kind = np.unique(np.round(nodes, 9), axis=0, return_inverse=True)
-    powers = kinds[:, None, :] ** np.arange(samples)[:, None]
+    _, kinds, kind = np.unique(np.round(nodes, 9), axis=0, return_index=True, return_inverse=True)
+    powers = nodes[kinds, None, :] ** np.arange(samples)[:, None]
     weights = np.linalg.solve(powers, np.broadcast_to(moments, (len(kinds), samples))[..., None])[..., 0]
     return interval[:, None] * np.einsum("ks,ksj->kj", weights[kind.reshape(-1)], values[nearest])
