@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from reference.profile import PolynomialProfile, SplineProfile
 from reference.rim import find_second_touch, require_clear_rims, rim_clearances, rim_search
 from reference.simulate import simulate, simulate_modified_euler
 from reference.special import special_points
-from reference.surface import Paraboloid, Plane, Surface, evaluate
+from reference.surface import Paraboloid, Surface, SurfaceFunction, evaluate
 
 BICYCLE = Bicycle()
 CASES = Path(__file__).parents[1] / "cases"
@@ -41,7 +42,7 @@ GROUNDS = {
     "cone": Cone(0.8, 0.4),
     "torus": Torus(2.0, 0.8),
     "polynomial": PolynomialProfile((1.2, -0.05, 0.001)),
-    "spline": SplineProfile(np.linspace(0, 4, 9), 0.1 * np.cos(np.arange(9.0))),
+    "spline": SplineProfile(np.linspace(0, 4, 9), 0.3 * np.cos(np.arange(9.0))),
     "rough": rough(0.25, 0.02),
     "rougher": rough(0.1, 0.02),
 }
@@ -85,12 +86,16 @@ def test_least_clearance_is_that_of_a_dense_sampling(name: str) -> None:
         # Next to the contact the round-off of a height, 1e-15, is left over a versine.
         far = np.nanmin(dense[(turn > 0.01) & (turn < 2 * np.pi - 0.01)])
         least, d = kernel.least_clearance(centre, x, z, RADIUS, angle, True, known.samples, *where)
-        local, _ = kernel.least_clearance(centre, x, z, RADIUS, angle, True, 3, *where)
         assert kernel.bound(centre, x, z, RADIUS, angle, known, *where) <= least + 1e-9
-        assert least <= far + 1e-9
+        if np.isnan(dense).any():
+            # Next to an edge the ground may be upright: dense samples miss by how much the rim is inside.
+            assert least <= 0 or far > -1e-9
+            continue
         # At the contact itself the clearance is a limit that the dense samples come near to.
-        near = 0.02 * (1 + abs(local)) if abs(np.sin(d / 2)) < 0.01 else 1e-6 * (1 + abs(far))
+        near = 0.02 * (1 + abs(least)) if abs(np.sin(d / 2)) < 0.01 else 1e-6 * (1 + abs(far))
         assert least >= far - near
+        # A clearance far above zero is not refined: it is at most an eighth of itself too large.
+        assert least <= far + 1e-9 + max(least, 0.0) / 8
         touching += least <= 0
     if name != "sphere":  # in a sphere no rim touches twice
         assert touching > 0
@@ -101,8 +106,11 @@ def test_the_bound_is_the_least_clearance_in_a_paraboloid() -> None:
     known, where = rim_search(surface, [RADIUS]), (surface.function.real, surface.parameters)
     for centre, x, z, angle in contacts(surface, 40):
         least, _ = kernel.least_clearance(centre, x, z, RADIUS, angle, True, known.samples, *where)
-        # Golden section finds a least value to the square of its interval, over the round-off of heights.
-        assert kernel.bound(centre, x, z, RADIUS, angle, known, *where) == pytest.approx(least, abs=1e-9)
+        # A clearance far above zero is not refined. Golden section finds a least value to round-off of heights.
+        bound = kernel.bound(centre, x, z, RADIUS, angle, known, *where)
+        assert least - max(least, 0.0) / 8 - 1e-9 <= bound <= least + 1e-9
+        if least < 0:
+            assert bound == pytest.approx(least, abs=1e-9)
 
 
 def test_bounds_of_bowls_hold_within_a_wheel() -> None:
@@ -174,16 +182,32 @@ def test_a_touch_after_the_last_output_is_none_of_the_ride() -> None:
     assert simulate(BICYCLE, surface, q, qd, np.array([0.0, 0.7221])).ended is None
 
 
-def test_samples_of_any_ride_are_looked_at() -> None:
-    """A ride that knows nothing of a kerb rolls straight into it."""
-    surface, q, qd = case("curb.toml")
-    ride = simulate(BICYCLE, Plane(), *consistent_state(BICYCLE, Plane(), (q[0], q[1]), 0.0, 0.0, (0.02, 0.0, qd[7])),
-                    np.arange(151) / 100)  # fmt: skip
+@dataclass(frozen=True)
+class Blind:
+    """A ground of which nobody is told that it bends."""
+
+    ground: Surface
+    bend = 0.0
+
+    @property
+    def function(self) -> SurfaceFunction:
+        return self.ground.function
+
+    @property
+    def parameters(self) -> np.ndarray:
+        return self.ground.parameters
+
+
+@pytest.mark.parametrize(("name", "time"), [("hollow.toml", 0.722178), ("curb.toml", 0.605196)])
+def test_samples_of_any_ride_are_looked_at(name: str, time: float) -> None:
+    surface, q, qd = case(name)
+    ride = simulate(BICYCLE, Blind(surface), q, qd, np.arange(151) / 100)
+    assert ride.time[-1] > time + 0.005
     ending = find_second_touch(BICYCLE, surface, ride.time, ride.q, ride.qd)
     assert ending is not None
     assert "the front rim touches the ground at a second place" in ending.why
-    # The spline before the kerb is level to 0.1 mm only, of its 8 cm: 1 ms at 3 m/s.
-    assert ending.time == pytest.approx(0.605196, abs=1e-3)
+    # Looks are an eighth of a detail apart, 4 ms here and 13 ms in the hollow, and the clearance bends in between.
+    assert ending.time == pytest.approx(time, abs=1e-3)
 
 
 def test_a_start_inside_the_ground_is_refused() -> None:

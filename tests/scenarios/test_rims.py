@@ -60,7 +60,7 @@ def test_a_start_with_a_rim_inside_the_ground_is_refused() -> None:
 @pytest.mark.parametrize("alpha", [1.5, 2.0, 5.0])
 def test_a_start_in_a_bowl_tighter_than_a_wheel_is_refused(alpha: float) -> None:
     _, scenario = load_scenario(str(CASES / "bowl-tighter-than-wheel.toml"), {"surface.alpha": alpha})
-    with pytest.raises(ScenarioError, match="cannot touch the ground|inside the ground"):
+    with pytest.raises(ScenarioError, match=r"cannot touch the ground|inside the ground"):
         make_start(scenario)
 
 
