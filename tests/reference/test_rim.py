@@ -97,8 +97,9 @@ def test_least_clearance_is_that_of_a_dense_sampling(name: str) -> None:
         # A clearance far above zero is not refined: it is at most an eighth of itself too large.
         assert least <= far + 1e-9 + max(least, 0.0) / 8
         touching += least <= 0
-    if name != "sphere":  # in a sphere no rim touches twice
-        assert touching > 0
+    # In a sphere no rim touches twice, in the others few do.
+    if name in ("paraboloid", "polynomial", "rough", "rougher"):
+        assert 0 < touching < 60
 
 
 def test_the_bound_is_the_least_clearance_in_a_paraboloid() -> None:
@@ -201,13 +202,13 @@ class Blind:
 @pytest.mark.parametrize(("name", "time"), [("hollow.toml", 0.722178), ("curb.toml", 0.605196)])
 def test_samples_of_any_ride_are_looked_at(name: str, time: float) -> None:
     surface, q, qd = case(name)
-    ride = simulate(BICYCLE, Blind(surface), q, qd, np.arange(151) / 100)
-    assert ride.time[-1] > time + 0.005
+    ride = simulate(BICYCLE, Blind(surface), q, qd, np.arange(1501) / 1000)
+    assert ride.time[-1] > time
     ending = find_second_touch(BICYCLE, surface, ride.time, ride.q, ride.qd)
     assert ending is not None
     assert "the front rim touches the ground at a second place" in ending.why
-    # Looks are an eighth of a detail apart, 4 ms here and 13 ms in the hollow, and the clearance bends in between.
-    assert ending.time == pytest.approx(time, abs=1e-3)
+    # A sample is 3 mm, over which the clearance is next to linear; the cubics between samples are as good.
+    assert ending.time == pytest.approx(time, abs=1e-4)
 
 
 def test_a_start_inside_the_ground_is_refused() -> None:
