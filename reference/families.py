@@ -39,6 +39,7 @@ from .continuation import (
     roots_along,
 )
 from .kernels.steady import STANDING, direction
+from .standing import require_standing
 from .surface import SurfaceOfRevolution, has_tip
 
 FAMILIES = (1, 2, 3, 4)
@@ -325,7 +326,7 @@ def find_motion(
     Raises
     ------
     ValueError
-        If there is no such motion, or the input is not one.
+        If there is no such motion, or the input is not one, or a rim of the motion lies inside the ground.
     """
     if not (np.isfinite(rear_rate) and rear_rate > 0):
         raise ValueError(f"rear rate is {rear_rate!r}; it must be a positive number of rad/s")
@@ -348,6 +349,7 @@ def find_motion(
         where = f"family {family}" if family is not None else "any family"
         raise ValueError(f"no circular motion found with {wanted} in {where}: {reason}")
     if near is None:
+        require_standing(bicycle, surface, found[0][1])
         return found[0]
 
     def distance(item: tuple[int, CircularMotion]) -> float:
@@ -359,4 +361,5 @@ def find_motion(
         raise ValueError(
             f"no circular motion found with {wanted} within {_NEAR_ENOUGH} rad of near; the nearest is at {place}"
         )
+    require_standing(bicycle, surface, nearest[1])
     return nearest

@@ -29,7 +29,7 @@ _TOUCHING = 1e-9  # [m] no depth worth a number
 _RINGS_A_WHEEL, _SAMPLES_A_RING, _FARTHEST = 8, 16, 200.0
 
 
-def rim_search(surface: Surface, radii: Sequence[float]) -> kernel.RimSearch:
+def rim_search(surface: Surface, radii: Sequence[float] | np.ndarray) -> kernel.RimSearch:
     """How closely to look at the rims of wheels of some radii [m], from the surface's ``bend`` and ``detail``."""
     largest, smallest = max(radii), min(radii)
     finest = 2 * math.pi * largest * _SAMPLES_A_DETAIL / _MOST
@@ -111,6 +111,8 @@ def require_clear_rims(bicycle: Bicycle, surface: Surface, q: np.ndarray, contac
     ValueError
         With the wheel, the depth and the place; or if a wheel has no contact.
     """
+    if not bicycle_rim_search(bicycle, surface).curved:
+        return
     if contact is None:
         contact = contact_parameters(bicycle, surface, q)
     clear = rim_clearances(bicycle, surface, q, contact) > 0

@@ -19,6 +19,7 @@ from .kernels.circle import STEP
 from .kernels.steady import steady_energy
 from .kinematics import FRONT_ANGLE, constants
 from .stability import VARIABLES, linearise
+from .standing import stands
 from .surface import Plane, is_level
 
 LEAN, STEER, LEAN_RATE, STEER_RATE = (VARIABLES.index(name) for name in ("lean", "steer", "lean_rate", "steer_rate"))
@@ -62,7 +63,7 @@ def energy_slope(equations: Steady) -> Callable[[Point], float]:
 
 
 def special_points(family: Family) -> list[SpecialPoint]:
-    """All special points of a family, in the order of its points."""
+    """All special points of a family on which its wheels can stand, in the order of its points."""
     equations = family.equations
     conditions: tuple[tuple[str, Callable[[Point], float]], ...] = (
         ("cusp", front_rate_slope),
@@ -78,7 +79,7 @@ def special_points(family: Family) -> list[SpecialPoint]:
     for i, end in zip((0, len(family.points) - 1), family.ends, strict=True):
         if end in ("static", "pivot"):
             found.append((i, 0.0, end, family.points[i]))
-    found.sort(key=lambda item: item[:2])
+    found = sorted((item for item in found if stands(equations, item[3].unknowns)), key=lambda item: item[:2])
     ordered = [(kind, equations.motion(point.unknowns)) for *_, kind, point in found]
     points = [SpecialPoint(name, kind, *_figures(motion)) for name, kind, motion in _named(family, ordered)]
     if is_level(equations.surface) and family.number in STRAIGHT:

@@ -14,6 +14,7 @@ from reference.families import FAMILIES, Family, trace_all
 from reference.modes import MODES, modes
 from reference.sections import SectionEnd, sample_family, stable_sections
 from reference.special import special_points
+from reference.standing import motion_stands, stands
 from reference.surface import Surface
 
 from .files import make_folder, write_json
@@ -115,7 +116,7 @@ def family_document(family: Family) -> dict[str, Any]:
         "family": family.number,
         "ends": list(family.ends),
         "points": _points(family),
-        "stable_sections": [_section(*ends) for ends in stable_sections(family)],
+        "stable_sections": [_section(*ends) for ends in stable_sections(family) if _standing(family, ends)],
         "special_points": {
             point.name: {
                 "rear_rate": point.rear_rate,
@@ -137,11 +138,18 @@ def _points(family: Family) -> dict[str, list[Any]]:
     return {
         **{name: getattr(seen, name).tolist() for name in names},
         "lyapunov_stable": seen.stable.tolist(),
+        "rims_clear": [stands(family.equations, point.unknowns) for point in family.points],
         "growth_rate": seen.growth_rate.tolist(),
         "normal_force_rear": seen.normal_force[:, 0].tolist(),
         "normal_force_front": seen.normal_force[:, 1].tolist(),
         "eigenvalues": np.stack([np.real(values), np.imag(values)], axis=-1).tolist(),
     }
+
+
+def _standing(family: Family, ends: tuple[SectionEnd, SectionEnd]) -> bool:
+    """Whether wheels can stand somewhere at the ends of a section."""
+    where = family.equations.bicycle, family.equations.surface
+    return any(motion_stands(*where, end.motion) for end in ends)
 
 
 def _section(start: SectionEnd, end: SectionEnd) -> dict[str, Any]:

@@ -121,7 +121,7 @@ def rim_look(model: Model, problem: Problem) -> Callable[[float], Ending | None]
     try:
         watch = RimWatch(problem.bicycle, problem.surface, problem.q)
     except ValueError as error:
-        raise EngineError(str(error)) from error
+        raise EngineError(f"exudyn could not start: {error}") from error
     if not watch.needed:
         return lambda _: None
     system, kinds = model.system, exu.OutputVariableType

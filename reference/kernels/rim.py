@@ -148,6 +148,7 @@ def bound(centre, x, z, radius, angle, ground, function, parameters):
 def least_clearance(centre, x, z, radius, angle, held, samples, function, parameters):
     """Return (clearance, d): the least clearance of the whole rim and the angle to it from the contact at ``angle``.
 
+    A clearance far above zero is not refined, and may be an eighth of itself too large: its sign is what counts.
     ``held`` is False for a wheel in the air. (inf, 0) where the contact is off the ground, which is for others to tell.
     """
     edge = _edge(centre, x, z, radius, angle, held, samples, function, parameters)
