@@ -46,7 +46,7 @@ class Identified:
     uncertainty : float
         Largest change of an entry by the last extrapolation [1/s and mixed units].
     eigenvalues : ndarray, shape (7,), complex
-        Sorted by real part, then by imaginary part [1/s].
+        In the order of `reference.stability.eigenvalue_order` [1/s].
     order : float
         Order in the step that the entries show; NaN where they do not move.
     """

@@ -45,16 +45,18 @@ from .circular import (
     REAR_SPEED,
     SIGMA,
     STEER,
+    YAW_SPEED,
     Condition,
     Steady,
     nearest_condition,
     newton,
     rear_rate_condition,
+    turned,
     unknown_condition,
 )
-from .continuation import LARGEST_LEAN, crossings, follow
+from .continuation import LARGEST_LEAN, crossings, follow, tangent
 from .kernels import dynamics as kernel
-from .kernels.steady import UNKNOWNS
+from .kernels.steady import STANDING, UNKNOWNS
 from .kinematics import body_positions, constants
 from .surface import Plane, SurfaceOfRevolution, evaluate, is_level
 
@@ -151,6 +153,7 @@ def _carry(
     more than a step should is taken again, shorter.
     """
     reached = 0.0
+    u = turned(u) if u[YAW_SPEED] < 0 else u  # as the solver gives them: an anchor at a pivot may run the other way
     while reached < 1:
         wanted = min(1.0, reached + step)
         carried = _step_on(path(wanted), u, condition)
@@ -252,7 +255,23 @@ def anchor(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rat
             u = _other_pivot(bicycle, surface)
     else:
         u, condition = _to_surface_or_middle(bicycle, surface, u, condition, directions)
-    return Anchor(family, Steady(bicycle, surface), u, directions, condition)
+    return _anchor_at(family, Steady(bicycle, surface), u, directions, condition)
+
+
+def _anchor_at(
+    family: int,
+    equations: Steady,
+    unknowns: np.ndarray,
+    directions: tuple[np.ndarray, ...],
+    condition: Callable[[np.ndarray], Condition],
+) -> Anchor:
+    """An anchor at a solution; a pivoting motion turns as those do that its curve is followed to."""
+    u = unknowns
+    if abs(u[REAR_SPEED]) < STANDING:
+        along = tangent(equations, u)
+        if along[REAR_SPEED] * (along @ directions[0]) < 0:
+            u = turned(u)
+    return Anchor(family, equations, u, directions, condition)
 
 
 def next_anchor(path: Callable[[float], Steady], family: int, rear_rate: float | None, unknowns: np.ndarray) -> Anchor:
@@ -265,7 +284,7 @@ def next_anchor(path: Callable[[float], Steady], family: int, rear_rate: float |
     """
     there, condition = path(1.0), _anchored(rear_rate)
     u = _carry(path, unknowns, condition, str(there.surface), step=1.0)
-    return Anchor(family, there, u, _directions(family, rear_rate), condition)
+    return _anchor_at(family, there, u, _directions(family, rear_rate), condition)
 
 
 def further_anchors(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Iterator[Anchor]:

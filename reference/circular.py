@@ -118,7 +118,7 @@ class Steady:
         return out
 
     def motion(self, unknowns: np.ndarray) -> CircularMotion:
-        """The motion behind a solution, run so that the rear wheel rolls forward.
+        """The motion behind a solution, run so that the rear wheel rolls forward (`kernels.steady.direction`).
 
         Raises
         ------
@@ -128,8 +128,7 @@ class Steady:
         u = unknowns
         if u[SIGMA] < -1e-12:  # round-off of a static equilibrium
             raise ValueError(f"no motion: the squared speed is {u[SIGMA]!r}")
-        speed = np.sqrt(kernel.SIGMA_UNIT * max(u[SIGMA], 0.0)) * (-1.0 if u[REAR_SPEED] < 0 else 1.0)
-        yaw_rate, rear_rate, front_rate = (float(speed * u[i]) for i in (YAW_SPEED, REAR_SPEED, FRONT_SPEED))
+        yaw_rate, rear_rate, front_rate = kernel.running_rates(u)
         weight = self.bicycle.mass * self.bicycle.gravity
         return CircularMotion(
             position=u[:3].copy(),
@@ -143,6 +142,13 @@ class Steady:
             force=weight * u[FORCE].reshape(2, 3),
             residual=float(np.abs(self.residual(u)[:21]).max()),
         )
+
+
+def turned(unknowns: np.ndarray) -> np.ndarray:
+    """The same solution, or its tangent, (22,) each, with the signs of all three speeds exchanged."""
+    other = unknowns.copy()
+    other[YAW_SPEED : FRONT_SPEED + 1] *= -1
+    return other
 
 
 @dataclass(frozen=True)

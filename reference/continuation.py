@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -172,6 +172,59 @@ def root_between(equations: Steady, first: Point, second: Point, function: Calla
     at, length = _arc(equations, first, second)
     root: Any = brentq(lambda distance: function(at(distance)), 0.0, length, xtol=1e-15)
     return at(root)
+
+
+def sign_changes(values: Sequence[float] | np.ndarray, zero: float = 0.0) -> list[tuple[int, int]]:
+    """Pairs of places between which a sequence of numbers changes its sign.
+
+    Parameters
+    ----------
+    values : sequence of float, shape (n,)
+    zero : float
+        Largest size of a number that is zero but for round-off. It has no sign and is passed over.
+
+    Returns
+    -------
+    list of (int, int)
+        Places of opposite signs, neighbours but for the zeros between them.
+    """
+    numbers = np.asarray(values, float)
+    signed = np.flatnonzero(np.abs(numbers) > zero)
+    turns = np.flatnonzero(np.diff(numbers[signed] > 0))
+    return [(int(signed[k]), int(signed[k + 1])) for k in turns]
+
+
+def roots_along(
+    equations: Steady,
+    points: Sequence[Point],
+    function: Callable[[Point], float],
+    values: Sequence[float] | np.ndarray | None = None,
+    zero: float = 0.0,
+) -> Iterator[tuple[int, Point]]:
+    """Points at which a function changes its sign along a followed curve.
+
+    Parameters
+    ----------
+    equations : Steady
+    points : sequence of Point, length n
+        In the order followed.
+    function : callable
+        Maps a `Point`, its tangent in the direction followed, to a number.
+    values : sequence of float, shape (n,), optional
+        The function at the points, where it is known already.
+    zero : float
+        See `sign_changes`.
+
+    Yields
+    ------
+    place : int
+        Of the last of the points before the root.
+    root : Point
+        To round-off of the arc's length; one of the points where the function is zero there.
+    """
+    numbers = [function(point) for point in points] if values is None else values
+    for i, j in sign_changes(numbers, zero):
+        yield i, points[(i + j) // 2] if j > i + 1 else root_between(equations, points[i], points[j], function)
 
 
 def crossings(

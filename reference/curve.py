@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .circular import LEAN, PITCH, REAR_SPEED, SIGMA, STEER, YAW_SPEED, Steady
+from .circular import LEAN, PITCH, STEER, Steady
 from .kernels import curve as kernel
-from .kernels.circle import SIGMA_UNIT
 from .kinematics import constants
 from .stability import growth_rates, sorted_eigenvalues
 
@@ -30,7 +29,7 @@ class Samples:
     normal_force : ndarray, shape (n, 2)
         Of the ground on the rear and the front wheel [N].
     eigenvalues : ndarray, shape (n, 7), complex
-        Sorted by real part, then by imaginary part [1/s].
+        In the order of `reference.stability.eigenvalue_order` [1/s].
     growth_rate : ndarray, shape (n,)
         Largest real part among those that symmetry does not fix [1/s].
     """
@@ -77,13 +76,12 @@ def sample(equations: Steady, unknowns: np.ndarray) -> Samples:
         If a motion cannot be linearised.
     """
     u = np.ascontiguousarray(unknowns, float)
-    jacobians, seen = np.empty((len(u), 7, 7)), np.empty((len(u), 3))
+    jacobians, seen = np.empty((len(u), 7, 7)), np.empty((len(u), 6))
     kernel.sample(u, *equations.where, constants(equations.bicycle), jacobians, seen)
     if not np.all(np.isfinite(jacobians)):
         lost = u[np.flatnonzero(~np.isfinite(jacobians).all(axis=(1, 2)))[0]]
         raise ValueError(f"the motion cannot be linearised at lean = {lost[LEAN]!r}, steer = {lost[STEER]!r}")
-    speed = np.sqrt(SIGMA_UNIT * np.maximum(u[:, SIGMA], 0.0)) * np.where(u[:, REAR_SPEED] < 0, -1.0, 1.0)
-    yaw_rate, rear_rate, front_rate = speed * u[:, YAW_SPEED:SIGMA].T
+    yaw_rate, rear_rate, front_rate = seen[:, :3].T
     eigenvalues = sorted_eigenvalues(jacobians)
     return Samples(
         yaw_rate=yaw_rate,
@@ -93,8 +91,8 @@ def sample(equations: Steady, unknowns: np.ndarray) -> Samples:
         steer=u[:, STEER],
         pitch=u[:, PITCH],
         radius=np.hypot(u[:, 0], u[:, 1]),
-        energy=seen[:, 0],
-        normal_force=seen[:, 1:],
+        energy=seen[:, 3],
+        normal_force=seen[:, 4:],
         eigenvalues=eigenvalues,
         growth_rate=growth_rates(equations.surface, eigenvalues, yaw_rate),
     )

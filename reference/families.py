@@ -16,7 +16,17 @@ import numpy as np
 
 from .anchors import ANCHORS, Anchor, anchor, further_anchors
 from .bicycle import Bicycle
-from .circular import FRONT_SPEED, LEAN, REAR_SPEED, SIGMA, CircularMotion, Steady, rear_rate_condition
+from .circular import (
+    FRONT_SPEED,
+    LEAN,
+    REAR_SPEED,
+    SIGMA,
+    YAW_SPEED,
+    CircularMotion,
+    Steady,
+    rear_rate_condition,
+    turned,
+)
 from .continuation import (
     FARTHEST,
     LARGEST_LEAN,
@@ -26,8 +36,9 @@ from .continuation import (
     at_edge,
     crossings,
     follow,
-    root_between,
+    roots_along,
 )
+from .kernels.steady import STANDING, direction
 from .surface import SurfaceOfRevolution, has_tip
 
 FAMILIES = (1, 2, 3, 4)
@@ -59,7 +70,8 @@ class Family:
     number : int
     equations : Steady
     points : list of Point
-        In the order of one direction; all tangents point that way.
+        In the order of one direction; all tangents point that way. At a pivoting end the speeds have the sign with
+        which the motion turns as its neighbours on the curve do.
     """
 
     number: int
@@ -79,10 +91,9 @@ class Family:
 
 def _kind_of_end(surface: SurfaceOfRevolution, point: Point) -> str:
     u = point.unknowns
-    # Static and pivot are solved for: their unknown is zero to round-off.
-    if abs(u[SIGMA]) < 1e-12:
+    if _is_zero(u, SIGMA):
         return "static"
-    if abs(u[REAR_SPEED]) < 1e-12:
+    if _is_zero(u, REAR_SPEED):
         return "pivot"
     if at_edge(surface, point):
         return "edge"
@@ -129,8 +140,11 @@ def trace_from(start: Anchor, longest: float = LONGEST_STEP) -> Family:
         points = list(_to_an_end(follow(start.equations, start.unknowns, towards, longest)))
         halves.append(_end_exactly(start.equations, points))
     forward, *backward = halves
-    turned = [Point(point.unknowns, -point.tangent) for half in backward for point in reversed(half[1:])]
-    return Family(start.family, start.equations, _turning_alike(turned + forward))
+    before = [Point(point.unknowns, -point.tangent) for half in backward for point in reversed(half[1:])]
+    points = before + forward
+    for end, neighbour in ((0, 1), (-1, -2)) if len(points) > 1 else ():
+        points[end] = _cleared_end(points[end], points[neighbour])
+    return Family(start.family, start.equations, points)
 
 
 def trace_all(
@@ -179,18 +193,21 @@ def _passes(curve: Family, start: Anchor) -> bool:
     return any(start.met_by(u) for u in crossings(curve.equations, curve.points, start.condition))
 
 
-def _turning_alike(points: list[Point]) -> list[Point]:
-    """Let a pivoting motion at an end turn as its neighbour does.
+def _is_zero(unknowns: np.ndarray, unknown: int) -> bool:
+    """Whether the squared speed or the rear speed is zero, as it is solved for in a static equilibrium and a pivot."""
+    return abs(float(unknowns[unknown])) < STANDING
 
-    Its rear speed is zero to round-off, of either sign; motions are run so that the rear wheel rolls forward.
-    """
-    points = list(points)
-    for end, neighbour in ((0, 1), (-1, -2)) if len(points) > 1 else ():
-        u = points[end].unknowns.copy()
-        if abs(u[REAR_SPEED]) < 1e-12:
-            u[REAR_SPEED] = np.copysign(max(abs(u[REAR_SPEED]), 1e-300), points[neighbour].unknowns[REAR_SPEED])
-            points[end] = Point(u, points[end].tangent)
-    return points
+
+def _cleared_end(end: Point, neighbour: Point) -> Point:
+    """An end of a curve with its zero without round-off; a pivoting motion there turns as its neighbour does."""
+    u, along = end.unknowns.copy(), end.tangent
+    for unknown in (SIGMA, REAR_SPEED):
+        if _is_zero(u, unknown):
+            u[unknown] = 0.0
+    turning = neighbour.unknowns[YAW_SPEED] * direction(neighbour.unknowns[REAR_SPEED])
+    if _is_zero(u, REAR_SPEED) and u[YAW_SPEED] * turning < 0:
+        u, along = turned(u), turned(along)
+    return Point(u, along)
 
 
 def _to_an_end(points: Iterable[Point]) -> Iterator[Point]:
@@ -208,10 +225,10 @@ def _to_an_end(points: Iterable[Point]) -> Iterator[Point]:
 def _end_exactly(equations: Steady, points: list[Point]) -> list[Point]:
     """Replace a last point beyond the static equilibrium or the pivoting motion by that end itself."""
     for unknown in (SIGMA, REAR_SPEED):
-        first, last = points[-2:] if len(points) > 1 else (points[0], points[0])
-        if first.unknowns[unknown] * last.unknowns[unknown] < 0:
-            end = root_between(equations, first, last, lambda point, k=unknown: float(point.unknowns[k]))
-            return [*points[:-1], end]
+        last = max(len(points) - 3, 0)  # a point of the curve may be the end itself, and the next one lie beyond
+        ends = roots_along(equations, points[last:], lambda point, k=unknown: float(point.unknowns[k]), zero=STANDING)
+        for place, end in ends:
+            return [*points[: last + place + 1], end]
     return points
 
 

@@ -11,6 +11,7 @@ from .circular import Steady
 from .curve import sample
 from .families import Family
 from .sections import sample_family
+from .stability import are_zero
 from .surface import Plane, is_level
 
 MODES = ("family", "castering", "capsize", "weave", "weave", "orbital", "orbital")
@@ -37,7 +38,8 @@ def modes(family: Family) -> np.ndarray:
     Returns
     -------
     ndarray, shape (n, 7), complex
-        Columns family, castering, capsize, weave (2), orbital (2).
+        Columns family, castering, capsize, weave (2), orbital (2). Of a pair the half of positive imaginary part
+        stands first, of two real roots the lesser.
     """
     seen = sample_family(family)
     start, named = _at_the_anchor(family) or _at_the_plainest(seen.eigenvalues, seen.yaw_rate)
@@ -84,9 +86,11 @@ def _at_the_plainest(eigenvalues: np.ndarray, yaw_rate: np.ndarray) -> tuple[int
 
 
 def _plainness(eigenvalues: np.ndarray, yaw_rate: float) -> float:
-    """How plain the modes are, at most 1; below 0 where there are not two pairs."""
-    rest = np.delete(eigenvalues, np.abs(eigenvalues).argmin())
-    upper = rest[np.imag(rest) > 0]
+    """How plain the modes are, at most 1; below 0 where there are not two pairs, least where the bicycle stands."""
+    if yaw_rate == 0:
+        return -2.0
+    rest = _without_zero(eigenvalues)[1]
+    upper = rest[_turning(rest) & (np.imag(rest) > 0)]
     if len(upper) != 2:
         return -1.0
     near, far = sorted(np.abs(upper - 1j * abs(yaw_rate)))
@@ -97,18 +101,35 @@ def _continued(neighbour: np.ndarray, eigenvalues: np.ndarray) -> np.ndarray:
     """Eigenvalues (7,) in the columns of the neighbour's modes.
 
     As a whole they lie nearest to the neighbour's, but no pair is torn apart: weave and orbital are each a pair or
-    two real roots, and so are castering and capsize, which may meet and turn as well.
+    two real roots, and so are castering and capsize, which may meet and turn as well. The halves of each have an order
+    of their own, since a pair that turns into two real roots is as near to them one way round as the other. Distances
+    count by their squares: their plain sum is the same for two real roots that pass a third, whichever is which.
     """
-    # Where a root passes zero, continuity cannot tell it from the family's own zero.
-    zero = np.abs(eigenvalues).argmin()
-    rest = np.delete(eigenvalues, zero)
+    zero, rest = _without_zero(eigenvalues)
     first, second = rest[_ORDERS[:, 0::2]], rest[_ORDERS[:, 1::2]]
-    real = np.abs(np.imag(rest)) <= _SAME * (1 + np.abs(rest))
-    conjugate = np.abs(first - np.conj(second)) <= _SAME * (1 + np.abs(first))
-    whole = (conjugate | (real[_ORDERS[:, 0::2]] & real[_ORDERS[:, 1::2]])).all(axis=1)
-    cost = np.abs(rest[_ORDERS] - neighbour[1:]).sum(axis=1)
-    best = np.where(whole, cost, np.inf).argmin()
-    return np.append(eigenvalues[zero], rest[_ORDERS[best]])
+    real = ~_turning(rest)
+    pair = np.abs(first - np.conj(second)) <= _SAME * (1 + np.abs(first))
+    two = real[_ORDERS[:, 0::2]] & real[_ORDERS[:, 1::2]] & ~pair
+    ordered = (pair & (np.imag(first) >= np.imag(second))) | (two & (np.real(first) < np.real(second)))
+    cost = (np.abs(rest[_ORDERS] - neighbour[1:]) ** 2).sum(axis=1)
+    best = np.where(ordered.all(axis=1), cost, np.inf).argmin()
+    return np.append(zero, rest[_ORDERS[best]])
+
+
+def _without_zero(eigenvalues: np.ndarray) -> tuple[complex, np.ndarray]:
+    """The family's zero and the six others.
+
+    Where a root passes zero, continuity cannot tell it from the family's own zero, and round-off may make a pair of
+    the two: what is zero is taken for real.
+    """
+    values = np.where(are_zero(eigenvalues), np.real(eigenvalues), eigenvalues)
+    nearest = np.abs(values).argmin()
+    return values[nearest], np.delete(values, nearest)
+
+
+def _turning(eigenvalues: np.ndarray) -> np.ndarray:
+    """Which of the eigenvalues are complex."""
+    return np.abs(np.imag(eigenvalues)) > _SAME * (1 + np.abs(eigenvalues))
 
 
 def _named(eigenvalues: np.ndarray, yaw_rate: float) -> np.ndarray:
@@ -123,4 +144,5 @@ def _named(eigenvalues: np.ndarray, yaw_rate: float) -> np.ndarray:
     orbital = [take(complex(0, yaw_rate)), take(complex(0, -yaw_rate))]
     castering = take(min(value.real for value in rest))
     capsize = take(min((value for value in rest), key=lambda value: (abs(value.imag), -value.real)))
-    return np.array([zero, castering, capsize, *sorted(rest, key=lambda value: value.imag), *orbital])
+    halves = [sorted(pair, key=lambda value: (-value.imag, value.real)) for pair in (rest, orbital)]
+    return np.array([zero, castering, capsize, *halves[0], *halves[1]])

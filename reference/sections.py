@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from .circular import CircularMotion, Steady
-from .continuation import Point, least_between, root_between
+from .continuation import Point, least_between, roots_along
 from .curve import Samples, sample
 from .families import Family
 from .stability import Linearisation, free_eigenvalues, linearise
@@ -68,14 +67,14 @@ def stable_sections(family: Family, growth: np.ndarray | None = None) -> list[tu
     """
     equations = family.equations
     points, rates = _with_least(family, sample_family(family).growth_rate if growth is None else growth)
-    ends: list[SectionEnd] = []
-    if rates[0] < 0:
-        ends.append(_end(equations, points[0], "end"))
-    for i, (first, second) in enumerate(pairwise(points)):
-        if rates[i] * rates[i + 1] < 0:
-            crossing = root_between(equations, first, second, lambda point: growth_along(equations, point))
-            ends.append(_end(equations, crossing))
-    if rates[-1] < 0:
+    ends = [
+        _end(equations, root)
+        for _, root in roots_along(equations, points, lambda point: growth_along(equations, point), rates)
+    ]
+    signed = [rate for rate in rates if rate != 0] or [0.0]
+    if signed[0] < 0:
+        ends.insert(0, _end(equations, points[0], "end"))
+    if signed[-1] < 0:
         ends.append(_end(equations, points[-1], "end"))
     return list(zip(ends[::2], ends[1::2], strict=True))
 
@@ -117,6 +116,7 @@ def _end(equations: Steady, point: Point, cause: str | None = None) -> SectionEn
     motion, reduced = linearise_point(equations, point)
     free = free_eigenvalues(equations.surface, reduced.eigenvalues, motion.yaw_rate)
     critical = max(free, key=lambda value: (value.real, value.imag))
-    critical = complex(critical.real, abs(critical.imag))
     # Two zeros that meet split by the root of round-off, 1e-7; the slowest pair that crosses turns at 1/s.
-    return SectionEnd(cause or ("hopf" if critical.imag > 1e-3 else "energy"), motion, critical)
+    turning = abs(critical.imag) > 1e-3
+    eigenvalue = complex(critical.real, abs(critical.imag) if turning else 0.0)
+    return SectionEnd(cause or ("hopf" if turning else "energy"), motion, eigenvalue)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from scipy.optimize import brentq
 
 from .bicycle import Bicycle
 from .circular import REAR_SPEED, CircularMotion, Steady
-from .continuation import Point, root_between
+from .continuation import Point, metric, roots_along, sign_changes
 from .dae import consistent_state
 from .families import Family, front_rate_slope, rear_rate_slope
 from .kernels.circle import STEP
@@ -70,24 +69,26 @@ def special_points(family: Family) -> list[SpecialPoint]:
         ("fold", rear_rate_slope),
         ("energy", energy_slope(equations)),
     )
-    found: list[tuple[int, str, Point]] = []
+    found: list[tuple[int, float, str, Point]] = []
     for kind, condition in conditions:
-        values = [condition(point) for point in family.points]
-        for i, (first, second) in enumerate(pairwise(family.points)):
-            if values[i] * values[i + 1] < 0:
-                point = root_between(equations, first, second, condition)
-                # The squared rear rate is least at the pivoting motion: that is no fold of its own.
-                if kind != "fold" or abs(point.unknowns[REAR_SPEED]) > 1e-6:
-                    found.append((i, kind, point))
+        for i, point in roots_along(equations, family.points, condition):
+            # The squared rear rate is least at the pivoting motion: that is no fold of its own.
+            if kind != "fold" or abs(point.unknowns[REAR_SPEED]) > 1e-6:
+                found.append((i, _distance(family.points[i], point), kind, point))
     for i, end in zip((0, len(family.points) - 1), family.ends, strict=True):
         if end in ("static", "pivot"):
-            found.append((i, end, family.points[i]))
-    found.sort(key=lambda item: item[0])
-    ordered = [(kind, equations.motion(point.unknowns)) for _, kind, point in found]
+            found.append((i, 0.0, end, family.points[i]))
+    found.sort(key=lambda item: item[:2])
+    ordered = [(kind, equations.motion(point.unknowns)) for *_, kind, point in found]
     points = [SpecialPoint(name, kind, *_figures(motion)) for name, kind, motion in _named(family, ordered)]
     if is_level(equations.surface) and family.number in STRAIGHT:
         points.append(straight_motion(equations.bicycle, *STRAIGHT[family.number]))
     return points
+
+
+def _distance(first: Point, point: Point) -> float:
+    """How far a near point lies along the curve from the first."""
+    return float((metric(first.unknowns) * first.tangent) @ (point.unknowns - first.unknowns))
 
 
 def straight_motion(bicycle: Bicycle, name: str, steer: float) -> SpecialPoint:
@@ -108,11 +109,10 @@ def straight_motion(bicycle: Bicycle, name: str, steer: float) -> SpecialPoint:
         return float(np.linalg.det(linearise(bicycle, Plane(), *state).jacobian[np.ix_(block, block)]))
 
     rates = np.linspace(0.5, 30.0, 60) / radius
-    signs = np.sign([determinant(rate) for rate in rates])
-    changes = np.flatnonzero(signs[:-1] * signs[1:] < 0)
-    if len(changes) == 0:
+    changes = sign_changes([determinant(rate) for rate in rates])
+    if not changes:
         raise ValueError(f"no straight motion at steer = {steer!r} has circular neighbours")
-    rear_rate: Any = brentq(determinant, rates[changes[0]], rates[changes[0] + 1], xtol=1e-13)
+    rear_rate: Any = brentq(determinant, *rates[list(changes[0])], xtol=1e-13)
     _, rates = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.0, steer, (0.0, 0.0, rear_rate))
     return SpecialPoint(name, "straight", 0.0, steer, rear_rate, float(rates[FRONT_ANGLE]))
 

@@ -14,6 +14,11 @@ from .kernels.pose import aligned
 from .kinematics import FRONT_ANGLE, LEAN, REAR_ANGLE, STEER, YAW, constants
 from .surface import Surface, is_level
 
+# Both of a matrix's largest eigenvalue. Real parts nearer to each other are equal but for round-off, which is some 1e-15
+# times an eigenvalue's condition, 1e2 to 1e4 along the families. A double zero splits by the root of that, 1e-8 to
+# 1e-7; the slowest pair, of circles of a kilometre on the plane, turns at 1e-4.
+_EQUAL, _ZERO = 1e-9, 1e-6
+
 # x and y in the heading frame.
 VARIABLES = ("x", "y", "lean", "steer", "lean_rate", "steer_rate", "rear_rate")
 
@@ -31,7 +36,7 @@ class Linearisation:
         X(v); zero on a circular motion.
     jacobian : ndarray, shape (7, 7)
     eigenvalues : ndarray, shape (7,), complex
-        Sorted by real part, then by imaginary part [1/s].
+        In the order of `eigenvalue_order` [1/s].
     """
 
     variables: tuple[str, ...]
@@ -83,8 +88,45 @@ def linearise(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray)
 
 
 def sorted_eigenvalues(jacobians: np.ndarray) -> np.ndarray:
-    """Eigenvalues of matrices (..., 7, 7), shape (..., 7), sorted by real part, then by imaginary part."""
-    return np.sort(np.linalg.eigvals(jacobians).astype(complex), axis=-1)
+    """Eigenvalues of real matrices (..., n, n), shape (..., n), in the order of `eigenvalue_order`.
+
+    Complex ones stand in exactly conjugate pairs.
+    """
+    eigenvalues = np.linalg.eigvals(jacobians).astype(complex)
+    return np.take_along_axis(eigenvalues, eigenvalue_order(eigenvalues), axis=-1)
+
+
+def eigenvalue_order(eigenvalues: np.ndarray) -> np.ndarray:
+    """Order of eigenvalues by their real parts, and of those with equal ones by their imaginary parts.
+
+    Real parts are equal where they differ from the next by round-off at most, as those of eigenvalues that symmetry
+    puts on the imaginary axis do. Eigenvalues that `are_zero` count as zero.
+
+    Parameters
+    ----------
+    eigenvalues : ndarray, shape (..., n), complex
+
+    Returns
+    -------
+    ndarray of int, shape (..., n)
+    """
+    values = np.where(are_zero(eigenvalues), 0, eigenvalues)
+    by_real = np.argsort(np.real(values), axis=-1, kind="stable")
+    real, imaginary, own = (
+        np.take_along_axis(part, by_real, axis=-1) for part in (np.real(values), np.imag(values), np.real(eigenvalues))
+    )
+    gap = _EQUAL * np.abs(eigenvalues).max(axis=-1, keepdims=True)
+    group = np.cumsum(np.diff(real, axis=-1, prepend=real[..., :1]) > gap, axis=-1)
+    return np.take_along_axis(by_real, np.lexsort((own, imaginary, group), axis=-1), axis=-1)
+
+
+def are_zero(eigenvalues: np.ndarray) -> np.ndarray:
+    """Which eigenvalues (..., n) of matrices are zero but for round-off, shape (..., n).
+
+    A zero that is double, as where the energy is extreme along a family or the bicycle stands, may come out as a pair.
+    """
+    size = np.abs(eigenvalues)
+    return size <= _ZERO * size.max(axis=-1, keepdims=True)
 
 
 def structural_eigenvalues(surface: Surface, yaw_rate: np.ndarray | float) -> np.ndarray:

@@ -18,6 +18,7 @@ import numpy as np
 
 from reference.bicycle import Bicycle
 from reference.kinematics import REAR_ANGLE
+from reference.stability import eigenvalue_order
 
 # A bounded disturbance |e| <= b over a duration T tilts a least-squares line by 3 b / T at the most.
 _SLOPE = 3.0
@@ -188,7 +189,7 @@ def eigenvalue_limits(
     Returns
     -------
     ndarray, shape (7,)
-        [1/s], in the order of `reference.stability.sorted_eigenvalues`.
+        [1/s], in the order of `reference.stability.eigenvalue_order`.
     """
     sizes = np.array([scale.radius, scale.radius, 1, 1, *3 * [scale.rear_rate]])
     derivative = noise * weight * sizes[:, None] / disturbances
@@ -197,4 +198,4 @@ def eigenvalue_limits(
     moved = np.einsum("ij,jk,ki->i", np.abs(left), derivative, np.abs(right))
     factor = np.exp(np.real(eigenvalues) * interval)
     limits = moved * (1 + factor) * factor**-1.5 / interval
-    return limits[np.argsort(eigenvalues)]
+    return limits[eigenvalue_order(eigenvalues)]

@@ -21,7 +21,7 @@ import numpy as np
 from engines.engine import Trajectory
 from reference.bicycle import Bicycle
 from reference.kinematics import YAW
-from reference.stability import independent, linearise
+from reference.stability import are_zero, eigenvalue_order, independent, linearise
 from reference.surface import Surface, is_level
 
 _PLACE = 2  # x and y stand first among the independent variables
@@ -102,8 +102,9 @@ def modes_of(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) 
     left = np.zeros((len(values), 7), complex)
     left[:, first:] = np.linalg.inv(right)
     right = np.concatenate([np.zeros((first, len(values)), complex), right])
-    values = np.where(np.abs(np.imag(values)) > _REAL, values, np.real(values))
-    upper = [k for k in np.argsort(values) if np.imag(values[k]) >= 0]
+    real = are_zero(values) | (np.abs(np.imag(values)) <= _REAL)
+    values = np.where(real, np.real(values), values)
+    upper = [k for k in eigenvalue_order(values) if np.imag(values[k]) >= 0]
     zero = min(upper, key=lambda k: abs(values[k]))
     names = _names(values[upper], upper.index(zero), 0.0 if first else abs(float(qd[YAW])))
     modes = []

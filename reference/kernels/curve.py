@@ -18,13 +18,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from .circle import COORDINATES, FULL, ROWS, SIGMA_UNIT, STEP, circle_jacobian, circle_residual, unfold
+from .circle import COORDINATES, FULL, ROWS, STEP, circle_jacobian, circle_residual, unfold
 from .reduced import FRONT, REAR, VARIABLES, reduced_jacobian, telling_spin
-from .steady import steady_energy
+from .steady import running_rates, steady_energy
 from .vector import jit
 
 CHOSEN = np.array([0, 1, 2, 3, 4, 5, 9, 12, 15])  # the nine among the 22
-X, Y, Z, LEAN, YAW_SPEED, REAR_SPEED, FRONT_SPEED, SIGMA = 0, 1, 2, 3, 6, 7, 8, 9
+X, Y, Z, LEAN, REAR_SPEED, FRONT_SPEED, SIGMA = 0, 1, 2, 3, 7, 8, 9
 _FIRST_STEP, _SHORTEST_STEP = 0.02, 1e-6
 _MOST = 15  # iterations of a step, each of which takes a digit or two
 
@@ -238,11 +238,10 @@ def follow(distance, longest, largest, real, function, parameters, a, full, alon
 def state(full, y):
     """Fill y (24,) = (q, qd, contact parameters) of a motion, the rear wheel rolling forward."""
     y[:] = 0
-    speed = np.sqrt(SIGMA_UNIT * max(full[SIGMA], 0.0)) * (-1.0 if full[REAR_SPEED] < 0 else 1.0)
-    turn = speed * full[YAW_SPEED]
+    turn, rear, front = running_rates(full)
     y[0], y[1], y[2], y[4], y[5], y[6] = full[0], full[1], full[2], full[3], full[4], full[5]
     y[9], y[10], y[12] = -turn * full[1], turn * full[0], turn
-    y[REAR], y[FRONT] = speed * full[REAR_SPEED], speed * full[FRONT_SPEED]
+    y[REAR], y[FRONT] = rear, front
     for i in range(6):
         y[18 + i] = full[10 + i]
 
@@ -260,7 +259,8 @@ def sample(full, real, function, parameters, a, c, jacobians, seen):
     """Along motions ``full`` (n, 22) fill what `reduced` and the forces say of them.
 
     ``c`` and ``a`` are the `kinematics.Constants` and what `pose.aligned` makes of them; jacobians (n, 7, 7),
-    whose eigenvalues are the motion's; seen (n, 3), energy [J] and normal forces of both wheels [N].
+    whose eigenvalues are the motion's; seen (n, 6), the rates of yaw and both wheels [rad/s], energy [J] and normal
+    forces of both wheels [N].
     """
     y, field = np.empty(24), np.empty(VARIABLES)
     weight = a.mass * a.gravity
@@ -268,6 +268,7 @@ def sample(full, real, function, parameters, a, c, jacobians, seen):
         state(full[n], y)
         spin = telling_spin(full[n, REAR_SPEED], full[n, FRONT_SPEED])
         reduced_jacobian(y, spin, function, parameters, a, field, jacobians[n])
-        seen[n, 0] = steady_energy(full[n], c)
+        seen[n, 0], seen[n, 1], seen[n, 2] = running_rates(full[n])
+        seen[n, 3] = steady_energy(full[n], c)
         for k in range(2):
-            seen[n, 1 + k] = weight * _normal_force(full[n], k, real, parameters)
+            seen[n, 4 + k] = weight * _normal_force(full[n], k, real, parameters)

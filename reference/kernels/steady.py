@@ -13,6 +13,11 @@ squares of it, so static equilibria (sigma = 0) and pivoting motions (b = 0) are
 Unknowns (22): x, y, z, lean, pitch, steer | a, b, c | sigma / 400 | contact parameters (6) | contact
 forces / weight (6). Rows (22): the 21 equations, speeds by their direction, and the normalisation.
 
+A solution holds for (a, b, c) and for (-a, -b, -c), the same circle ridden the other way. `direction` chooses: the
+rear wheel rolls forward, b > 0. Where it stands, b = 0 to round-off, the motion runs as the unknowns say. The solvers
+give a > 0, a turn to the left; where a family of curves ends in the pivoting motion, the signs stored there are those
+with which it turns as its neighbours on that curve do (`reference.families`).
+
 Solutions are found in the smaller form of `circle`; this one describes them and measures how well they hold.
 """
 
@@ -25,6 +30,7 @@ from .dynamics import energies, mass_and_bias, residual
 from .vector import jit
 
 UNKNOWNS = 22
+STANDING = 1e-12  # of b, at most 1: the pivoting motion is solved for, and b there is round-off of either sign
 
 
 @jit
@@ -63,6 +69,20 @@ def steady_jacobian(u, function, parameters, c, out):
         z[j] = u[j]
         for i in range(UNKNOWNS):
             out[i, j] = r[i].imag / STEP
+
+
+@jit
+def direction(rear):
+    """Return the sign of (a, b, c) with which the rear wheel rolls forward; 1 where it stands, ``rear`` = b."""
+    return -1.0 if rear < -STANDING else 1.0
+
+
+@jit
+def running_rates(u):
+    """Return the rates of yaw, rear wheel and front wheel [rad/s] at the unknowns ``u`` (22,), run in `direction`."""
+    speed = np.sqrt(SIGMA_UNIT * max(u[9], 0.0)) * direction(u[7])
+    # At rest a product may be -0.
+    return speed * u[6] + 0.0, speed * u[7] + 0.0, speed * u[8] + 0.0
 
 
 @jit

@@ -13,7 +13,6 @@ from reference.special import SpecialPoint, special_points
 from reports.paper.ledger import Check, Line, above, below, equals, source, words
 
 from .evidence import Evidence, families_command
-from .named import front_rate
 from .profile import abscissa, apart, figure_coordinates, nearest
 from .search import search
 
@@ -96,7 +95,7 @@ def _small_curvature(evidence: Evidence) -> Iterator[Line]:
     before = evidence.found(_PLANE)
     changes = [abs(float(found.static[0][STEER] - before.static[0][STEER]))]
     changes += [abs(float(found.pivoting[0][k] - before.pivoting[0][k])) for k in (3, STEER)]
-    rates = [abs(front_rate(one.pivoting[0])) for one in (before, found)]
+    rates = [abs(one.equations.motion(one.pivoting[0]).front_rate) for one in (before, found)]
     changes.append(float(np.ptp(abscissa(evidence.bicycle, np.array(rates)))))
     yield words(
         section="3.3",

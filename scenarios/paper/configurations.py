@@ -11,7 +11,6 @@ from reference.families import motions
 from reports.paper.ledger import Check, Line, Source, Threshold, above, below, figure, source, words
 
 from .evidence import Evidence
-from .named import front_rate
 
 NAMES = ("P1", "P2", "P3", "P4")
 _ROUND_OFF = 1e-14  # of numbers of order ten
@@ -68,7 +67,7 @@ def own_errors(evidence: Evidence, name: str, motion: CircularMotion) -> dict[st
     off = {
         "lean": u[LEAN] - motion.lean,
         "steer": u[STEER] - motion.steer,
-        "front_rate": front_rate(u) - motion.front_rate,
+        "front_rate": found.equations.motion(u).front_rate - motion.front_rate,
         "x": u[0] - motion.position[0],
         "y": u[1] - motion.position[1],
     }

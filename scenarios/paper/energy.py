@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 from reference.circular import LEAN, CircularMotion
-from reference.continuation import Point, root_between
+from reference.continuation import Point, roots_along
 from reference.curve import sample
 from reference.families import Family
 from reference.sections import sample_family
@@ -24,8 +22,8 @@ def motion_of_energy(family: Family, energy: float, near: CircularMotion) -> Cir
         return float(sample(family.equations, point.unknowns[None]).energy[0]) - energy
 
     values = sample_family(family).energy - energy
-    brackets = [pair for k, pair in enumerate(pairwise(family.points)) if values[k] * values[k + 1] < 0]
-    if not brackets:
+    roots = [root for _, root in roots_along(family.equations, family.points, excess, values)]
+    if not roots:
         raise ValueError(f"no motion of family {family.number} has an energy of {energy!r} J")
-    first, second = min(brackets, key=lambda pair: abs(pair[0].unknowns[LEAN] - near.lean))
-    return family.equations.motion(root_between(family.equations, first, second, excess).unknowns)
+    nearest = min(roots, key=lambda point: abs(point.unknowns[LEAN] - near.lean))
+    return family.equations.motion(nearest.unknowns)

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference.circular import LEAN, REAR_SPEED, SIGMA, STEER, Steady, newton, unknown_condition
-from reference.kernels.steady import SIGMA_UNIT
+from reference.circular import LEAN, STEER, Steady, newton, unknown_condition
 
 _NEAREST = 2e-3  # rad from +-pi/2: nearer, forces are so large that their round-off reaches the other rows
 _MOST = 40
@@ -62,8 +61,8 @@ def limit(equations: Steady, ends: Sequence[np.ndarray], side: int) -> Limit:
         unknowns, _ = newton(equations, unknowns, condition, most=_MOST)
         off = float(np.abs(equations.residual(unknowns)).max())
         residual = max(residual, off / (1 + float(np.abs(unknowns).max())))
-        speed = np.sqrt(SIGMA_UNIT * unknowns[SIGMA]) * np.sign(unknowns[REAR_SPEED])
-        rows.append((distance, float(speed * unknowns[8]), float(unknowns[STEER]), float(np.hypot(*unknowns[:2]))))
+        rate = equations.motion(unknowns).front_rate
+        rows.append((distance, rate, float(unknowns[STEER]), float(np.hypot(*unknowns[:2]))))
     (_, _, s0, _), (_, r1, s1, _), (d2, r2, s2, radius) = rows[-3:]
     # Halving: an error of the first order leaves half of itself.
     steer = 2 * s2 - s1

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference.circular import FRONT_SPEED, LEAN, REAR_SPEED, SIGMA, STEER
+from reference.circular import LEAN, REAR_SPEED, STEER
+from reference.continuation import sign_changes
 from reference.families import FAMILIES, Family, front_rate_slope, trace
-from reference.kernels.steady import SIGMA_UNIT
 from reference.special import SpecialPoint, special_points, straight_motion
 from reports.paper.ledger import Check, Line, above, below, count, figure, source, untestable, words
 
@@ -49,7 +49,7 @@ def point(evidence: Evidence, family: int, name: str) -> tuple[SpecialPoint, dic
     error = {field: abs(getattr(one, field) - getattr(other, field)) for field in names}
     found = evidence.found(_LEVEL)
     for alone in {"A": found.static, "G": found.pivoting}.get(name, []):
-        rate = abs(front_rate(alone)) - abs(one.front_rate)
+        rate = abs(found.equations.motion(alone).front_rate) - abs(one.front_rate)
         for field, off in (("lean", alone[LEAN] - one.lean), ("steer", alone[STEER] - one.steer), ("front_rate", rate)):
             error[field] = max(error[field], abs(float(off)))
     return one, {field: off + _ROUND_OFF for field, off in error.items()}
@@ -193,7 +193,7 @@ def _second(evidence: Evidence) -> Iterator[Line]:
     for name, what in (("lean", "lean"), ("steer", "steer"), ("front_rate", "front rate")):
         yield figure("3.2", f"D: {what}", printed[name], getattr(cusp, name), error[name], _SPECIAL)
     rate = cusp.front_rate - _BEYOND_CUSP
-    crossings = int(np.sum(np.diff(np.sign(samples.front_rate - rate)) != 0))
+    crossings = len(sign_changes(samples.front_rate - rate))
     yield words(
         section="3.2",
         claim="around the cusp D lean and steer take several values at a front rate",
@@ -289,9 +289,3 @@ def _agreement(evidence: Evidence) -> Line:
         checks=[model],
         kind="number",
     )
-
-
-def front_rate(unknowns: np.ndarray) -> float:
-    """Front rate of a solution, run so that the rear wheel rolls forward [rad/s]."""
-    speed = np.sqrt(SIGMA_UNIT * max(unknowns[SIGMA], 0.0))
-    return float(speed * unknowns[FRONT_SPEED] * np.sign(unknowns[REAR_SPEED]))

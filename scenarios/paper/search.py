@@ -19,8 +19,8 @@ from reference.circular import (
     rear_rate_condition,
     unknown_condition,
 )
-from reference.continuation import follow
-from reference.kernels.steady import UNKNOWNS
+from reference.continuation import follow, sign_changes
+from reference.kernels.steady import STANDING, UNKNOWNS
 
 _MOST = 25  # Newton steps
 _SAME = 1e-5  # two solutions of one start's condition; each is known to round-off
@@ -137,7 +137,7 @@ def distance(curve: np.ndarray, unknowns: np.ndarray) -> float:
 
 
 def _pivots(curve: np.ndarray) -> int:
-    return int(np.sum(curve[:-1, REAR_SPEED] * curve[1:, REAR_SPEED] < 0))
+    return len(sign_changes(curve[:, REAR_SPEED], STANDING))
 
 
 def _solutions(equations: Steady, condition: Callable, grid: Grid) -> Iterator[np.ndarray]:

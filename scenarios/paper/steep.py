@@ -10,6 +10,7 @@ from reference.circular import LEAN, REAR_SPEED, SIGMA, STEER
 from reference.critical import reconnections
 from reference.curve import sample
 from reference.families import FAMILIES, trace
+from reference.kernels.steady import STANDING
 from reports.paper.ledger import Check, Line, Source, above, below, count_by_cut, equals, source, words
 
 from .bowl import profiles
@@ -200,7 +201,7 @@ def _pushed(found: Found) -> int:
     pieces = 0
     for curve in found.curves:
         # A pivoting motion itself has a rear rate of zero to round-off, of either sign: its neighbours tell.
-        moving = curve[(curve[:, SIGMA] >= 0) & (np.abs(curve[:, REAR_SPEED]) > 1e-9)]
+        moving = curve[(curve[:, SIGMA] >= 0) & (np.abs(curve[:, REAR_SPEED]) > STANDING)]
         physical = sample(found.equations, moving).physical
         turns = (moving[:-1, REAR_SPEED] * moving[1:, REAR_SPEED] < 0) & physical[:-1] & physical[1:]
         pieces += int(physical[0]) + int(np.sum(~physical[:-1] & physical[1:])) + int(np.sum(turns))

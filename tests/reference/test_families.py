@@ -341,7 +341,7 @@ def test_modes_have_the_names_that_they_have_on_the_plane() -> None:
     angles = np.array([point.unknowns[[LEAN, STEER]] for point in curve.points])
     named = modes(curve)[np.linalg.norm(angles - (0.7374, 2.837), axis=1).argmin()]
     # Points are 0.05 of arc apart, along which the fastest eigenvalue moves by 1.
-    assert np.abs(named[1:4] - [-12.28, -0.43, -0.14 - 6.71j]).max() < 1
+    assert np.abs(named[1:4] - [-12.28, -0.43, -0.14 + 6.71j]).max() < 1
     assert np.abs(np.imag(named[5:])).max() == pytest.approx(2.35, abs=0.1)
 
 
