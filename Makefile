@@ -6,7 +6,7 @@ STAMP := .venv/set-up
 LOWEST := .venv-lowest
 LOWEST_STAMP := $(LOWEST)/set-up
 
-.PHONY: run test test-all test-lowest lint check
+.PHONY: run test test-all test-lowest test-machines test-machines-short lint check
 
 run: $(STAMP)
 	$(BIN)/velodrome run q2-plus
@@ -19,6 +19,13 @@ test-all: $(STAMP)
 
 test-lowest: $(LOWEST_STAMP)
 	$(LOWEST)/bin/python -m pytest
+
+# The tests that round-off could sway, as other CPUs would run them.
+test-machines: $(STAMP)
+	$(BIN)/python -m tests.machines
+
+test-machines-short: $(STAMP)
+	$(BIN)/python -m tests.machines --short
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -45,9 +45,9 @@ from .circular import (
     REAR_SPEED,
     SIGMA,
     STEER,
-    YAW_SPEED,
     Condition,
     Steady,
+    as_solved,
     nearest_condition,
     newton,
     rear_rate_condition,
@@ -153,7 +153,7 @@ def _carry(
     more than a step should is taken again, shorter.
     """
     reached = 0.0
-    u = turned(u) if u[YAW_SPEED] < 0 else u  # as the solver gives them: an anchor at a pivot may run the other way
+    u = as_solved(u)
     while reached < 1:
         wanted = min(1.0, reached + step)
         carried = _step_on(path(wanted), u, condition)

@@ -151,6 +151,11 @@ def turned(unknowns: np.ndarray) -> np.ndarray:
     return other
 
 
+def as_solved(unknowns: np.ndarray) -> np.ndarray:
+    """The same solution (22,) with the signs of the speeds that solvers give: a turn to the left."""
+    return turned(unknowns) if unknowns[YAW_SPEED] < 0 else unknowns
+
+
 @dataclass(frozen=True)
 class Condition:
     """One more equation, value = 0, that picks a point of a family: its value and gradient."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from .circular import CONTACT, Condition, Steady, newton
+from .circular import CONTACT, Condition, Steady, as_solved, newton, turned
 from .kernels import curve as kernel
 from .kernels.steady import UNKNOWNS
 from .surface import SurfaceOfRevolution, has_tip
@@ -52,7 +52,7 @@ def metric(u: np.ndarray) -> np.ndarray:
 
 
 def tangent(equations: Steady, u: np.ndarray) -> np.ndarray:
-    """Direction of the curve, of unit length in the arclength's metric, of either sign."""
+    """Direction of the curve at a solution `as_solved`, of unit length in the arclength's metric, of either sign."""
     chosen, full, along = u[kernel.CHOSEN], np.empty(UNKNOWNS), np.empty(UNKNOWNS)
     # Rank 8 of 9: the singular vector of the smallest singular value.
     null = np.linalg.svd(equations.expand(chosen).jacobian)[2][-1]
@@ -82,8 +82,10 @@ def follow(
     Point
         The start, then points along the curve, until it ends: with the first point of sigma < 0, beyond
         the largest lean, circle or speed, at the edge of the ground, before a tip of it, or where the shortest
-        steps no longer converge.
+        steps no longer converge. The speeds of all are `as_solved`.
     """
+    if as_solved(start) is not start:
+        start, towards = turned(start), turned(towards)
     direction = tangent(equations, start)
     first = Point(start, direction if direction @ towards > 0 else -direction)
     tip, side = has_tip(equations.surface), start[_REAR_SIDE]

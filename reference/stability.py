@@ -14,9 +14,9 @@ from .kernels.pose import aligned
 from .kinematics import FRONT_ANGLE, LEAN, REAR_ANGLE, STEER, YAW, constants
 from .surface import Surface, is_level
 
-# Both of a matrix's largest eigenvalue. Real parts nearer to each other are equal but for round-off, which is some 1e-15
-# times an eigenvalue's condition, 1e2 to 1e4 along the families. A double zero splits by the root of that, 1e-8 to
-# 1e-7; the slowest pair, of circles of a kilometre on the plane, turns at 1e-4.
+# Both of a matrix's largest eigenvalue. Real parts nearer to each other are equal but for round-off, which is some
+# 1e-15 times an eigenvalue's condition, 1e2 to 1e4 along the families. A double zero splits by the root of that, 1e-8
+# to 1e-7; the slowest pair, of circles of a kilometre on the plane, turns at 1e-4.
 _EQUAL, _ZERO = 1e-9, 1e-6
 
 # x and y in the heading frame.
