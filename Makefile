@@ -2,8 +2,11 @@ PYTHON ?= python3
 BIN := .venv/bin
 # The stamp's time is that of the last set-up: a changed list of packages sets up again.
 STAMP := .venv/set-up
+# The oldest versions of the direct dependencies that the suite claims to work with.
+LOWEST := .venv-lowest
+LOWEST_STAMP := $(LOWEST)/set-up
 
-.PHONY: run test test-all test-machines test-machines-short lint check
+.PHONY: run test test-all test-lowest test-machines test-machines-short lint check
 
 run: $(STAMP)
 	$(BIN)/velodrome run q2-plus
@@ -13,6 +16,9 @@ test: $(STAMP)
 
 test-all: $(STAMP)
 	$(BIN)/python -m pytest -m ""
+
+test-lowest: $(LOWEST_STAMP)
+	$(LOWEST)/bin/python -m pytest
 
 # The tests that round-off could sway, as other CPUs would run them.
 test-machines: $(STAMP)
@@ -33,4 +39,9 @@ $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit("velodrome needs Python 3.11 or newer") if sys.version_info < (3, 11) else None'
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+$(LOWEST_STAMP): pyproject.toml constraints-lowest.txt
+	$(PYTHON) -m venv $(LOWEST)
+	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints-lowest.txt --editable '.[benchmark,cluster]' hypothesis pillow pytest
 	touch $@

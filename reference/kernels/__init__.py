@@ -5,7 +5,8 @@ step: no conjugation, no absolute value, comparisons on real parts only.
 
 Compiled code is cached on disk. numba renews an entry when the file of the function changes, but not
 when a kernel that it calls from another file does; so the cache's folder carries a fingerprint of all
-kernels, and a changed kernel starts a new one.
+kernels, and a changed kernel starts a new one. Another version of numba does so too: it would write over
+the entries of the first.
 """
 
 # numba fills its configuration in at run time.
@@ -14,12 +15,12 @@ kernels, and a changed kernel starts a new one.
 import hashlib
 from pathlib import Path
 
-from numba import config
+from numba import __version__, config
 
 
 def _cache_folder() -> str:
     here = Path(__file__).parent
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(__version__.encode())
     for source in sorted(here.glob("*.py")):
         digest.update(source.read_bytes())
     # A folder that the user chose through NUMBA_CACHE_DIR stays the place.

@@ -60,7 +60,7 @@ class Grid:
 
 GRID = Grid((-1.2, 1.2, 7), (0.05, 3.09, 7), (4.0, 12.0, 18.0, 24.0))
 # Starts of which none is one of the other grid's, nor at one of its rates: what both find is not a grid's chance.
-OTHER_GRID = Grid((-1.3, 1.3, 8), (0.02, 3.12, 8), (2.0, 7.0, 15.0, 21.0, 40.0))
+OTHER_GRID = Grid((-1.3, 1.3, 6), (0.02, 3.12, 6), (2.0, 7.0, 15.0, 30.0))
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from reference.circular import LEAN, REAR_SPEED, SIGMA, STEER
 from reference.critical import reconnections
 from reference.curve import sample
 from reference.families import FAMILIES, trace
+from reference.kernels.steady import STANDING
 from reports.paper.ledger import Check, Line, Source, above, below, count_by_cut, equals, source, words
 
 from .bowl import profiles
@@ -22,6 +23,7 @@ _STEEP, _DEEP = 1.0, 0.2
 _BETWEEN = (0.425, 0.44, 0.46)  # where no pivoting motion is left
 _MUCH = 0.4  # rad in the figures' coordinates: twice what counts as alike
 _NEAR_REST, _NEAR_INFINITY = 0.41, 0.47  # alphas at which the pivoting motion is slow, and fast
+_G_AND_A = ("pivot", "static")
 _SAME = 0.1  # in `coordinates`: curves are followed in steps of as much
 
 
@@ -199,7 +201,7 @@ def _pushed(found: Found) -> int:
     pieces = 0
     for curve in found.curves:
         # A pivoting motion itself has a rear rate of zero to round-off, of either sign: its neighbours tell.
-        moving = curve[(curve[:, SIGMA] >= 0) & (np.abs(curve[:, REAR_SPEED]) > 1e-9)]
+        moving = curve[(curve[:, SIGMA] >= 0) & (np.abs(curve[:, REAR_SPEED]) > STANDING)]
         physical = sample(found.equations, moving).physical
         turns = (moving[:-1, REAR_SPEED] * moving[1:, REAR_SPEED] < 0) & physical[:-1] & physical[1:]
         pieces += int(physical[0]) + int(np.sum(~physical[:-1] & physical[1:])) + int(np.sum(turns))
@@ -228,10 +230,10 @@ def _combined_somewhere(evidence: Evidence) -> Line:
         claim="when alpha is large enough families 1, 3 and 4 are one",
         thresholds=[
             above("alphas from the touching point to where G is at rest", rest - low, 0.0, "1/m"),
-            equals("half-way, ends of G's curve that are G and A", sum(e in ("pivot", "static") for e in middle), 2),
+            equals("half-way, ends of G's curve that are G and A", sum(end in _G_AND_A for end in middle), 2),
         ],
-        measured=f"literally so from alpha = {low:.11f} to {rest:.11f}, where G comes to rest: the curve of G and H runs "
-        "to A; not at alpha = 1",
+        measured=f"literally so from alpha = {low:.11f} to {rest:.11f}, where G comes to rest: the curve of G and H "
+        "runs to A; not at alpha = 1",
         source=source("the touching point, and the alpha at which G comes to rest", reconnections, pivot_at),
         checks=[
             Check("residual of the touching point's equations", np.inf if touch is None else touch.residual, 1e-12),
@@ -271,8 +273,8 @@ def _never_without(evidence: Evidence) -> Line:
         section="5",
         claim="families 3 and 4 can always be merged through the pivoting motion",
         thresholds=[equals("least number of pivoting motions at alphas between the five cases", least, 1)],
-        measured=f"from alpha = {rest:.11f}, where G comes to rest, to {fast:.11f}, from where on there is another that "
-        f"begins infinitely fast, there is no pivoting motion: at alpha = {', '.join(f'{a:g}' for a in inside)} a "
+        measured=f"from alpha = {rest:.11f}, where G comes to rest, to {fast:.11f}, from where on there is another "
+        f"that begins infinitely fast, there is no pivoting motion: at alpha = {', '.join(f'{a:g}' for a in inside)} a "
         f"search finds {none}, and both, carried on there, would have negative squared rates, {min(squares):.1f} to "
         f"{max(squares):.1f} rad^2/s^2. Both ends are solved for, what lies between is sampled",
         source=source(

@@ -16,6 +16,7 @@ import pytest
 from complaints import refusing
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
+from packaging.version import Version
 
 from engines import engine as registry
 from reports.drift import Verdict
@@ -224,21 +225,48 @@ def test_a_files_name_is_no_formula_in_a_figure(tmp_path: Path) -> None:
 
 def test_every_installed_requirement_is_pinned() -> None:
     """The requirements of the suite and its extras, with all of theirs, against constraints.txt."""
-    pins = {}
-    for line in (ROOT / "constraints.txt").read_text().splitlines():
-        name, equals, version = line.partition("==")
-        assert equals, line
-        pins[canonicalize_name(name)] = version.strip()
+    pins = read_pins("constraints.txt")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
     # What only a benchmark compares with may be absent.
     asked = [*project["dependencies"], *(line for extra in extras.values() for line in extra)]
     found = dict(installed([Requirement(line) for line in asked]))
     assert {canonicalize_name(Requirement(line).name) for line in project["dependencies"]} <= set(found)
+    lowest = read_pins("constraints-lowest.txt")
+    if {name: found.get(name) for name in lowest} == lowest:
+        pytest.skip("the environment of the lowest versions, of which constraints-lowest.txt pins the direct ones")
     wrong = {name: version for name, version in found.items() if pins.get(name) != version}
     in_benchmark = dict(installed([Requirement(line) for line in extras.get("benchmark", [])]))
     wrong = {name: version for name, version in wrong.items() if name not in in_benchmark}
     assert not wrong, f"installed, but not pinned so in constraints.txt: {wrong}"
+
+
+def read_pins(file: str) -> dict[str, str]:
+    pins = {}
+    for line in (ROOT / file).read_text().splitlines():
+        name, equals, version = line.partition("==")
+        assert equals, line
+        pins[canonicalize_name(name)] = version.strip()
+    return pins
+
+
+def test_lower_bounds_are_the_versions_that_are_tested() -> None:
+    """Every direct dependency, at its lower bound in pyproject.toml and nothing else in constraints-lowest.txt."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    bounds: dict[str, set[Version]] = {}
+    for line in (
+        *project["dependencies"],
+        *(line for extra in project["optional-dependencies"].values() for line in extra),
+    ):
+        required = Requirement(line)
+        # The linters run in the pinned environment alone.
+        if required.name in ("pyright", "ruff"):
+            continue
+        (bound,) = required.specifier
+        assert bound.operator == ">=", line
+        bounds.setdefault(canonicalize_name(required.name), set()).add(Version(bound.version))
+    lowest = {name: {Version(version)} for name, version in read_pins("constraints-lowest.txt").items()}
+    assert lowest == bounds
 
 
 def installed(requirements: list[Requirement]) -> Iterator[tuple[str, str]]:
@@ -261,7 +289,8 @@ def installed(requirements: list[Requirement]) -> Iterator[tuple[str, str]]:
                 todo.append((required.name, frozenset(required.extras)))
 
 
-def test_pins_are_exact() -> None:
-    lines = (ROOT / "constraints.txt").read_text().splitlines()
+@pytest.mark.parametrize("file", ["constraints.txt", "constraints-lowest.txt"])
+def test_pins_are_exact(file: str) -> None:
+    lines = (ROOT / file).read_text().splitlines()
     assert all(re.fullmatch(r"[A-Za-z0-9._-]+==[0-9][A-Za-z0-9.+!]*", line) for line in lines)
     assert len({canonicalize_name(line.partition("==")[0]) for line in lines}) == len(lines)

@@ -1,5 +1,6 @@
 """The ledger: its lines hold, and with a wrong print or a wrong bicycle they do not."""
 
+import importlib
 from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import replace
@@ -7,24 +8,33 @@ from typing import Any
 
 import numpy as np
 import pytest
+import typer
 
 from reference.bicycle import Bicycle
-from reference.circular import Steady
+from reference.circular import REAR_SPEED, SIGMA, Steady, newton, unknown_condition
+from reference.kernels.curve import CHOSEN
+from reference.stability import linearise
 from reference.surface import Paraboloid
 from reports.paper import printed
-from reports.paper.ledger import FAILS, KINDS, ROUNDS, TRUNCATED, Line, document
+from reports.paper.ledger import DEPENDS, FAILS, KINDS, REPRODUCED, ROUNDS, TRUNCATED, UNTESTABLE, Line, document
+from scenarios.cli import app
 from scenarios.paper import ledger
-from scenarios.paper.configurations import configuration_lines
+from scenarios.paper.configurations import configuration_lines, named_motion
 from scenarios.paper.evidence import Evidence
+from scenarios.paper.fast import expand, follow_flat_end, pivot_at, pivoting, solve, squared_rates, with_angle
 from scenarios.paper.limits import limit
 from scenarios.paper.model import model_check
 from scenarios.paper.named import plane_lines
+from scenarios.paper.pencil import generalised_eigenvalues, linearised_dae, number_of_finite, spurious
 from scenarios.paper.points import point_lines
 from scenarios.paper.profile import apart, nearest
+from scenarios.paper.rates import rate_lines
+from scenarios.paper.reduction import reduction_lines
 from scenarios.paper.rides import ride_lines
-from scenarios.paper.search import mirrored
+from scenarios.paper.search import OTHER_GRID, mirrored, missing, search
 from scenarios.paper.stability import section_lines
 from scenarios.paper.structure import structure_lines
+from scenarios.paper.unseen import unseen_lines
 
 
 @pytest.fixture(scope="module")
@@ -48,10 +58,41 @@ def altered(evidence: Evidence, *path: Any, value: Any) -> Evidence:
     return replace(evidence, figures=figures)
 
 
+def all_say_how(lines: list[Line]) -> None:
+    """Every line has thresholds that no round-off can move, and a source whose functions and commands exist."""
+    commands: Any = typer.main.get_command(app)
+    for line in lines:
+        if line.verdict == UNTESTABLE:
+            assert line.measured, line.claim
+            continue
+        assert line.thresholds, line.claim
+        assert line.source.computed, line.claim
+        for threshold in line.thresholds:
+            size = max(abs(threshold.value), abs(threshold.limit))
+            clear = abs(threshold.value - threshold.limit) > 1e-9 * size
+            assert clear or threshold.relation == "=", (line.claim, threshold)
+        for name in line.source.functions:
+            assert callable(resolved(name)), name
+        for command in (line.source.command or "").split(" && "):
+            program, name, *arguments = command.split()
+            assert program == "velodrome"
+            commands.commands[name].make_context(name, arguments)
+
+
+def resolved(name: str) -> Any:
+    """What a full name stands for: a module's function, or a class's."""
+    module, *rest = name.rsplit(".", 1)
+    try:
+        return getattr(importlib.import_module(module), *rest)
+    except ModuleNotFoundError:
+        return getattr(resolved(module), *rest)
+
+
 def test_structure_and_simulations_hold(evidence: Evidence) -> None:
     lines = [*structure_lines(evidence), *ride_lines(evidence)]
     assert failing(iter(lines)) == {}
     assert len(lines) > 20
+    all_say_how(lines)
 
 
 def test_every_figure_of_the_plane_rounds_but_one_that_is_cut_off(evidence: Evidence) -> None:
@@ -59,6 +100,117 @@ def test_every_figure_of_the_plane_rounds_but_one_that_is_cut_off(evidence: Evid
     assert failing(iter(lines)) == {}
     assert [line.claim for line in lines if line.verdict == TRUNCATED] == ["D: steer"]
     assert sum(line.verdict == ROUNDS for line in lines) == 8
+    all_say_how(lines)
+
+
+def test_figures_of_points_hold_and_say_how(evidence: Evidence) -> None:
+    lines = [*configuration_lines(evidence), *point_lines(evidence), *unseen_lines(evidence)]
+    assert failing(iter(lines)) == {}
+    all_say_how(lines)
+
+
+def test_rear_rates_run_to_infinity(evidence: Evidence) -> None:
+    lines = list(rate_lines(evidence))
+    assert failing(iter(lines)) == {}
+    all_say_how(lines)
+
+
+def test_fast_equations_are_the_steady_ones(evidence: Evidence) -> None:
+    """Rows at any sigma are the affine ones; a family's point solves them, and again from a moved guess."""
+    family = evidence.family(0.2, 2)
+    unknowns = family.points[len(family.points) // 2].unknowns
+    chosen = with_angle(unknowns)
+    here = expand(family.equations, chosen)
+    # The point's own residual is some 1e-14, of accelerations of order 10.
+    assert np.abs(here.rows).max() < 1e-11
+    at = unknowns[CHOSEN].copy()
+    at[6] = 3.7
+    rows, angle = family.equations.expand(at).rows, at.copy()
+    angle[6] = np.arctan(3.7)
+    scale = np.where(np.arange(8) < 6, 1.0, np.cos(angle[6]))
+    # Sums of terms of up to a hundred.
+    assert expand(family.equations, angle).rows == pytest.approx(scale * rows, abs=1e-12)
+    changes = np.array(
+        [
+            (expand(family.equations, chosen + 1e-6 * e).rows - expand(family.equations, chosen - 1e-6 * e).rows) / 2e-6
+            for e in np.eye(9)
+        ]
+    ).T
+    assert here.jacobian == pytest.approx(changes, rel=1e-6, abs=1e-6 * np.abs(here.jacobian).max())
+    lean = float(chosen[3])
+    again = solve(family.equations, chosen + 1e-3, lambda x, _: (float(x[3]) - lean, np.eye(9)[3]))
+    assert again == pytest.approx(chosen, abs=1e-10)
+
+
+def test_a_flat_end_is_followed_by_its_law(evidence: Evidence) -> None:
+    family = evidence.family(0.0, 3)
+    near, far = (follow_flat_end(family.equations, family.points[-1].unknowns, d) for d in (1e-3, 1e-6))
+    # Squared rate times distance is constant but for a relative correction of the distance's order.
+    assert near.constant == pytest.approx(far.constant, rel=10 * near.distance)
+    assert far.rear_rate > 2e4
+    # The motions of moderate speed are the family's.
+    assert family.points[-1].unknowns[SIGMA] > 0
+
+
+def test_no_pivoting_motion_between_two_alphas(evidence: Evidence) -> None:
+    """Both ends are solved for; on either side of each the squared speed has the signs that make it an end."""
+    bicycle = evidence.bicycle
+    start = with_angle(evidence.found(0.2).pivoting[0])
+    rest, still = pivot_at(bicycle, start, 0.2, towards=0.41, angle=0.0)
+    assert rest == pytest.approx(0.41962074367657, abs=1e-12)
+    for shape, sign in ((rest - 1e-3, 1), (rest + 1e-3, -1)):
+        moved = solve(Steady(bicycle, Paraboloid(shape)), still, pivoting)
+        assert np.sign(squared_rates(moved)) == sign
+    # The same by the equations in sigma.
+    full, _ = newton(
+        Steady(bicycle, Paraboloid(rest)),
+        Steady(bicycle, Paraboloid(rest)).expand(np.where(np.arange(9) == 6, 0.0, still)).full,
+        unknown_condition(REAR_SPEED, 0.0),
+        most=30,
+    )
+    assert abs(full[SIGMA]) < 1e-12
+    fast, quick = pivot_at(bicycle, with_angle(evidence.found(1.0).pivoting[0]), 1.0, towards=0.47, angle=np.pi / 2)
+    assert fast == pytest.approx(0.46360209675220, abs=1e-12)
+    for shape, sign in ((fast + 1e-3, 1), (fast - 1e-3, -1)):
+        moved = solve(Steady(bicycle, Paraboloid(shape)), quick, pivoting)
+        assert np.sign(squared_rates(moved)) == sign
+        assert abs(squared_rates(moved)) > 5000
+    assert evidence.found(0.44).pivoting == []
+
+
+def test_the_pencil_has_the_reduced_systems_seven_and_twenty_spurious(evidence: Evidence) -> None:
+    motion, surface = named_motion(evidence, "Q2"), Paraboloid(0.005)
+    e, h = linearised_dae(evidence.bicycle, surface, motion)
+    reduced = linearise(evidence.bicycle, surface, *motion.state()).eigenvalues
+    assert np.linalg.matrix_rank(e) == 15
+    assert number_of_finite(e, h) == 7
+    found = generalised_eigenvalues(e, h)
+    off, rest = spurious(found, reduced)
+    # Round-off of order 1e-15 times the norm, 1e3, times the condition.
+    assert off < 1e-9
+    assert len(rest) == 20
+    # What is spurious is far from all that the motion has.
+    assert np.abs(rest).min() > 1e3 * np.abs(reduced).max()
+    # Were one of the seven not the pencil's, it would show.
+    assert spurious(found, reduced + 0.01)[0] > 1e-3
+
+
+def test_the_reduced_system_is_the_linearised_dae(evidence: Evidence) -> None:
+    lines = list(reduction_lines(evidence))
+    assert failing(iter(lines)) == {}
+    assert [line.verdict for line in lines if "spurious" in line.claim] == [REPRODUCED]
+    all_say_how(lines)
+
+
+def test_a_second_grid_of_starts_finds_the_same(evidence: Evidence) -> None:
+    found = evidence.found(0.2)
+    again = search(found.equations, OTHER_GRID)
+    assert missing(found, again) == 0
+    assert again.described != found.described
+    # A search that has lost a curve or found another motion shows.
+    assert missing(replace(found, curves=found.curves[1:]), again) > 0
+    assert missing(replace(found, pivoting=[]), again) > 0
+    assert missing(replace(found, static=[*found.static, found.static[0] + 0.01]), again) > 0
 
 
 @pytest.mark.parametrize(
@@ -125,7 +277,8 @@ def test_the_whole_ledger() -> None:
     parts: list[tuple[str, float, float]] = []
     lines = ledger(lambda *seen: parts.append(seen))
     assert parts[-1][1] == parts[-1][2]
-    assert len(lines) > 100
+    assert len(lines) > 145
+    all_say_how(lines)
     assert {line.kind for line in lines} == set(KINDS)
     assert [line.section for line in lines] == sorted(line.section for line in lines)
     # What the paper has wrong, each shown to be its own.
@@ -133,11 +286,16 @@ def test_the_whole_ledger() -> None:
     assert set(found.values()) == {"paper"}
     assert sorted(found) == [
         "at alpha = 0.005 stable motions are in families: 2",
-        "at alpha = 1 there still are four families",
+        "at alpha = 1 family 3 merges with family 1 at point B",
+        "families 3 and 4 can always be merged through the pivoting motion",
         "so at alpha = 1 families 1, 3 and 4 are one combined family",
         "there always are one static equilibrium and one pivoting motion",
     ]
-    assert document(lines)["faults"] == {"paper": 4, "ours": 0}
+    assert document(lines)["faults"] == {"paper": 5, "ours": 0}
+    # The count under each cut: on the plane 3, 4 and 4.
+    (cut,) = [line for line in lines if line.verdict == DEPENDS]
+    assert cut.claim == "at alpha = 1 there still are four families"
+    assert [threshold.value for threshold in cut.thresholds] == [4, 5, 4]
 
 
 @pytest.mark.slow
