@@ -35,6 +35,7 @@ TESTS = (
 SHORT_TESTS = (
     *(f"tests/reference/test_{name}.py" for name in ("families", "running_direction", "stability")),
     "tests/reports/test_modes.py",
+    "tests/scenarios/test_paper.py",
 )
 ALPHAS = (0.0, 1 / 200, 1 / 5, 1.0)
 # Of a row's largest number: a double zero splits by the root of round-off times its condition, 1e-7.
