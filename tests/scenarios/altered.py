@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from engines.engine import Engine, Problem, Progress, Settings, Trajectory
@@ -51,6 +52,10 @@ class Altered:
 
     def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
         return self.after(self.inner.simulate(self.before(problem), settings, progress))
+
+
+# Where `raising` raises, as it is named.
+RAISED_AT = f"altered.py:{Path(__file__).read_text().splitlines().index('        raise error') + 1}"
 
 
 def raising(error: BaseException) -> Callable[[Trajectory], Trajectory]:
