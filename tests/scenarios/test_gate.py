@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from altered import Altered, raising
+from altered import RAISED_AT, Altered, raising
 from gating import (
     Chosen,
     altered,
@@ -212,7 +212,7 @@ def test_numbers_that_are_none_fail() -> None:
     ("after", "words"),
     [
         (raising(EngineError("no contact at the start")), "did not run: no contact at the start"),
-        (raising(ZeroDivisionError("by zero")), "did not run: by zero"),
+        (raising(ZeroDivisionError("by zero")), f"did not run: ZeroDivisionError: by zero ({RAISED_AT})"),
         (lambda trajectory: replace(trajectory, ended="Newton failed at 0.5 s"), "did not run: Newton failed at 0.5 s"),
     ],
 )
