@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .engine import REQUIRED, SHAPES, Engine, EngineError, Problem, Progress, Settings, Trajectory
+from .guard import simulate
 
 
 def ride(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
@@ -34,7 +35,7 @@ def ride(engine: Engine, problem: Problem, settings: Any, progress: Progress) ->
     Exception
         Whatever the engine raises.
     """
-    trajectory = engine.simulate(problem, settings, progress)
+    trajectory = simulate(engine, problem, settings, progress)
     if not isinstance(trajectory, Trajectory):
         raise EngineError(f"it gave a {type(trajectory).__name__}, not a Trajectory")
     for wrong in _faults(engine, problem, settings, trajectory):

@@ -19,6 +19,9 @@ from pydantic import BaseModel, ConfigDict
 from reference.bicycle import Bicycle
 from reference.surface import Surface
 
+from .guard import EngineError as EngineError
+from .guard import GuardedEngine, call_engine, where_raised
+
 ENTRY_POINT_GROUP = "velodrome.engines"
 REFERENCE = "reference"
 
@@ -226,11 +229,8 @@ class Engine(Protocol):
         ...
 
 
-_MEMBERS = ("name", "version", "gives", "settings", "check", "step_noise", "simulate")
-
-
-class EngineError(RuntimeError):
-    """An engine could not run a problem at all."""
+_FACTS = ("name", "version", "gives", "settings")
+_MEMBERS = (*_FACTS, "check", "step_noise", "simulate")
 
 
 class UnsuitableProblem(ValueError):
@@ -292,16 +292,26 @@ def load_engine(name: str) -> Engine:
     if name not in points:
         raise ValueError(f"engine {name!r} is not installed; there are {', '.join(engine_names())}")
     where = f"engine {name!r}, announced as {points[name].value},"
+    engine = None
     try:
-        engine = points[name].load()
+        engine = call_engine(points[name].load)
+        members = {member: call_engine(getattr, engine, member) for member in _MEMBERS}
     except Exception as error:  # another package's code may break in any way
-        raise ValueError(f"{where} cannot be loaded: {type(error).__name__}: {error}") from error
-    for member in _MEMBERS:
-        if not hasattr(engine, member):
-            raise ValueError(f"{where} is no engine: it has no {member}")
-    if engine.name != name:
-        raise ValueError(f"{where} calls itself {engine.name!r}; both names must be the same")
-    return engine
+        if isinstance(error, AttributeError) and error.obj is engine and where_raised(error) is None:
+            raise ValueError(f"{where} is no engine: it has no {error.name}") from error
+        raise ValueError(f"{where} cannot be loaded: {why_failed(error)}") from error
+    if members["name"] != name:
+        raise ValueError(f"{where} calls itself {members['name']!r}; both names must be the same")
+    return GuardedEngine(engine, **{fact: members[fact] for fact in _FACTS})
+
+
+def why_failed(error: Exception) -> str:
+    """Say in one line why an engine failed: its own words where it chose them, else what broke in which line."""
+    if isinstance(error, EngineError):
+        return " ".join(str(error).split())
+    place = None if isinstance(error, UnsuitableProblem) else where_raised(error)
+    words = f"{type(error).__name__}: {error}" + (f" ({place})" if place else "")
+    return " ".join(words.split())
 
 
 @cache

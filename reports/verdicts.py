@@ -14,6 +14,19 @@ Verdicts = Sequence[tuple[str, Verdict]]
 _WORST_FIRST = ("missing", "worse", "changed", "better", "holds", "shown")
 
 
+UNFINISHED_MARKDOWN = "# Drift gate: not finished\n\nThe check has not come to its verdicts.\n"
+UNFINISHED_JUNIT = """\
+<?xml version='1.0' encoding='utf-8'?>
+<testsuites name="velodrome check" tests="1" failures="0" errors="1">
+  <testsuite name="velodrome check" tests="1" failures="0" errors="1">
+    <testcase classname="velodrome" name="check">
+      <error type="unfinished" message="the check has not come to its verdicts" />
+    </testcase>
+  </testsuite>
+</testsuites>
+"""
+
+
 def junit_xml(verdicts: Verdicts) -> str:
     """JUnit XML: a test suite a scenario, a test case a quantity of an engine.
 

@@ -7,6 +7,7 @@ of them waits for the others'.
 from __future__ import annotations
 
 import sys
+from typing import NoReturn
 
 import typer
 
@@ -17,6 +18,7 @@ from .commands.stored import diff_command, view_command
 from .commands.studies import paper_command, precision_command
 from .commands.sweep import sweep_command
 from .error import ScenarioError
+from .supervision import run_supervised
 
 app = typer.Typer(
     name="velodrome",
@@ -43,8 +45,13 @@ for _command in (
     app.command(_command.__name__.removesuffix("_command"))(_command)
 
 
-def main() -> None:
-    """Run the command; bad input ends with one line on stderr and exit status 2."""
+def supervised_main() -> NoReturn:
+    """Run the command as the console does: a process that ends before the command has is no success."""
+    run_supervised(main)
+
+
+def main() -> NoReturn:
+    """Run the command in this process; bad input ends with one line on stderr and exit status 2."""
     status = 0
     try:
         status = app(sys.argv[1:] or ["--help"], standalone_mode=False)
@@ -55,19 +62,19 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.exit(130)
     except BrokenPipeError:
-        # The reader of a pipe (head, less) has gone: nothing is wrong here.
+        # The reader has gone before there was a result: nobody is there to be told.
         sys.stderr.close()
-        sys.exit(0)
-    except SystemExit:
-        # What rich makes of a broken pipe; the commands themselves end with typer.Exit.
-        sys.exit(0)
+        sys.exit(1)
+    except SystemExit as error:
+        # The commands end with typer.Exit: this is somebody else's.
+        _complain(f"something called sys.exit({error.code!r}) before the command was done", status=1)
     except (OSError, UnicodeEncodeError) as error:  # the latter of a path that is no text
         _complain(f"cannot write: {error}")
     sys.exit(status or 0)
 
 
-def _complain(message: str) -> None:
+def _complain(message: str, status: int = 2) -> NoReturn:
     # What was typed may be repeated, but must not move the cursor.
     line = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in " ".join(message.split()))
     print(f"velodrome: {line}", file=sys.stderr)
-    sys.exit(2)
+    sys.exit(status)

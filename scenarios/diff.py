@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,9 +9,8 @@ from textwrap import shorten
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
-from engines.engine import REFERENCE, Trajectory, load_engine
+from engines.engine import REFERENCE, Trajectory, load_engine, why_failed
 from reference.surface import SurfaceOfRevolution
 from reports.consistency import follow
 from reports.diff import DIFFERS, Ground, StoredRun, diff_document, diff_markdown
@@ -23,6 +21,7 @@ from reports.palette import colours
 from .error import ScenarioError
 from .files import make_folder, write_json, write_text
 from .installed import installed
+from .runner import configure
 from .scenario import OF_THE_MOTION, CircularTable, Scenario, load_scenario
 from .start import make_start
 from .stored import document, part, ride
@@ -149,21 +148,24 @@ def diff(pair: Pair) -> dict[str, Any]:
             continue
         settings = [pair.before.manifest["engines"][name]["settings"], entry["settings"]]
         known = [_step_noise(name, values) for values in settings]
-        if None in known:
-            notes.append(f"{name} is not installed here with such settings; its steps are allowed round-off only")
-        noises[name] = max(ROUND_OFF if value is None else value for value in known)
+        reasons = dict.fromkeys(value for value in known if isinstance(value, str))
+        notes += [f"{name} {reason}; its steps are allowed round-off only" for reason in reasons]
+        noises[name] = max(ROUND_OFF if isinstance(value, str) else value for value in known)
     return diff_document(pair.before, pair.after, pair.ground, noises) | {"notes": notes}
 
 
-def _step_noise(name: str, settings: Mapping[str, Any]) -> float | None:
-    """Relative error that a step of an engine may add; None where the engine here does not know such settings."""
+def _step_noise(name: str, settings: Mapping[str, Any]) -> float | str:
+    """Relative error that a step of an engine may add, or why the engine here does not tell it for such settings."""
     if name not in installed():
-        return None
-    engine = load_engine(name)
+        return "is not installed here"
     try:
-        return engine.step_noise(engine.settings.model_validate_json(json.dumps(settings)))
-    except ValidationError:
-        return None
+        load_engine(name)
+        engine, chosen = configure(name, settings)
+        return float(engine.step_noise(chosen))
+    except ScenarioError:
+        return "is not installed here with such settings"
+    except Exception as error:  # another package's code may break in any way
+        return f"cannot be asked here: {why_failed(error)}"
 
 
 def write_diff(pair: Pair, found: Mapping[str, Any], out: Path) -> list[Path]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,9 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 import reports
-from engines.engine import Engine, Settings, UnsuitableProblem
-from reports.drift import ABSOLUTE, Verdict, judge, missing
+from engines.engine import Engine, Settings, UnsuitableProblem, why_failed
+from engines.guard import call_engine
+from reports.drift import ABSOLUTE, CHANGES, Verdict, judge, missing
 
 from .error import ScenarioError
 from .files import make_folder, write_json
@@ -21,7 +23,7 @@ from .gate_exact import find_exact
 from .gate_sample import SHORT_HORIZON, sample
 from .installed import installed
 from .run_folder import library_versions
-from .runner import Watch, configure
+from .runner import Trace, Watch, configure
 from .scenario import OF_THE_MOTION, Gate, Scenario, Simulation, library_names, load_scenario
 from .start import make_start
 from .stored import read_json
@@ -77,9 +79,13 @@ def check(
     engines: Sequence[str] | None = None,
     baselines: Path | None = None,
     chosen: Chosen = configure,
+    trace: Trace | None = None,
     hold_cpu: bool = False,
 ) -> tuple[list[tuple[str, Verdict]], dict[str, dict[str, Any]]]:
     """Run the gate.
+
+    Every engine has a verdict on every scenario, but for engines that were not asked for, have no baseline and are
+    not made for the motion: one that exits, breaks or is not judged for any other reason did not run, and fails.
 
     Parameters
     ----------
@@ -93,6 +99,8 @@ def check(
         Folder of the baselines; the suite's own if not given.
     chosen : callable
         Maps an engine's name and its settings in the scenario to the engine and its settings.
+    trace : callable, optional
+        Called with an engine that broke and what it raised.
     hold_cpu : bool
         Whether an engine's CPU time, relative to the reference's, is judged too.
 
@@ -108,24 +116,30 @@ def check(
         If a scenario or a baseline is none, or an engine is neither installed nor in a baseline.
     """
     folder = BASELINES if baselines is None else baselines
-    scenarios = [_as_gated(*load_scenario(source)) for source in (sources or gated_names())]
+    scenarios = [as_gated(source) for source in (sources or gated_names())]
     known = {name: read_baseline(name, folder, scenario) for name, scenario in scenarios}
     judged = _to_judge(engines, known)
-    asked = bool(engines)
     verdicts: list[tuple[str, Verdict]] = []
     fresh: dict[str, dict[str, Any]] = {}
     for name, scenario in scenarios:
-        found, rest = _held(name, scenario, judged, known[name], watch, chosen, asked, hold_cpu)
-        verdicts += [(name, verdict) for verdict in found]
-        fresh[name] = {"scenario": name} | _ride(scenario) | {"content": content(scenario)}
-        fresh[name] |= {"libraries": library_versions()} | rest
+        held = _hold(name, scenario, judged, known[name], watch, chosen, trace, bool(engines), hold_cpu)
+        verdicts += [(name, verdict) for verdict in [*held.verdicts, *_without_verdict(judged, held)]]
+        fresh[name] = {
+            "scenario": name,
+            **_ride(scenario),
+            "content": content(scenario),
+            "libraries": library_versions(),
+            "exact_error": held.exact_error,
+            "engines": held.entries,
+        }
     if not verdicts:
         raise ScenarioError("nothing was judged: no engine and no scenario go together")
     return verdicts, fresh
 
 
-def _as_gated(name: str, scenario: Scenario) -> tuple[str, Scenario]:
-    """A scenario as the gate rides it."""
+def as_gated(source: str) -> tuple[str, Scenario]:
+    """Name of a scenario, and the scenario as the gate rides it."""
+    name, scenario = load_scenario(source)
     gate = scenario.gate or Gate()
     simulation = Simulation(duration=gate.duration, output_rate=gate.output_rate)
     return name, scenario.model_copy(update={"gate": gate, "simulation": simulation})
@@ -151,17 +165,31 @@ def _to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[str, Any
     return [name for name in names if not wanted or name in wanted]
 
 
-def _held(
+@dataclass(frozen=True)
+class _Held:
+    """What came of all engines on one scenario.
+
+    Verdicts, entries of a new baseline, engines that were passed over, and the exact ride's own error.
+    """
+
+    verdicts: list[Verdict]
+    entries: dict[str, Any]
+    passed_over: list[str]
+    exact_error: float
+
+
+def _hold(
     name: str,
     scenario: Scenario,
     engines: Sequence[str],
     baseline: Mapping[str, Any],
     watch: Watch,
     chosen: Chosen,
+    trace: Trace | None,
     asked: bool,
     hold_cpu: bool,
-) -> tuple[list[Verdict], dict[str, Any]]:
-    """Verdicts on the engines on one scenario, and what a new baseline says of them and of the exact ride.
+) -> _Held:
+    """Hold the engines on one scenario against the baseline.
 
     An engine that the motion does not suit is passed over, unless it was ``asked`` for or has a baseline.
     """
@@ -170,30 +198,34 @@ def _held(
         exact = find_exact(start)
     except ScenarioError as error:
         raise ScenarioError(f"{name}: {error}") from error
-    gate, duration = scenario.gate or Gate(), scenario.simulation.duration
-    verdicts: list[Verdict] = []
-    entries: dict[str, Any] = {}
+    held = _Held([], {}, [], exact.error)
     for engine_name in engines:
         entry = baseline.get(engine_name)
         try:
             values = gate_settings().get(engine_name, {}) | scenario.engines.get(engine_name, {})
             engine, settings = chosen(engine_name, values)
-            found = sample(
+            found = call_engine(
+                sample,
                 start,
                 exact,
-                gate,
+                scenario.gate or Gate(),
                 engine,
                 settings,
-                watch=lambda t, e=engine_name: watch(e, t, duration),
+                watch=partial(_report, watch, engine_name, scenario.simulation.duration),
                 known_noise=(entry or {}).get("step_noise"),
                 hold_cpu=hold_cpu,
             )
         except Exception as error:  # an engine that breaks in any way did not run
             if entry is None and not asked and isinstance(error, UnsuitableProblem):
+                held.passed_over.append(engine_name)
                 continue
-            verdicts.append(missing(engine_name, f"did not run: {' '.join(str(error).split())}"))
+            own_words = isinstance(error, ScenarioError | UnsuitableProblem)
+            why = " ".join(str(error).split()) if own_words else why_failed(error)
+            held.verdicts.append(missing(engine_name, f"did not run: {why}"))
+            if trace is not None:
+                trace(engine_name, error)
             continue
-        entries[engine_name] = {
+        held.entries[engine_name] = {
             "created": datetime.now(UTC).date().isoformat(),
             "version": found.version,
             "settings": found.settings,
@@ -202,8 +234,19 @@ def _held(
             "quantities": found.values,
         }
         run = (found.settings, found.version, found.reasons)
-        verdicts += judge(engine_name, found.values, entry, found.limits, *run)
-    return verdicts, {"exact_error": exact.error, "engines": entries}
+        held.verdicts.extend(judge(engine_name, found.values, entry, found.limits, *run))
+    return held
+
+
+def _report(watch: Watch, engine: str, duration: float, time: float) -> None:
+    watch(engine, time, duration)
+
+
+def _without_verdict(engines: Sequence[str], held: _Held) -> list[Verdict]:
+    """Verdicts on engines that should have been judged and were not: nothing that is known of them holds."""
+    judged = {verdict.engine for verdict in held.verdicts if verdict.quantity != CHANGES}
+    expected = [name for name in engines if name not in held.passed_over]
+    return [missing(name, "did not run: none of its quantities was judged") for name in expected if name not in judged]
 
 
 def content(scenario: Scenario) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from engines.admission import ride
 from engines.convergence import observed_orders
-from engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory, load_engine
+from engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory, load_engine, why_failed
 from engines.friction import required_friction
 from engines.identify import DISTURBANCES, STENCIL_WEIGHT, interval_of, jacobian_at
 from reference.kinematics import YAW
@@ -27,7 +27,7 @@ from reports.metrics import position_errors
 from reports.precision import match
 
 from .gate_exact import Exact, scale_of
-from .runner import measure_one, why_failed
+from .runner import measure_one
 from .scenario import Gate
 from .start import Start
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from engines.admission import ride
-from engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory
+from engines.engine import REFERENCE, Engine, Problem, Settings, Trajectory, why_failed
+from engines.guard import call_engine
 from engines.identify import LEVELS as IDENTIFY_LEVELS
 from engines.identify import Identified, identify
 from reference.stability import linearise
@@ -20,7 +21,7 @@ from reports.precision import Level, comparison_horizon, eigenvalue_document, en
 from .error import ScenarioError
 from .files import make_folder, write_json
 from .run_folder import Plan, library_versions
-from .runner import Watch, claimed_noise, measure_one, plan_run
+from .runner import Trace, Watch, claimed_noise, measure_one, plan_run
 from .scenario import Scenario
 from .start import Start
 
@@ -31,15 +32,34 @@ _LONGEST_INTERVAL = 200  # output intervals of the scenario merged so that the c
 
 @dataclass(frozen=True)
 class Study:
-    """Levels of one engine that ran to the end, those that did not, its own linear system or why there is none."""
+    """Study of one engine.
+
+    Attributes
+    ----------
+    levels : list of Level
+        Those that ran to the end.
+    failures : list of dict
+        ``step`` and ``reason`` of those that did not.
+    ran : bool
+        Whether any level rode at all, or there was none to ride.
+    identified : Identified, str or None
+        Its own linear system, or why there is none.
+    """
 
     levels: list[Level]
     failures: list[dict[str, Any]]
+    ran: bool
     identified: Identified | str | None
 
 
 def precision(
-    name: str, scenario: Scenario, wanted: list[str] | None, levels: int, eigenvalues: bool, watch: Watch
+    name: str,
+    scenario: Scenario,
+    wanted: list[str] | None,
+    levels: int,
+    eigenvalues: bool,
+    watch: Watch,
+    trace: Trace | None = None,
 ) -> dict[str, Any]:
     """Study the engines of a scenario.
 
@@ -55,6 +75,8 @@ def precision(
         Whether to measure each engine's linear system too.
     watch : callable
         Called with what is run, the simulated time reached and the duration.
+    trace : callable, optional
+        Called with an engine that broke and what it raised.
 
     Returns
     -------
@@ -64,7 +86,7 @@ def precision(
     Raises
     ------
     ScenarioError
-        If the scenario cannot be run, or no output interval fits all steps.
+        If the scenario cannot be run, no output interval fits all steps, or the reference does not get through.
     """
     plan = plan_run(name, scenario, wanted)
     factors = [COARSEST / 2**level for level in range(levels)]
@@ -77,18 +99,40 @@ def precision(
     problem = _sampled(plan, ladders)
     engine, settings = plan.engines[REFERENCE]
     watch(REFERENCE, 0.0, _duration(problem))
-    reference = ride(engine, problem, settings, lambda t: watch(REFERENCE, t, _duration(problem)))
+    try:
+        reference = ride(engine, problem, settings, lambda t: watch(REFERENCE, t, _duration(problem)))
+    except Exception as error:  # without it there is nothing to measure against
+        raise ScenarioError(f"{name}: the reference did not run: {why_failed(error)}") from error
     if reference.ended is not None:
         raise ScenarioError(f"{name}: the reference ends at {reference.time[-1]:.6g} s: {reference.ended}")
     studies = {}
     q, qd = plan.start.undisturbed
     undisturbed = replace(plan.start.problem, q=q, qd=qd)
     for engine_name, (engine, settings) in plan.engines.items():
-        runs = list(_runs(engine, ladders[engine_name], plan.start, problem, reference, watch))
-        identified = _identified(engine, _refinable(settings), undisturbed, watch) if eigenvalues else None
+        runs = list(_runs(engine, ladders[engine_name], plan.start, problem, reference, watch, trace))
         found = [run for run in runs if isinstance(run, Level)]
-        studies[engine_name] = Study(found, [run for run in runs if not isinstance(run, Level)], identified)
+        failures = [run.as_json() for run in runs if isinstance(run, _Failure)]
+        ran = not runs or not all(isinstance(run, _Failure) and run.broke for run in runs)
+        identified = _identified(engine, settings, undisturbed, watch, trace) if eigenvalues else None
+        studies[engine_name] = Study(found, failures, ran, identified)
     return _document(name, plan.start, problem, reference, undisturbed, studies)
+
+
+def all_ran(document: Mapping[str, Any]) -> bool:
+    """Whether every engine of a document of `velodrome precision` rode at one step at least."""
+    return all(entry["ran"] for entry in document["engines"].values())
+
+
+@dataclass(frozen=True)
+class _Failure:
+    """A level without a result: its step, why, and whether the engine broke instead of riding."""
+
+    step: float | None
+    reason: str
+    broke: bool
+
+    def as_json(self) -> dict[str, Any]:
+        return {"step": self.step, "reason": self.reason}
 
 
 def _duration(problem: Problem) -> float:
@@ -100,7 +144,7 @@ def _ladder(settings: Settings, factors: list[float]) -> list[Settings]:
     found = []
     for factor in factors:
         try:
-            found.append(settings.refined(factor))
+            found.append(call_engine(settings.refined, factor))
         except ValueError:
             continue  # beyond what the engine allows: fewer levels
     return found
@@ -126,46 +170,67 @@ def _sampled(plan: Plan, ladders: Mapping[str, list[Settings]]) -> Problem:
             continue
         times = np.arange(samples // merged + 1) * merged / simulation.output_rate
         problem = replace(plan.start.problem, times=times)
-        try:
-            for name, ladder in ladders.items():
-                for settings in ladder:
-                    plan.engines[name][0].check(problem, settings)
-        except ValueError:
-            continue
-        return problem
+        if all(_fits(name, plan.engines[name][0], ladder, problem) for name, ladder in ladders.items()):
+            return problem
     raise ScenarioError(
         f"{plan.name}: no output interval up to {_LONGEST_INTERVAL / simulation.output_rate:g} s is a multiple of all "
         "engines' steps; steps and a duration that are multiples of one another would do"
     )
 
 
+def _fits(name: str, engine: Engine, ladder: list[Settings], problem: Problem) -> bool:
+    """Whether an engine takes a problem with the settings of all levels."""
+    try:
+        for settings in ladder:
+            engine.check(problem, settings)
+    except ValueError:
+        return False
+    except Exception as error:  # an engine may break here as well
+        raise ScenarioError(f"engines.{name}: its check failed: {why_failed(error)}") from error
+    return True
+
+
 def _runs(
-    engine: Engine, ladder: list[Settings], start: Start, problem: Problem, reference: Trajectory, watch: Watch
-) -> Iterator[Level | dict[str, Any]]:
+    engine: Engine,
+    ladder: list[Settings],
+    start: Start,
+    problem: Problem,
+    reference: Trajectory,
+    watch: Watch,
+    trace: Trace | None,
+) -> Iterator[Level | _Failure]:
     for settings in ladder:
         step = getattr(settings, "step", None)
         try:
             trajectory = ride(engine, problem, settings, lambda t: watch(engine.name, t, _duration(problem)))
-        except (EngineError, ValueError, ArithmeticError) as error:
-            yield {"step": step, "reason": " ".join(str(error).split())}
+        except Exception as error:  # whatever an engine raises must not cost the others' results
+            yield _Failure(step, why_failed(error), broke=True)
+            if trace is not None:
+                trace(engine.name, error)
             continue
         measured = measure_one(start, trajectory, reference, step_noise=claimed_noise(engine, settings))
         if trajectory.ended is not None:
-            yield {"step": step, "reason": f"ended at {trajectory.time[-1]:.6g} s: {trajectory.ended}"}
+            yield _Failure(step, f"ended at {trajectory.time[-1]:.6g} s: {trajectory.ended}", broke=False)
         elif measured["fell_at"] is not None:
-            yield {"step": step, "reason": f"fell at {measured['fell_at']:.6g} s"}
+            yield _Failure(step, f"fell at {measured['fell_at']:.6g} s", broke=False)
         else:
             yield Level(_duration(problem) / trajectory.steps, trajectory, measured)
 
 
-def _identified(engine: Engine, settings: Settings, undisturbed: Problem, watch: Watch) -> Identified | str:
+def _identified(
+    engine: Engine, settings: Settings, undisturbed: Problem, watch: Watch, trace: Trace | None
+) -> Identified | str:
     if not isinstance(undisturbed.surface, SurfaceOfRevolution):
         return "the ground is no surface of revolution, so that the motion is not steady"
     label = f"{engine.name} modes"
     try:
-        return identify(engine, settings, undisturbed, lambda done: watch(label, done, 1.0))
-    except (EngineError, ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+        return call_engine(identify, engine, _refinable(settings), undisturbed, lambda done: watch(label, done, 1.0))
+    except (ArithmeticError, ValueError) as error:  # numpy's LinAlgError among them: there may be no such system
         return " ".join(str(error).split())
+    except Exception as error:
+        if trace is not None:
+            trace(engine.name, error)
+        return why_failed(error)
 
 
 def _document(
@@ -182,6 +247,7 @@ def _document(
     engines = {}
     for engine, study in studies.items():
         entry = engine_document(study.levels, study.failures, reference, start.size, horizon)
+        entry["ran"] = study.ran
         found = study.identified
         entry["eigenvalues"] = None
         if isinstance(found, Identified):

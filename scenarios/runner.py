@@ -19,12 +19,13 @@ from engines.admission import ride
 from engines.engine import (
     REFERENCE,
     Engine,
-    EngineError,
     Settings,
     Trajectory,
     UnsuitableProblem,
     load_engine,
+    why_failed,
 )
+from engines.guard import call_engine
 from engines.storage import write_trajectory
 from reports.consistency import follow
 from reports.fall import as_shown
@@ -41,6 +42,8 @@ from .table import one_line, refuse_unknown
 
 # (engine, simulated time reached, duration)
 Watch = Callable[[str, float, float], None]
+# (engine, what it raised)
+Trace = Callable[[str, Exception], None]
 
 
 @dataclass(frozen=True)
@@ -96,6 +99,8 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
             if wanted or not isinstance(error, UnsuitableProblem):
                 raise ScenarioError(f"engines.{engine}: {error}") from error
             left_out[engine] = str(error)
+        except Exception as error:  # an engine may break here as well
+            raise ScenarioError(f"engines.{engine}: its check failed: {why_failed(error)}") from error
     chosen = {engine: pair for engine, pair in chosen.items() if engine not in left_out}
     return Plan(name, scenario, start, chosen, left_out)
 
@@ -115,14 +120,17 @@ def configure(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
     try:
         refuse_unknown(values, engine.settings.model_fields)
         # As JSON: strictness would refuse a TOML array where a setting is a tuple.
-        return engine, engine.settings.model_validate_json(json.dumps(dict(values), default=str), strict=True)
+        text = json.dumps(dict(values), default=str)
+        return engine, call_engine(engine.settings.model_validate_json, text, strict=True)
     except ValidationError as error:
         raise ScenarioError(f"engines.{name}.{one_line(error)}") from error
     except ValueError as error:
         raise ScenarioError(f"engines.{name}: {error}") from error
+    except Exception as error:  # settings may have code of their own
+        raise ScenarioError(f"engines.{name}: its settings failed: {why_failed(error)}") from error
 
 
-def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None]) -> Outcome:
+def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None], trace: Trace | None = None) -> Outcome:
     """Run every engine of a plan and write the run folder.
 
     Each engine's trajectory is written when it is done; Ctrl-C ends the engine at work and leaves the
@@ -137,6 +145,8 @@ def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None]) -> Out
         Called with engine, time reached and duration.
     note : callable
         Called with a line when something needs saying.
+    trace : callable, optional
+        Called with an engine that broke and what it raised.
 
     Returns
     -------
@@ -156,6 +166,8 @@ def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None]) -> Out
             except Exception as error:  # whatever an engine raises must not cost the others' results
                 failures[name] = why_failed(error)
                 note(f"{name}: {failures[name]}")
+                if trace is not None:
+                    trace(name, error)
             else:
                 write_trajectory(trajectory, folder / f"{name}.parquet")
                 trajectories[name] = trajectory
@@ -174,12 +186,6 @@ def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None]) -> Out
         found = write_manifest(folder, plan, trajectories, failures, verdicts, complete=not interrupted)
         write_page(folder, plan, shown, measured, found)
     return Outcome(folder, measured, failures, verdicts, interrupted)
-
-
-def why_failed(error: Exception) -> str:
-    """One line on why an engine failed; its own words where it chose them."""
-    words = str(error) if isinstance(error, EngineError) else f"{type(error).__name__}: {error}"
-    return " ".join(words.split())
 
 
 def measure_one(

@@ -13,7 +13,7 @@ from reference.bicycle import Bicycle
 
 from .error import ScenarioError
 from .surfaces import SurfaceTable
-from .table import Table, one_line, placed, read_toml, shown
+from .table import Table, UnknownName, one_line, placed, read_toml, shown
 
 LIBRARY = files("scenarios") / "library"
 # The tables that the motion depends on.
@@ -147,7 +147,7 @@ class Scenario(Table):
         unknown = sorted(set(self.bicycle) - set(Bicycle.__dataclass_fields__))
         if unknown:
             names = ", ".join(Bicycle.__dataclass_fields__)
-            raise ValueError(f"bicycle parameter {shown(repr(unknown[0]))} is unknown; there are {names}")
+            raise UnknownName(f"bicycle parameter {shown(repr(unknown[0]))} is unknown; there are {names}")
         return Bicycle(**self.bicycle)
 
 

@@ -77,11 +77,15 @@ class Table(BaseModel):
         return data
 
 
+class UnknownName(ValueError):
+    """A name that is none of those that there are: a typing error, whatever its value."""
+
+
 def refuse_unknown(data: Mapping[str, Any], known: Iterable[str]) -> None:
-    """Raise ValueError with the known keys if there is another."""
+    """Raise UnknownName with the known keys if there is another."""
     unknown = sorted(set(data) - set(known))
     if unknown:
-        raise ValueError(f"unknown key {shown(repr(unknown[0]))}; there are {', '.join(known)}")
+        raise UnknownName(f"unknown key {shown(repr(unknown[0]))}; there are {', '.join(known)}")
 
 
 _PLAIN_WORDS = {
@@ -93,10 +97,10 @@ _PLAIN_WORDS = {
 }
 
 
-def _kinds() -> set[str]:
+def kinds() -> set[str]:
     """All values that the kind of a table may have."""
-    kinds = (table.model_fields["kind"] for table in Table.__subclasses__() if "kind" in table.model_fields)
-    return {value for kind in kinds for value in get_args(kind.annotation)}
+    tables = (table.model_fields["kind"] for table in Table.__subclasses__() if "kind" in table.model_fields)
+    return {value for kind in tables for value in get_args(kind.annotation)}
 
 
 def _written(value: Any) -> str:
@@ -112,7 +116,7 @@ def one_line(error: ValidationError) -> str:
     """Say the first thing wrong in one line: where, what, what came."""
     first = error.errors()[0]
     # Discriminator values appear in the location of a union's member: they are no keys of the file.
-    where = ".".join(shown(str(part)) for part in first["loc"] if part not in _kinds())
+    where = ".".join(shown(str(part)) for part in first["loc"] if part not in kinds())
     message = " ".join(_PLAIN_WORDS.get(first["type"], first["msg"].removeprefix("Value error, ")).split())
     came = first.get("input")
     left_out = isinstance(came, Mapping | BaseModel) or first["type"] == "missing"

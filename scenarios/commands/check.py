@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from ..error import ScenarioError
-from .options import Json, print_json
+from .options import Json, ShowTraceback, ending_with, print_json, print_traceback, showing_traceback
 
 
 def check_command(
@@ -36,16 +38,18 @@ def check_command(
     ] = False,
     junit: Annotated[Path | None, typer.Option(help="Write the verdicts as JUnit XML.")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Write the verdicts as Markdown, worst first.")] = None,
+    traceback: ShowTraceback = False,
     as_json: Json = False,
 ) -> None:
     """The drift gate: run the gated scenarios and hold them against the committed baselines."""
     from rich.console import Console
 
-    from reports.verdicts import junit_xml, markdown_page
+    from reports.verdicts import UNFINISHED_JUNIT, UNFINISHED_MARKDOWN, junit_xml, markdown_page
 
     from .. import gate, present
     from ..files import write_text
     from ..installed import installed
+    from ..runner import configure
 
     if reason is not None and not update:
         raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
@@ -53,10 +57,12 @@ def check_command(
     for option, path in (("--junit", junit), ("--markdown", markdown)):
         if path is not None:
             _check_path(option, path)
-    console = Console(stderr=as_json)
-    with present.Progress() as progress:
-        verdicts, fresh = gate.check(progress.watch, scenario, engine, baselines, hold_cpu=hold_cpu)
-    for path, page in ((junit, junit_xml), (markdown, markdown_page)):
+    files = [(junit, junit_xml), (markdown, markdown_page)]
+    unfinished = _unfinished({junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN})
+    with showing_traceback(traceback), unfinished, present.Progress() as progress:
+        trace = print_traceback if traceback else None
+        verdicts, fresh = gate.check(progress.watch, scenario, engine, baselines, configure, trace, hold_cpu)
+    for path, page in files:
         if path is not None:
             write_text(path, page(verdicts))
     written = []
@@ -73,18 +79,37 @@ def check_command(
         written = [str(path) for path in gate.update(fresh, verdicts, reason, baselines)]
     refused = gate.refused(verdicts) if update else []
     passes = not refused if update else all(verdict.passes for _, verdict in verdicts)
-    if as_json:
-        rows = [{"scenario": name} | verdict.as_json() for name, verdict in verdicts]
-        print_json({"passes": passes, "updated": written, "verdicts": rows})
-    else:
-        present.show_verdicts(console, verdicts, renewed=update)
-        for path in written:
-            console.print(f"baseline written: {path}", soft_wrap=True)
-        for name, verdict in refused:
-            line = f"no baseline written of {verdict.engine} on {name}: {verdict.reason}"
-            console.print(line, style="red", markup=False, highlight=False, soft_wrap=True)
-    if not passes:
-        raise typer.Exit(1)
+    with ending_with(0 if passes else 1):
+        if as_json:
+            rows = [{"scenario": name} | verdict.as_json() for name, verdict in verdicts]
+            print_json({"passes": passes, "updated": written, "verdicts": rows})
+        else:
+            console = Console()
+            present.show_verdicts(console, verdicts, renewed=update)
+            for path in written:
+                console.print(f"baseline written: {path}", soft_wrap=True)
+            for name, verdict in refused:
+                line = f"no baseline written of {verdict.engine} on {name}: {verdict.reason}"
+                console.print(line, style="red", markup=False, highlight=False, soft_wrap=True)
+
+
+@contextmanager
+def _unfinished(pages: Mapping[Path | None, str]) -> Iterator[None]:
+    """Let files say that the check is not finished, until it is: one whose process ends leaves none that look whole.
+
+    Bad input leaves no file.
+    """
+    from ..files import write_text
+
+    paths = [path for path in pages if path is not None]
+    for path in paths:
+        write_text(path, pages[path])
+    try:
+        yield
+    except ScenarioError:
+        for path in paths:
+            path.unlink(missing_ok=True)
+        raise
 
 
 def _check_path(option: str, path: Path) -> None:

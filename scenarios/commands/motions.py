@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .options import STARTING, Alpha, Ground, Json, angles_of, ground_of, print_json
+from .options import STARTING, Alpha, Ground, Json, angles_of, ending_with, ground_of, print_json
 
 
 def circular_command(
@@ -26,10 +26,11 @@ def circular_command(
     angles, ground = angles_of(near), ground_of(alpha, surface)
     with present.working(STARTING):
         found = present.circular(ground, rear_rate, family, angles)
-    if as_json:
-        print_json(found)
-    else:
-        present.show_circular(Console(), found)
+    with ending_with(0):
+        if as_json:
+            print_json(found)
+        else:
+            present.show_circular(Console(), found)
 
 
 def families_command(
@@ -49,10 +50,11 @@ def families_command(
         document = families_document(ground)
     if out is not None:
         write_families(document, out)
-    if as_json:
-        print_json(document)
-    else:
-        present.show_families(Console(), document)
+    with ending_with(0):
+        if as_json:
+            print_json(document)
+        else:
+            present.show_families(Console(), document)
 
 
 def critical_command(as_json: Json = False) -> None:
@@ -64,10 +66,11 @@ def critical_command(as_json: Json = False) -> None:
 
     with present.Progress() as progress:
         document = critical_document(progress.watch)
-    if as_json:
-        print_json(document)
-    else:
-        present.show_critical(Console(), document)
+    with ending_with(0):
+        if as_json:
+            print_json(document)
+        else:
+            present.show_critical(Console(), document)
 
 
 def atlas_command(
@@ -86,7 +89,8 @@ def atlas_command(
 
     with present.Progress() as progress:
         document = make_atlas(out, size, largest, lambda done: progress.watch("atlas", done, 1.0))
-    if as_json:
-        print_json(document)
-    else:
-        present.show_atlas(Console(), document, out)
+    with ending_with(0):
+        if as_json:
+            print_json(document)
+        else:
+            present.show_atlas(Console(), document, out)

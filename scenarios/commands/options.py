@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from traceback import print_exception
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -28,6 +32,9 @@ Changes = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a field, e.g. simulation.duration=5.")
 ]
 Duration = Annotated[float | None, typer.Option(help="Simulated time [s].")]
+ShowTraceback = Annotated[
+    bool, typer.Option("--traceback", help="Show on stderr the whole traceback of an engine that failed.")
+]
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else.")]
 
 
@@ -93,3 +100,37 @@ def show_written(paths: Iterable[Path]) -> None:
 def print_json(data: Any) -> None:
     """Print one JSON document, and nothing else."""
     print(json.dumps(data, indent=1, allow_nan=False))
+
+
+@contextmanager
+def ending_with(status: int) -> Iterator[None]:
+    """Show a command's result in the body, then end the command with its exit status.
+
+    A reader of the output who has gone (``head``, ``less``) changes nothing about the status.
+    """
+    try:
+        yield
+        if sys.stdout is not None:  # None where it was closed from the start
+            sys.stdout.flush()
+    except (BrokenPipeError, SystemExit):  # the latter is what rich makes of the former
+        # Or the interpreter complains when it flushes at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    if status:
+        raise typer.Exit(status)
+
+
+def print_traceback(engine: str, error: Exception) -> None:
+    """Print the whole traceback of what an engine raised on stderr."""
+    print(f"{engine}:", file=sys.stderr)
+    print_exception(error, file=sys.stderr)
+
+
+@contextmanager
+def showing_traceback(shown: bool) -> Iterator[None]:
+    """Let the cause of a `ScenarioError` be seen, such as an engine that cannot be loaded."""
+    try:
+        yield
+    except ScenarioError as error:
+        if shown and error.__cause__ is not None:
+            print_exception(error.__cause__, file=sys.stderr)
+        raise

@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..error import ScenarioError
-from .options import STARTING, Changes, Duration, Json, changed, print_json
+from .options import (
+    STARTING,
+    Changes,
+    Duration,
+    Json,
+    ShowTraceback,
+    changed,
+    ending_with,
+    print_json,
+    print_traceback,
+    showing_traceback,
+)
 
 if TYPE_CHECKING:
     from ..run_folder import Plan
+    from ..runner import Outcome
 
 
 def list_command(as_json: Json = False) -> None:
     """Scenarios of the library and installed engines."""
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
     from engines.engine import load_engine
 
     from ..installed import installed
@@ -36,9 +45,18 @@ def list_command(as_json: Json = False) -> None:
             engines.append({"name": name, "version": engine.version, "gives": list(engine.gives)})
         except ValueError as error:
             engines.append({"name": name, "version": None, "gives": [], "error": " ".join(str(error).split())})
-    if as_json:
-        print_json({"scenarios": scenarios, "engines": engines})
-        return
+    with ending_with(0):
+        if as_json:
+            print_json({"scenarios": scenarios, "engines": engines})
+        else:
+            _show_list(scenarios, engines)
+
+
+def _show_list(scenarios: list[dict[str, Any]], engines: list[dict[str, Any]]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
     table = Table("scenario", "title", "tags", box=None, pad_edge=False)
     for entry in scenarios:
         table.add_row(entry["name"], entry["title"], ", ".join(entry["tags"]))
@@ -62,6 +80,7 @@ def run_command(
     change: Changes = None,
     duration: Duration = None,
     out: Annotated[Path, typer.Option(help="Folder for the run folders.")] = Path("runs"),
+    traceback: ShowTraceback = False,
     as_json: Json = False,
 ) -> None:
     """Run scenarios in every engine from the same computed start and compare with the reference."""
@@ -76,23 +95,29 @@ def run_command(
         raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
     changes = changed(change, duration)
     installed()  # an engine that two packages announce is no scenario's fault
-    with present.working(STARTING):
+    with showing_traceback(traceback), present.working(STARTING):
         plans = [_plan(source, changes, engine) for source in dict.fromkeys(sources)]
     console = Console(stderr=as_json)
     outcomes = []
     for plan in plans:
         with present.Progress() as progress:
-            outcome = run(plan, out, progress.watch, progress.note)
+            outcome = run(plan, out, progress.watch, progress.note, print_traceback if traceback else None)
         outcomes.append((plan, outcome))
-        present.show_outcome(console, plan, outcome)
+        with ending_with(0):  # the next run does not depend on a reader of this one's table
+            present.show_outcome(console, plan, outcome)
         if outcome.interrupted:
             break
-    if as_json:
-        print_json({"runs": [present.outcome_json(plan, outcome) for plan, outcome in outcomes]})
-    if any(outcome.interrupted for _, outcome in outcomes):
-        raise typer.Exit(130)
-    if any(outcome.failures or not all(v["holds"] for v in outcome.verdicts) for _, outcome in outcomes):
-        raise typer.Exit(1)
+    with ending_with(_status_of([outcome for _, outcome in outcomes])):
+        if as_json:
+            print_json({"runs": [present.outcome_json(plan, outcome) for plan, outcome in outcomes]})
+
+
+def _status_of(outcomes: Sequence[Outcome]) -> int:
+    """Exit status: 130 after Ctrl-C, 1 if an engine did not run or a verdict falls short."""
+    if any(outcome.interrupted for outcome in outcomes):
+        return 130
+    holds = (not outcome.failures and all(verdict["holds"] for verdict in outcome.verdicts) for outcome in outcomes)
+    return 0 if all(holds) else 1
 
 
 def _plan(source: str, changes: dict[str, Any], wanted: list[str] | None) -> Plan:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..error import ScenarioError
-from .options import Json, print_json, show_written
+from .options import Json, ending_with, print_json, show_written
 
 
 def diff_command(
@@ -32,13 +32,12 @@ def diff_command(
     pair = read_pair(before, after, engine)
     found = diff(pair)
     written = [] if out is None else write_diff(pair, found, out)
-    if as_json:
-        print_json(found)
-    else:
-        show_diff(Console(), found)
-        show_written(written)
-    if not found["same"]:
-        raise typer.Exit(1)
+    with ending_with(0 if found["same"] else 1):
+        if as_json:
+            print_json(found)
+        else:
+            show_diff(Console(), found)
+            show_written(written)
 
 
 def view_command(

@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from .options import Changes, Duration, Json, changed, print_json, show_written
+from .options import (
+    Changes,
+    Duration,
+    Json,
+    ShowTraceback,
+    changed,
+    ending_with,
+    print_json,
+    print_traceback,
+    show_written,
+    showing_traceback,
+)
 
 
 def paper_command(
@@ -31,13 +42,12 @@ def paper_command(
         lines = ledger(lambda part, done, parts: progress.watch(part, done, parts))
         written = [] if out is None else write_paper(out, lines, progress.watch)
     found = document(lines)
-    if as_json:
-        print_json(found)
-    else:
-        show_ledger(Console(), lines)
-        show_written(written)
-    if not found["holds"]:
-        raise typer.Exit(1)
+    with ending_with(0 if found["holds"] else 1):
+        if as_json:
+            print_json(found)
+        else:
+            show_ledger(Console(), lines)
+            show_written(written)
 
 
 def precision_command(
@@ -56,6 +66,7 @@ def precision_command(
     ] = 5,
     eigenvalues: Annotated[bool, typer.Option(help="Measure each engine's own eigenvalues too.")] = True,
     out: Annotated[Path | None, typer.Option(help="Folder for the document and its figure.")] = None,
+    traceback: ShowTraceback = False,
     as_json: Json = False,
 ) -> None:
     """Work-precision: error and CPU time over step sizes, observed order, limit, the engine's own eigenvalues."""
@@ -63,18 +74,20 @@ def precision_command(
 
     from .. import present
     from ..files import make_folder
-    from ..precision import precision, write_precision
+    from ..precision import all_ran, precision, write_precision
     from ..scenario import load_scenario
 
     changes = changed(change, duration)
     name, loaded = load_scenario(scenario, changes)
     if out is not None:
         make_folder(out)  # before the work
-    with present.Progress() as progress:
-        document = precision(name, loaded, engine, levels, eigenvalues, progress.watch)
+    with showing_traceback(traceback), present.Progress() as progress:
+        trace = print_traceback if traceback else None
+        document = precision(name, loaded, engine, levels, eigenvalues, progress.watch, trace)
     written = [] if out is None else write_precision(document, out)
-    if as_json:
-        print_json(document)
-        return
-    present.show_precision(Console(), document)
-    show_written(written)
+    with ending_with(0 if all_ran(document) else 1):
+        if as_json:
+            print_json(document)
+        else:
+            present.show_precision(Console(), document)
+            show_written(written)

@@ -22,11 +22,18 @@ def sweep_command(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with what the folder has: do what is missing.")
     ] = False,
+    retry: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="STATUS",
+            help="With --resume: do rows of this status again, such as timeout or failed; may be given several times.",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Many runs over a grid, a list or a Latin hypercube, on local processes or a Dask cluster."""
     from ..sweep.command import sweep
 
-    status = sweep(file, scheduler, workers, out, resume, as_json)
+    status = sweep(file, scheduler, workers, out, resume, as_json, retry or [])
     if status:
         raise typer.Exit(status)

@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
-import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
 
+from scenarios.commands.options import ending_with, print_json
 from scenarios.error import ScenarioError
 from scenarios.present import working
+from scenarios.table import shown
 
 from .live import SweepView
 from .plan import plan_sweep
+from .rows import STATUSES
 from .run import Work, locally, run_sweep
 from .summary import resume_command, show_summary, status_of, summary
 
 FOLDER = Path("sweeps")
 
 
-def sweep(path: Path, scheduler: str | None, workers: int | None, out: Path | None, resume: bool, as_json: bool) -> int:
+def sweep(
+    path: Path,
+    scheduler: str | None,
+    workers: int | None,
+    out: Path | None,
+    resume: bool,
+    as_json: bool,
+    retry: Sequence[str] = (),
+) -> int:
     """Run a sweep file, or what is missing of it, and say what came of it.
 
     Parameters
@@ -36,6 +47,8 @@ def sweep(path: Path, scheduler: str | None, workers: int | None, out: Path | No
         Whether to go on with a sweep in that folder.
     as_json : bool
         Print the summary as JSON on stdout, the table on stderr.
+    retry : sequence of str
+        Statuses of rows that are to be done again; they go with ``resume``.
 
     Returns
     -------
@@ -49,15 +62,21 @@ def sweep(path: Path, scheduler: str | None, workers: int | None, out: Path | No
     """
     if scheduler is not None and workers is not None:
         raise ScenarioError("--workers goes without --scheduler: a cluster's workers are started with it")
+    if retry and not resume:
+        raise ScenarioError("--retry: it belongs to --resume, which goes on with a sweep")
+    for status in retry:
+        if status not in STATUSES:
+            raise ScenarioError(f"--retry {shown(status)}: no row has such a status; there are {', '.join(STATUSES)}")
     with working("checking every run of the sweep (the first time on a machine, kernels are compiled: half a minute)"):
         plan = plan_sweep(path)
     work = _work(scheduler, workers)
     with SweepView(len(plan.tasks)) as view:
-        outcome = run_sweep(plan, FOLDER / plan.name if out is None else out, work, resume, view.watch)
+        outcome = run_sweep(plan, FOLDER / plan.name if out is None else out, work, resume, view.watch, retry)
     document = summary(plan, outcome)
-    show_summary(Console(stderr=as_json), document, resume_command(plan, outcome))
-    if as_json:
-        print(json.dumps(document, indent=1, allow_nan=False))
+    with ending_with(0):
+        show_summary(Console(stderr=as_json), document, resume_command(plan, outcome, retry))
+        if as_json:
+            print_json(document)
     return status_of(outcome)
 
 

@@ -1,7 +1,8 @@
 """The journal of a sweep: finished rows, a line each, there before anybody is told of them.
 
-A line is a checksum, the task's index and JSON. What a crash or a full disk leaves of a line is not taken
-for one, and a damaged line is as if its task had not run. One process at a time writes.
+A line is a checksum, the task's index and JSON, which names the sweep and the task that the row is of. What a crash or
+a full disk leaves of a line is not taken for one, and a damaged line is as if its task had not run. Of two lines of one
+task the later holds: it was tried again. One process at a time writes.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import os
 import time
 import zlib
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -20,21 +22,55 @@ from scenarios.error import ScenarioError
 _BATCH, _WAIT = 200, 0.5  # rows, seconds: what a power failure may cost; a killed process costs none
 
 
-def line_of(index: int, row: dict[str, Any], timing: dict[str, Any]) -> bytes:
-    """A finished task as a line."""
-    text = json.dumps({"row": row, "timing": timing}, separators=(",", ":"), allow_nan=False)
-    body = f"{index} {text}".encode()
-    return b"%08x %b\n" % (zlib.crc32(body), body)
+@dataclass(frozen=True)
+class Line:
+    """A finished task.
+
+    Attributes
+    ----------
+    sweep : str
+        Key of the sweep that it is of; see `store.open_folder`.
+    key : str
+        The task's key, with a digest of all that determines its row.
+    index : int
+        The task's place in the sweep.
+    row, timing : dict
+    """
+
+    sweep: str
+    key: str
+    index: int
+    row: dict[str, Any]
+    timing: dict[str, Any]
+
+    def encode(self) -> bytes:
+        """As the journal has it."""
+        found = {"sweep": self.sweep, "key": self.key, "row": self.row, "timing": self.timing}
+        body = f"{self.index} {json.dumps(found, separators=(',', ':'), allow_nan=False)}".encode()
+        return b"%08x %b\n" % (zlib.crc32(body), body)
 
 
-def parsed(line: bytes) -> tuple[int, dict[str, Any], dict[str, Any]] | None:
-    """Index, row and timing of a line; None if it is not whole."""
+def parsed(line: bytes) -> Line | None:
+    """Read a line; None if it is not whole.
+
+    Raises
+    ------
+    ForeignLine
+        If it is whole and not of a journal such as this version writes.
+    """
     checksum, _, body = line.rstrip(b"\n").partition(b" ")
     if not line.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(body):
         return None
     index, _, text = body.partition(b" ")
-    found = json.loads(text)
-    return int(index), found["row"], found["timing"]
+    try:
+        found = json.loads(text)
+        return Line(str(found["sweep"]), str(found["key"]), int(index), dict(found["row"]), dict(found["timing"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise ForeignLine("a line of another kind of journal") from error
+
+
+class ForeignLine(ValueError):
+    """A whole line that is not of this journal."""
 
 
 class Journal:
@@ -43,7 +79,7 @@ class Journal:
     Parameters
     ----------
     path : Path
-        Made if need be. What a crash left of a line at its end is cut off.
+        Made if need be. What a crash left of a line at its end is cut off before the first line is added.
 
     Raises
     ------
@@ -60,8 +96,7 @@ class Journal:
             os.close(self._file)
             raise ScenarioError(f"{path.parent}: another sweep is writing there") from error
         self._end = _whole_lines(path)
-        os.ftruncate(self._file, self._end)
-        os.lseek(self._file, self._end, os.SEEK_SET)
+        self._cut = False
         self._unsynced, self._synced_at = 0, time.monotonic()
 
     def __enter__(self) -> Journal:
@@ -70,7 +105,7 @@ class Journal:
     def __exit__(self, *_: object) -> None:
         os.close(self._file)  # and with it the lock
 
-    def append(self, index: int, row: dict[str, Any], timing: dict[str, Any]) -> None:
+    def append(self, line: Line) -> None:
         """Write a finished task.
 
         Raises
@@ -78,19 +113,26 @@ class Journal:
         OSError
             If the disk is full, or the like; the journal is then as before.
         """
-        data = line_of(index, row, timing)
+        if not self._cut:
+            self._cut_off()
+        data = line.encode()
         written = 0
         try:
             while written < len(data):
                 written += os.write(self._file, data[written:])
         except OSError:
-            os.ftruncate(self._file, self._end)
-            os.lseek(self._file, self._end, os.SEEK_SET)
+            self._cut_off()
             raise
         self._end += len(data)
         self._unsynced += 1
         if self._unsynced >= _BATCH or time.monotonic() - self._synced_at > _WAIT:
             self.sync()
+
+    def _cut_off(self) -> None:
+        """Cut off what stands behind the last whole line."""
+        os.ftruncate(self._file, self._end)
+        os.lseek(self._file, self._end, os.SEEK_SET)
+        self._cut = True
 
     def sync(self) -> None:
         """Let a power failure cost nothing of what is written."""
@@ -98,23 +140,27 @@ class Journal:
         self._unsynced, self._synced_at = 0, time.monotonic()
 
 
-def finished(path: Path) -> Iterator[tuple[int, int, dict[str, Any], dict[str, Any]]]:
-    """Whole rows of a journal: offset of the line, index, row, timing; of two with one index the first."""
-    seen: set[int] = set()
+def finished(path: Path) -> Iterator[tuple[int, Line]]:
+    """Read the whole lines of a journal in their order, each with its offset.
+
+    Raises
+    ------
+    ForeignLine
+        If one is of another kind of journal.
+    """
     if not path.exists():
         return
     with path.open("rb") as file:
         offset = 0
         for line in file:
             found = parsed(line)
-            if found is not None and found[0] not in seen:
-                seen.add(found[0])
-                yield offset, *found
+            if found is not None:
+                yield offset, found
             offset += len(line)
 
 
-def row_at(file: BinaryIO, offset: int) -> tuple[int, dict[str, Any], dict[str, Any]]:
-    """The row whose line begins at an offset."""
+def line_at(file: BinaryIO, offset: int) -> Line:
+    """Read the line that begins at an offset."""
     file.seek(offset)
     found = parsed(file.readline())
     if found is None:

@@ -14,11 +14,11 @@ from rich.text import Text
 
 from .plan import Task
 from .pool import Done
-from .rows import BROKEN, COMPUTED
+from .rows import BROKEN, COMPUTED, REFUSED
 
 _REASONS = 4
 _RECENT = 500  # rows that the rate is taken over
-STYLES = dict.fromkeys(COMPUTED, "cyan") | {"done": "green"} | dict.fromkeys(BROKEN, "red")
+STYLES = dict.fromkeys(COMPUTED, "cyan") | {"done": "green", REFUSED: "yellow"} | dict.fromkeys(BROKEN, "red")
 
 
 class SweepView:

@@ -4,24 +4,28 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from pydantic import ValidationError
 
 from engines.engine import REFERENCE, UnsuitableProblem, load_engine
 from scenarios.error import ScenarioError
 from scenarios.installed import installed
 from scenarios.run_folder import library_versions
 from scenarios.runner import configure
-from scenarios.scenario import Scenario, validate
+from scenarios.scenario import Scenario
 from scenarios.start import make_start
-from scenarios.table import placed
+from scenarios.table import UnknownName, kinds, one_line, placed
 
 from .file import SweepFile, read_sweep
 from .points import count, points
 
 MOST = 5_000_000  # tasks; some 2 GB in the planning process
+# Errors of pydantic that a value of the right type may have.
+_OF_A_POINT = ("value_error", "greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")
 _CHECKED = 50  # kinds of runs whose engine is asked beforehand; each may need a motion, a tenth of a second
 
 
@@ -38,12 +42,15 @@ class Task:
     engine : str
     changes : dict
         Dotted key to value, of those that concern this engine.
+    refused : str or None
+        Why there is nothing to run at this point; None if there is.
     """
 
     index: int
     key: str
     engine: str
     changes: dict[str, Any]
+    refused: str | None = None
 
 
 @dataclass(frozen=True)
@@ -72,7 +79,6 @@ class Plan:
         digest = hashlib.sha256()
         for task in self.tasks:
             digest.update(f"{task.key} {task.engine}\n".encode())
-        digest.update(repr((self.file.time_limit, self.file.memory_limit)).encode())
         return {
             "tasks": len(self.tasks),
             "hash": digest.hexdigest(),
@@ -84,12 +90,14 @@ class Plan:
 def plan_sweep(path: Path) -> Plan:
     """Read a sweep file, validate every run of it, number them.
 
-    Settings of one engine do not multiply the runs of another: runs that come out the same are one task.
+    Settings of one engine do not multiply the runs of another: runs that come out the same are one task. A point
+    that is none, such as a drawn inertia that no rigid body has, is a task that is refused.
 
     Raises
     ------
     ScenarioError
-        With one line.
+        With one line, if the file is wrong: a name that is none, a value that it states and that cannot be, or
+        nothing but points that are refused.
     """
     sweep, base = read_sweep(path)
     names = installed()
@@ -98,17 +106,20 @@ def plan_sweep(path: Path) -> Plan:
             raise ScenarioError(f"{path}: engine {engine!r} is not installed; there are {', '.join(names)}")
     if count(sweep) * len(sweep.engines) > MOST:
         raise ScenarioError(f"{path}: {count(sweep) * len(sweep.engines)} runs; at most {MOST} fit one sweep")
-    checker = _Checker(path)
+    checker = _Checker(path, base, drawn=sweep.latin_hypercube.ranges if sweep.latin_hypercube else ())
     tasks: list[Task] = []
     seen: set[tuple[str, str]] = set()
     for changes in points(sweep):
         _refuse_other_engines(path, sweep, changes)
         for engine in sweep.engines:
             own = concerning(engine, changes)
-            digest = checker.resolved(engine, base, own)
+            digest, refused = checker.resolve(engine, own)
             if (engine, digest) not in seen:
                 seen.add((engine, digest))
-                tasks.append(Task(len(tasks), f"{len(tasks):07d}-{digest[:12]}", engine, own))
+                tasks.append(Task(len(tasks), f"{len(tasks):07d}-{digest[:12]}", engine, own, refused))
+    for engine in sweep.engines:
+        if all(task.refused for task in tasks if task.engine == engine):
+            raise ScenarioError(checker.first_refusal[engine])
     return Plan(path.stem, path, sweep, base, tasks)
 
 
@@ -137,57 +148,120 @@ def _refuse_other_engines(path: Path, sweep: SweepFile, changes: Mapping[str, An
             raise ScenarioError(f"{path}: {key}: {engine!r} is not among the sweep's engines")
 
 
+class _FileError(ScenarioError):
+    """What is wrong with the file itself, not with a point of it."""
+
+
 class _Checker:
-    """Validates runs, each part once."""
+    """Validates runs, each part once.
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    Parameters
+    ----------
+    path : Path
+    base : dict
+        The base scenario as resolved.
+    drawn : collection of str
+        Dotted keys whose values the file does not state: they are drawn.
+    """
+
+    def __init__(self, path: Path, base: dict[str, Any], drawn: Collection[str]) -> None:
+        self._path, self._base, self._drawn = path, base, drawn
         self._settings: set[str] = set()
-        self._kinds: set[str] = set()
+        self._kinds: dict[str, str | None] = {}
+        self.first_refusal: dict[str, str] = {}
 
-    def resolved(self, engine: str, base: dict[str, Any], changes: Mapping[str, Any]) -> str:
-        """Validate a run and return the hash of what it is resolved to."""
-        where = str(self._path)
-        if changes:
-            where += ": at " + ", ".join(f"{key} = {value!r}" for key, value in changes.items())
+    def resolve(self, engine: str, changes: Mapping[str, Any]) -> tuple[str, str | None]:
+        """Validate a run; return the hash of what it is resolved to, and why it is refused, or None if it is not.
+
+        Raises
+        ------
+        ScenarioError
+            If the file is wrong.
+        """
         try:
-            scenario = validate(pruned(placed(base, changes), engine), where)
-        except ScenarioError:
-            raise
+            data = pruned(placed(self._base, changes), engine)
         except ValueError as error:
-            raise ScenarioError(f"{where}: {error}") from error
-        data = scenario.model_dump(mode="json", exclude_none=True)
-        for name in {engine, REFERENCE}:
-            self._configure(where, name, data["engines"].get(name, {}))
-        self._ask(where, engine, scenario, data)
-        return hashlib.sha256(canonical([engine, data]).encode()).hexdigest()
+            raise ScenarioError(f"{self._where(changes)}: {error}") from error
+        refused = None
+        try:
+            data = self._resolved(engine, data, changes)
+        except ScenarioError as error:
+            line = f"{self._where(changes)}: {error}"
+            if isinstance(error, _FileError):
+                raise ScenarioError(line) from error
+            self.first_refusal.setdefault(engine, line)
+            refused = str(error)
+        return hashlib.sha256(canonical([engine, data]).encode()).hexdigest(), refused
 
-    def _configure(self, where: str, engine: str, settings: dict[str, Any]) -> None:
+    def _where(self, changes: Mapping[str, Any]) -> str:
+        at = ", ".join(f"{key} = {value!r}" for key, value in changes.items())
+        return f"{self._path}: at {at}" if at else str(self._path)
+
+    def _resolved(self, engine: str, data: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+        stated = [key for key in changes if key not in self._drawn]
+        try:
+            scenario = Scenario.model_validate(data)
+        except ValidationError as error:
+            raise _complaint(one_line(error), error, stated) from error
+        resolved = scenario.model_dump(mode="json", exclude_none=True)
+        for name in {engine, REFERENCE}:
+            self._configure(name, resolved["engines"].get(name, {}), stated)
+        self._ask(engine, scenario, resolved)
+        return resolved
+
+    def _configure(self, engine: str, settings: dict[str, Any], stated: Collection[str]) -> None:
         text = canonical([engine, settings])
         if text not in self._settings:
             try:
                 configure(engine, settings)
             except ScenarioError as error:
-                raise ScenarioError(f"{where}: {error}") from error
+                raise _complaint(str(error), error.__cause__, stated, ("engines", engine)) from error
             self._settings.add(text)
 
-    def _ask(self, where: str, engine: str, scenario: Scenario, data: Mapping[str, Any]) -> None:
+    def _ask(self, engine: str, scenario: Scenario, data: Mapping[str, Any]) -> None:
         """Let the engine refuse a step that does not divide the output interval, and the like."""
         kind = canonical([engine, data["engines"].get(engine, {}), data["simulation"]])
-        if kind in self._kinds or len(self._kinds) >= _CHECKED:
-            return
-        self._kinds.add(kind)
-        try:
-            problem = make_start(scenario).problem
-        except ScenarioError:
-            return  # a motion that does not exist is a row
-        library, settings = configure(engine, scenario.engines.get(engine, {}))
-        try:
-            library.check(problem, settings)
-        except UnsuitableProblem:
-            return  # so is ground that the engine does not know
-        except ValueError as error:
-            raise ScenarioError(f"{where}: engines.{engine}: {error}") from error
+        if kind not in self._kinds and len(self._kinds) < _CHECKED:
+            self._kinds[kind] = _why_refused(engine, scenario)
+        if refused := self._kinds.get(kind):
+            raise ScenarioError(refused)
+
+
+def _why_refused(engine: str, scenario: Scenario) -> str | None:
+    """Ask an engine whether it takes a run; what only the run itself can tell is no refusal."""
+    try:
+        problem = make_start(scenario).problem
+    except ScenarioError:
+        return None  # a motion that does not exist is a row
+    library, settings = configure(engine, scenario.engines.get(engine, {}))
+    try:
+        library.check(problem, settings)
+    except UnsuitableProblem:
+        return None  # so is ground that the engine does not know
+    except ValueError as error:
+        return f"engines.{engine}: {error}"
+    except Exception:
+        return None  # and an engine that breaks
+    return None
+
+
+def _complaint(
+    line: str, cause: BaseException | None, stated: Collection[str], place: tuple[str, ...] = ()
+) -> ScenarioError:
+    """Tell what is wrong with the file from what is wrong with a point.
+
+    Of a point are values that do not go together, and a drawn value out of its range. Of the file are names that are
+    none, values of another type, and values out of range that the file itself states.
+    """
+    if not isinstance(cause, ValidationError):
+        return _FileError(line)
+    for error in cause.errors():
+        where = ".".join(str(part) for part in (*place, *error["loc"]) if part not in kinds())
+        ours = any(where == key or where.startswith(f"{key}.") for key in stated)
+        unknown = isinstance(error.get("ctx", {}).get("error"), UnknownName)
+        if ours or unknown or error["type"] not in _OF_A_POINT:
+            return _FileError(line)
+    return ScenarioError(line)
 
 
 def canonical(data: Any) -> str:

@@ -13,6 +13,7 @@ from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from .plan import Task
@@ -24,6 +25,8 @@ ONE_THREAD = dict.fromkeys(
 ATTEMPTS = 3  # a worker may be killed for no fault of its task's; a third time the task is taken to be why
 _AHEAD = 2  # tasks that a worker has: the next is there before the last one's row is read
 _CHUNK = 16  # neighbours share a start, so they go to one worker, up to so many
+_STARTING = 600.0  # s for a worker to load and compile everything; half a minute on an idle machine
+_PATIENCE = 30.0  # s for a keeper to say that its child is dead, or to make another: a fork, milliseconds of work
 _LOOK = 0.2  # s between looks at the clock and at workers that are silent
 
 
@@ -49,9 +52,14 @@ class WorkersBroken(RuntimeError):
 
 @dataclass(eq=False)
 class _Worker:
-    """One worker process and what it has to do."""
+    """One worker process and what it has to do.
+
+    Its keeper owes a word while it starts, when it is asked for the next child, and when its child is dead; one that
+    is silent until ``overdue``, because somebody has stopped it or it is stuck, is replaced.
+    """
 
     process: subprocess.Popen[bytes]
+    overdue: float | None
     child: int | None = None
     rest: bytes = b""
     sent: deque[Task] = field(default_factory=deque)
@@ -142,10 +150,11 @@ class Pool:
                 yield Done(message["index"], message["row"], message["timing"])
             self._feed(worker)
         elif "pid" in message:
-            worker.child = message["pid"]
+            worker.child, worker.overdue = message["pid"], None
             self._feed(worker)
         elif "died" in message:
             yield from self._buried(worker, message["died"])
+            worker.overdue = time.monotonic() + _PATIENCE
             worker.say("\nagain")
         elif "broken" in message:
             raise WorkersBroken(f"no worker starts: {message['broken']}")
@@ -196,10 +205,12 @@ class Pool:
             yield given_up
 
     def _overdue(self) -> Iterator[Done]:
-        """Kill children that hang, replace workers that have gone without a word."""
+        """Kill children that hang, replace workers that have gone without a word or keep silent."""
         now = time.monotonic()
         for worker in list(self._workers):
-            if worker.process.poll() is not None:
+            if worker.overdue is None and worker.child is not None and _is_dead(worker.child):
+                worker.overdue = now + _PATIENCE
+            if worker.process.poll() is not None or (worker.overdue is not None and now > worker.overdue):
                 yield from self._replaced(worker)
             elif worker.sent and worker.child is not None and worker.hung is None and now > worker.due:
                 worker.hung = worker.sent[0].index
@@ -227,7 +238,7 @@ class Pool:
             # Ctrl-C is the parent's to answer.
             start_new_session=True,
         )
-        worker = _Worker(process)
+        worker = _Worker(process, time.monotonic() + _STARTING)
         worker.say(self._setup.line())
         assert process.stdout is not None
         self._selector.register(process.stdout, selectors.EVENT_READ, worker)
@@ -260,6 +271,15 @@ def _cause(status: int) -> str:
     if os.WIFSIGNALED(status):
         return signal.Signals(os.WTERMSIG(status)).name
     return f"exit status {os.WEXITSTATUS(status)}"
+
+
+def _is_dead(pid: int) -> bool:
+    """Whether a process is dead and its parent has not taken notice; False where the system does not tell."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state == "Z"
 
 
 def _kill(pid: int) -> None:

@@ -11,7 +11,11 @@ import pyarrow as pa
 from .plan import Task
 
 COMPUTED = ("done", "fell", "ended", "no-motion")
+REFUSED = "refused"  # a point that is none: its values do not go together, or were drawn from where there is nothing
 BROKEN = ("failed", "timeout", "killed", "memory")
+STATUSES = (*COMPUTED, REFUSED, *BROKEN)
+
+_LONGEST_REASON = 500  # letters
 
 _ERRORS = ("position_error_max", "position_error_end", "orientation_error_max", "orientation_error_end")
 FACTS = {
@@ -102,3 +106,8 @@ def record(task: Task, row: Mapping[str, Any], columns: pa.Schema) -> dict[str, 
         text = columns.field(key).type == pa.string() and not isinstance(value, str)
         values[key] = json.dumps(value) if text else value
     return values
+
+
+def one_line(text: str) -> str:
+    """Fit for a row: one line, not endless, nothing that is no text."""
+    return " ".join(text.encode(errors="replace").decode().split())[:_LONGEST_REASON]

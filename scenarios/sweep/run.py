@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Collection, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from scenarios.error import ScenarioError
 
-from .journal import Journal, finished
+from .journal import ForeignLine, Journal, Line, finished
 from .plan import Plan, Task
 from .pool import Done, Pool, WorkersBroken
-from .store import JOURNAL, open_folder, write_results
+from .rows import REFUSED, one_line
+from .store import JOURNAL, Opened, open_folder, refuse_other_limits, write_manifest, write_results
 from .worker import Setup
 
 Work = Callable[[Setup, Sequence[Task]], Generator[Done]]
@@ -30,7 +32,7 @@ class Outcome:
     counts : dict
         Rows by engine and status.
     missing : int
-        Tasks without a row.
+        Tasks without a row, and those to be tried again that were not.
     stopped : str or None
         Why it ended before its end; None if it did not.
     interrupted : bool
@@ -56,7 +58,7 @@ def locally(workers: int) -> Work:
     return work
 
 
-def run_sweep(plan: Plan, out: Path, work: Work, resume: bool, watch: Watch) -> Outcome:
+def run_sweep(plan: Plan, out: Path, work: Work, resume: bool, watch: Watch, retry: Collection[str] = ()) -> Outcome:
     """Do what is missing of a sweep, and make its data set once nothing is.
 
     Parameters
@@ -70,45 +72,76 @@ def run_sweep(plan: Plan, out: Path, work: Work, resume: bool, watch: Watch) -> 
         Whether the folder holds a part of this sweep.
     watch : callable
         Called with every task, its row and whether it is of this session; those of earlier ones come first.
+    retry : collection of str
+        Statuses of rows that are done again; until a new row is there, the old one stays.
 
     Raises
     ------
     ScenarioError
         If the folder is not this sweep's, or another process writes to it.
     """
-    open_folder(out, plan, resume)
-    path = out / JOURNAL
+    opened = open_folder(out, plan, resume)
     stopped, interrupted = None, False
-    counts: dict[str, Counter[str]] = {engine: Counter() for engine in plan.file.engines}
-    have: set[int] = set()
-
-    def count(done: Done, fresh: bool) -> None:
-        task = plan.tasks[done.index]
-        have.add(done.index)
-        counts[task.engine][done.row["status"]] += 1
-        watch(task, done, fresh)
-
-    with Journal(path) as journal:
-        for _, index, row, timing in finished(path):
-            if index >= len(plan.tasks):
-                raise ScenarioError(f"{path}: has a row that is not of this sweep")
-            count(Done(index, row, timing), fresh=False)
-        missing = [task for task in plan.tasks if task.index not in have]
+    with Journal(out / JOURNAL) as journal:
+        have = _stored(out / JOURNAL, plan, opened)
+        refuse_other_limits(out, plan, opened, {status for status, _ in have.values()} - set(retry))
+        missing = {task.index for task in plan.tasks if task.index not in have or have[task.index][0] in retry}
+        for index, (status, reason) in have.items():
+            if index not in missing:
+                watch(plan.tasks[index], Done(index, {"status": status, "reason": reason}, {}), False)
         try:
-            with closing(work(_setup(plan), missing)) as arriving:
+            if missing:
+                write_manifest(out, plan, opened, complete=False)
+            with closing(_arriving(plan, work, missing)) as arriving:
                 for done in arriving:
-                    journal.append(done.index, done.row, done.timing)
-                    count(done, fresh=True)
+                    task = plan.tasks[done.index]
+                    journal.append(Line(opened.key, task.key, done.index, done.row, done.timing))
+                    have[done.index] = (done.row["status"], done.row["reason"])
+                    missing.discard(done.index)
+                    watch(task, done, True)
             journal.sync()
-            write_results(out, plan)
+            write_results(out, plan, opened)
         except KeyboardInterrupt:
             stopped, interrupted = "interrupted", True
         except WorkersBroken as error:
             stopped = str(error)
         except OSError as error:
             stopped = f"cannot write: {error.strerror or error}"
+    counts: dict[str, Counter[str]] = {engine: Counter() for engine in plan.file.engines}
+    for index, (status, _) in have.items():
+        counts[plan.tasks[index].engine][status] += 1
     rows = {name: dict(found) for name, found in counts.items()}
-    return Outcome(out, rows, len(plan.tasks) - len(have), stopped, interrupted)
+    return Outcome(out, rows, len(missing), stopped, interrupted)
+
+
+def _stored(path: Path, plan: Plan, opened: Opened) -> dict[int, tuple[str, str | None]]:
+    """Status and reason of the rows of a journal, by the task's index.
+
+    Raises
+    ------
+    ScenarioError
+        If a row is not of this sweep.
+    """
+    found: dict[int, tuple[str, str | None]] = {}
+    try:
+        for _, line in finished(path):
+            task = plan.tasks[line.index] if 0 <= line.index < len(plan.tasks) else None
+            if line.sweep != opened.key or task is None or line.key != task.key:
+                raise ForeignLine(f"the row {line.key}")
+            found[line.index] = (sys.intern(line.row["status"]), line.row.get("reason"))
+    except ForeignLine as error:
+        raise ScenarioError(f"{path}: has {error}, which is not of this sweep; name another folder by --out") from error
+    return found
+
+
+def _arriving(plan: Plan, work: Work, missing: Collection[int]) -> Generator[Done]:
+    """Rows of all missing tasks, first of those that are refused: nobody has to work for them."""
+    tasks = [task for task in plan.tasks if task.index in missing]
+    for task in tasks:
+        if task.refused is not None:
+            yield Done(task.index, {"status": REFUSED, "reason": one_line(task.refused)}, {})
+    with closing(work(_setup(plan), [task for task in tasks if task.refused is None])) as arriving:
+        yield from arriving
 
 
 def _setup(plan: Plan) -> Setup:

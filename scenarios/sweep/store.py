@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import hashlib
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -16,15 +18,36 @@ from scenarios.error import ScenarioError
 from scenarios.files import make_folder, write_json
 from scenarios.stored import read_json
 
-from .journal import finished, row_at
-from .plan import Plan
+from .journal import finished, line_at
+from .plan import Plan, canonical
 from .rows import TIMING, record, schema
 
 MANIFEST, JOURNAL, RESULTS, TIMINGS = "sweep.json", "journal.txt", "results", "timing.parquet"
 _BLOCK = 20_000  # rows of a row group
+_FORMAT = 2  # of the manifest and the journal
 
 
-def open_folder(out: Path, plan: Plan, resume: bool) -> None:
+@dataclass(frozen=True)
+class Opened:
+    """A sweep's folder.
+
+    Attributes
+    ----------
+    key : str
+        Digest of all that the sweep's rows depend on, as it was when the sweep was begun; every line of its journal
+        carries it.
+    limits : dict
+        Limits under which the rows that it has were done.
+    facts : dict
+        What the rows of this session are of; see `Plan.facts`.
+    """
+
+    key: str
+    limits: dict[str, Any]
+    facts: dict[str, Any]
+
+
+def open_folder(out: Path, plan: Plan, resume: bool) -> Opened:
     """Make the folder of a new sweep, or see that an old one is of the same sweep.
 
     Raises
@@ -34,12 +57,47 @@ def open_folder(out: Path, plan: Plan, resume: bool) -> None:
     """
     facts, known = plan.facts(), out / MANIFEST
     if resume:
-        _same(known, _manifest(known), facts)
-    elif known.exists():
+        then = _manifest(known)
+        _same(known, then, facts)
+        return Opened(then["key"], then["limits"], facts)
+    if known.exists():
         raise ScenarioError(f"{out}: holds a sweep already: go on with it by --resume, or name another folder by --out")
-    else:
-        make_folder(out)
-        write_json(known, facts | {"title": plan.file.title, "complete": False})
+    if (out / JOURNAL).exists():
+        raise ScenarioError(
+            f"{out}: holds the {JOURNAL} of a sweep without its {MANIFEST}: name another folder by --out"
+        )
+    make_folder(out)
+    opened = Opened(hashlib.sha256(canonical(facts).encode()).hexdigest()[:16], _limits(plan), facts)
+    write_manifest(out, plan, opened, complete=False)
+    return opened
+
+
+def write_manifest(out: Path, plan: Plan, opened: Opened, complete: bool) -> None:
+    """Write what the folder's rows are of, and whether all are there."""
+    found = {"format": _FORMAT, "key": opened.key} | opened.facts | {"limits": opened.limits}
+    write_json(out / MANIFEST, found | {"title": plan.file.title, "complete": complete})
+
+
+def _limits(plan: Plan) -> dict[str, Any]:
+    return {"time_limit": plan.file.time_limit, "memory_limit": plan.file.memory_limit}
+
+
+def refuse_other_limits(out: Path, plan: Plan, opened: Opened, statuses: Collection[str]) -> None:
+    """Refuse to keep rows of these statuses where they would be others under the limits of the file.
+
+    Raises
+    ------
+    ScenarioError
+        If the file's limits are not those under which rows timed out or had no memory left.
+    """
+    now = _limits(plan)
+    for limit, status in (("time_limit", "timeout"), ("memory_limit", "memory")):
+        then = opened.limits.get(limit)
+        if then != now[limit] and status in statuses:
+            raise ScenarioError(
+                f"{out}: has rows of status {status} that are of {limit} {then!r}, and the file says {now[limit]!r}: "
+                f"try them again by --retry {status}"
+            )
 
 
 def _manifest(path: Path) -> dict[str, Any]:
@@ -66,6 +124,11 @@ def _same(path: Path, then: Mapping[str, Any], now: Mapping[str, Any]) -> None:
                     f"{path.parent}: was begun with {name} {old[name]}, and here is {new[name]}: "
                     "their rows do not belong together"
                 )
+    if then.get("format") != _FORMAT or not isinstance(then.get("limits"), dict) or "key" not in then:
+        raise ScenarioError(
+            f"{path.parent}: was begun by another version of velodrome, whose rows do not say what they are of; "
+            "begin it anew in another folder by --out"
+        )
     if then.get("hash") != now["hash"]:
         raise ScenarioError(f"{path.parent}: is of another sweep, or the file has changed; --out names another folder")
 
@@ -75,7 +138,7 @@ def part_of(out: Path, engine: str) -> Path:
     return out / RESULTS / f"engine={quote(engine, safe='')}" / "part-0.parquet"
 
 
-def write_results(out: Path, plan: Plan) -> None:
+def write_results(out: Path, plan: Plan, opened: Opened) -> None:
     """Make the data set of a complete journal, sorted by key, a part an engine; and say that it is complete.
 
     Raises
@@ -83,22 +146,21 @@ def write_results(out: Path, plan: Plan) -> None:
     OSError
         If the disk is full, or the like; the journal stays, and nothing looks whole that is not.
     """
-    facts = plan.facts()
-    offsets = {index: offset for offset, index, _, _ in finished(out / JOURNAL)}
+    offsets = {line.index: offset for offset, line in finished(out / JOURNAL)}
     columns = schema(plan.tasks)
     with (out / JOURNAL).open("rb") as journal:
         done = [(task, offsets[task.index]) for task in plan.tasks if task.index in offsets]
-        for engine, version in facts["engines"].items():
+        for engine, version in opened.facts["engines"].items():
             part = part_of(out, engine)
             part.parent.mkdir(parents=True, exist_ok=True)
-            own = ((task, row_at(journal, offset)) for task, offset in done if task.engine == engine)
+            own = ((task, line_at(journal, offset)) for task, offset in done if task.engine == engine)
             # A run that was killed could not say its version.
-            found = ({"version": version} | record(task, row, columns) for task, (_, row, _) in own)
+            found = ({"version": version} | record(task, line.row, columns) for task, line in own)
             _write(part, columns, found)
-        every = ((task, row_at(journal, offset)) for task, offset in done)
-        clocks = ({"key": task.key, "index": task.index, "engine": task.engine, **time} for task, (_, _, time) in every)
+        every = ((task, line_at(journal, offset)) for task, offset in done)
+        clocks = ({"key": task.key, "index": task.index, "engine": task.engine, **line.timing} for task, line in every)
         _write(out / TIMINGS, pa.schema(list(TIMING.items())), clocks)
-    write_json(out / MANIFEST, facts | {"title": plan.file.title, "complete": True})
+    write_manifest(out, plan, replace(opened, limits=_limits(plan)), complete=True)
 
 
 def _write(path: Path, columns: pa.Schema, records: Iterator[dict[str, Any]]) -> None:

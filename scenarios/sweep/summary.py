@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from rich.table import Table
 
 from .live import STYLES
 from .plan import Plan
-from .rows import BROKEN
+from .rows import BROKEN, REFUSED
 from .run import Outcome
 from .store import RESULTS, TIMINGS, part_of
 
@@ -32,7 +32,7 @@ def summary(plan: Plan, outcome: Outcome) -> dict[str, Any]:
     dict
         ``sweep, folder, tasks, missing, complete, stopped`` and ``engines``: per engine ``rows`` by status and, of
         a complete sweep, ``position_error`` (median and worst of the rides' largest), ``rows_per_second`` of one
-        worker, and ``reasons`` of rows that broke.
+        worker, and ``reasons`` of rows that broke or were refused.
     """
     complete = outcome.stopped is None
     engines: dict[str, Any] = {}
@@ -58,7 +58,7 @@ def _of_results(outcome: Outcome, engine: str) -> dict[str, Any]:
     error = {"median": float(np.median(errors)), "worst": float(errors.max())} if len(errors) else None
     timing = pq.read_table(outcome.folder / TIMINGS, filters=[("engine", "=", engine)], columns=["task_time"])
     seconds = timing.column("task_time").drop_null().to_numpy()
-    broken = [row for row in table.select(columns[:2]).to_pylist() if row["status"] in BROKEN]
+    broken = [row for row in table.select(columns[:2]).to_pylist() if row["status"] in (*BROKEN, REFUSED)]
     return {
         "position_error": error,
         "rows_per_second": float(len(seconds) / seconds.sum()) if seconds.sum() > 0 else None,
@@ -74,9 +74,10 @@ def status_of(outcome: Outcome) -> int:
     return int(broke or outcome.stopped is not None)
 
 
-def resume_command(plan: Plan, outcome: Outcome) -> str:
+def resume_command(plan: Plan, outcome: Outcome, retry: Collection[str] = ()) -> str:
     """What goes on with a sweep that was stopped."""
-    return f"velodrome sweep {plan.path} --out {outcome.folder} --resume"
+    again = "".join(f" --retry {status}" for status in retry)
+    return f"velodrome sweep {plan.path} --out {outcome.folder} --resume{again}"
 
 
 def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> None:
@@ -96,7 +97,7 @@ def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> 
     console.print(table)
     for name, entry in entries.items():
         for reason in entry.get("reasons", ()):
-            _say(console, f"{name} {reason}", "red")
+            _say(console, f"{name} {reason}", STYLES[reason.partition(":")[0]])
     if document["stopped"] is None:
         _say(console, f"data set: {document['folder']}/{RESULTS}")
         return

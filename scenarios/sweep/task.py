@@ -13,17 +13,16 @@ from typing import Any
 import numpy as np
 
 from engines.admission import ride
-from engines.engine import REFERENCE, Engine, Settings, Trajectory
+from engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, why_failed
+from engines.guard import call_engine
 from scenarios.error import ScenarioError
-from scenarios.runner import claimed_noise, configure, measure_one, why_failed
+from scenarios.runner import claimed_noise, configure, measure_one
 from scenarios.scenario import OF_THE_MOTION, Scenario, validate
 from scenarios.start import Start, make_start
 from scenarios.table import placed
 
 from .plan import canonical, pruned
-from .rows import METRICS, flat
-
-_LONGEST_REASON = 500
+from .rows import METRICS, REFUSED, flat, one_line
 
 
 class Tasks:
@@ -59,7 +58,7 @@ class Tasks:
         begin = time.process_time()
         timing: dict[str, Any] = {}
         try:
-            row = self._ride(engine, changes, timing)
+            row = call_engine(self._ride, engine, changes, timing)
         except Exception as error:  # whatever an engine raises is one row that says so
             row = _broken(error)
         timing["task_time"] = time.process_time() - begin
@@ -74,6 +73,12 @@ class Tasks:
         if isinstance(start, str):
             return facts | {"status": "no-motion", "reason": one_line(start)}
         facts |= {"family": start.family, "growth_rate": start.growth_rate, "size": start.size}
+        try:
+            engine.check(start.problem, settings)
+        except UnsuitableProblem:
+            raise
+        except ValueError as error:  # a step that does not divide the output interval, and the like
+            return facts | {"status": REFUSED, "reason": one_line(f"engines.{name}: {error}")}
         begin = time.process_time()
         reference: Trajectory | str | None = None
         try:
@@ -82,7 +87,6 @@ class Tasks:
                 if isinstance(trajectory, str):
                     return facts | {"status": "failed", "reason": trajectory}
             else:
-                engine.check(start.problem, settings)
                 reference = self._reference(scenario, start)
                 trajectory = ride(engine, start.problem, settings, lambda _: None)
         except MemoryError:
@@ -150,11 +154,6 @@ def _broken(error: Exception) -> dict[str, Any]:
     if short or "bad_alloc" in str(error):
         return {"status": "memory", "reason": "more memory than the sweep's memory_limit, or than there is"}
     return {"status": "failed", "reason": one_line(why_failed(error))}
-
-
-def one_line(text: str) -> str:
-    """Fit for a row: one line, not endless, nothing that is no text."""
-    return " ".join(text.encode(errors="replace").decode().split())[:_LONGEST_REASON]
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 RETIRED = 75  # exit status of a child that has run out of memory once and may be in pieces
+_INPUT_ENDED = 76  # of a child that has nothing more to do; an engine may end it with any other, 0 included
 _GRACE = 60.0  # seconds beyond its time limit after which a child that nobody watches ends itself
 
 
@@ -73,7 +74,7 @@ def main() -> None:
             signal.signal(signal.SIGCHLD, signal.SIG_DFL)
             _serve(setup, tasks, results)
         status = _watch(child, tasks, death)
-        if status is None or status == 0:
+        if status is None or (os.WIFEXITED(status) and os.WEXITSTATUS(status) == _INPUT_ENDED):
             return
         _say(results, {"died": status})
         # What the child left unread is sent again.
@@ -118,7 +119,7 @@ def _serve(setup: Setup, tasks: int, results: int) -> None:
             _say(results, {"index": task["index"], "row": row, "timing": timing | who})
             if row["status"] == "memory":
                 os._exit(RETIRED)  # what it has left may be too little for the next task
-        status = 0
+        status = _INPUT_ENDED
     finally:
         os._exit(status)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -66,6 +67,12 @@ def raising(error: BaseException) -> Callable[[Trajectory], Trajectory]:
         raise error
 
     return fail
+
+
+def pressing_ctrl_c(trajectory: Trajectory) -> Trajectory:
+    """An `after` during which the user presses Ctrl-C."""
+    signal.raise_signal(signal.SIGINT)
+    return trajectory
 
 
 def with_fields(**changes: Callable[[np.ndarray], np.ndarray]) -> Callable[[Trajectory], Trajectory]:

@@ -8,15 +8,16 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
-from altered import Altered, raising
+from altered import Altered, pressing_ctrl_c, raising
 
 from engines import engine as registry
-from engines.engine import Engine, EngineError, Settings, engine_names, load_engine
+from engines.engine import Engine, EngineError, Settings, Trajectory, engine_names, load_engine
 from reference.bicycle import Bicycle
 from reference.families import find_motion
 from reference.surface import Paraboloid
@@ -180,19 +181,19 @@ def test_run_by_tag_takes_all_that_have_it(velodrome) -> None:
     assert result.status == 0
 
 
-def breaking(error: BaseException, monkeypatch: pytest.MonkeyPatch) -> None:
+def breaking(after: Callable[[Trajectory], Trajectory], monkeypatch: pytest.MonkeyPatch) -> None:
     """Make mujoco-native break in every run."""
 
     def configure(name: str, values: Any) -> tuple[Engine, Settings]:
         engine, settings = original(name, values)
-        return (Altered(engine, after=raising(error)) if name == "mujoco-native" else engine), settings
+        return (Altered(engine, after=after) if name == "mujoco-native" else engine), settings
 
     original = runner.configure
     monkeypatch.setattr(runner, "configure", configure)
 
 
 def test_an_engine_that_breaks_is_status_1(velodrome, monkeypatch: pytest.MonkeyPatch) -> None:
-    breaking(EngineError("the solver diverged"), monkeypatch)
+    breaking(raising(EngineError("the solver diverged")), monkeypatch)
     result = velodrome("run", "q2", *SHORT, "--json")
     (entry,) = result.json()["runs"]
     assert (result.status, entry["complete"]) == (1, True)
@@ -201,7 +202,7 @@ def test_an_engine_that_breaks_is_status_1(velodrome, monkeypatch: pytest.Monkey
 
 
 def test_ctrl_c_is_status_130_and_ends_all_runs(velodrome, monkeypatch: pytest.MonkeyPatch) -> None:
-    breaking(KeyboardInterrupt(), monkeypatch)
+    breaking(pressing_ctrl_c, monkeypatch)
     result = velodrome("run", "q2", "q2-plus", *SHORT, "--json")
     assert result.status == 130
     (entry,) = result.json()["runs"]

@@ -4,52 +4,71 @@ from __future__ import annotations
 
 import errno
 import os
+import zlib
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from scenarios.error import ScenarioError
-from scenarios.sweep.journal import Journal, finished, line_of, parsed
+from scenarios.sweep.journal import ForeignLine, Journal, Line, finished, parsed
 
-ROWS = [(3, {"status": "done", "x": 0.1 + 0.2}, {}), (1, {"status": "fell", "reason": "é\n"}, {"cpu_time": 1e-300})]
+ROWS = [
+    Line("0123abcd", "0000003-aa", 3, {"status": "done", "x": 0.1 + 0.2}, {}),
+    Line("0123abcd", "0000001-bb", 1, {"status": "fell", "reason": "é\n"}, {"cpu_time": 1e-300}),
+]
 
 
-def kept(path: Path) -> list[list[Any]]:
-    return [found for _, *found in finished(path)]
+def kept(path: Path) -> list[Line]:
+    return [line for _, line in finished(path)]
 
 
 def test_rows_come_back_to_the_bit(tmp_path: Path) -> None:
     path = tmp_path / "journal"
     with Journal(path) as journal:
         for row in ROWS:
-            journal.append(*row)
-    assert kept(path) == [list(row) for row in ROWS]
+            journal.append(row)
+    assert kept(path) == ROWS
 
 
 @pytest.mark.parametrize("cut", [1, 2, 9, 30])
 def test_a_torn_last_line_is_cut_off_and_what_follows_is_whole(tmp_path: Path, cut: int) -> None:
     path = tmp_path / "journal"
-    path.write_bytes(line_of(*ROWS[0]) + line_of(*ROWS[1])[:-cut])
-    assert kept(path) == [list(ROWS[0])]
+    path.write_bytes(ROWS[0].encode() + ROWS[1].encode()[:-cut])
+    assert kept(path) == [ROWS[0]]
     with Journal(path) as journal:
-        journal.append(*ROWS[1])
-    assert kept(path) == [list(row) for row in ROWS]
+        journal.append(ROWS[1])
+    assert kept(path) == ROWS
 
 
 def test_a_line_without_any_end_is_no_row(tmp_path: Path) -> None:
     path = tmp_path / "journal"
-    path.write_bytes(line_of(*ROWS[0])[:40])
+    path.write_bytes(ROWS[0].encode()[:40])
+    assert kept(path) == []
+    with Journal(path) as journal:
+        journal.append(ROWS[1])
+    assert path.read_bytes() == ROWS[1].encode()
+
+
+def test_nothing_is_cut_off_before_there_is_something_to_write(tmp_path: Path) -> None:
+    path = tmp_path / "journal"
+    path.write_bytes(ROWS[0].encode()[:40])
     with Journal(path):
         pass
-    assert path.read_bytes() == b""
+    assert path.read_bytes() == ROWS[0].encode()[:40]
+
+
+@pytest.mark.parametrize("text", ['{"row":{},"timing":{}}', "3", "[]", "x", '{"sweep":1,"key":2,"row":3,"timing":4}'])
+def test_a_whole_line_of_another_kind_is_told_from_a_damaged_one(text: str) -> None:
+    body = f"3 {text}".encode()
+    with pytest.raises(ForeignLine):
+        parsed(b"%08x %b\n" % (zlib.crc32(body), body))
 
 
 @given(st.data())
 def test_no_altered_line_is_taken_for_a_row(data: st.DataObject) -> None:
-    line = line_of(*ROWS[1])
+    line = ROWS[1].encode()
     place = data.draw(st.integers(0, len(line) - 1))
     bit = 1 << data.draw(st.integers(0, 7))
     assert parsed(line[:place] + bytes([line[place] ^ bit]) + line[place + 1 :]) is None
@@ -57,8 +76,8 @@ def test_no_altered_line_is_taken_for_a_row(data: st.DataObject) -> None:
 
 def test_a_damaged_line_costs_that_row_only(tmp_path: Path) -> None:
     path = tmp_path / "journal"
-    path.write_bytes(line_of(*ROWS[0]).replace(b"done", b"gone") + line_of(*ROWS[1]))
-    assert kept(path) == [list(ROWS[1])]
+    path.write_bytes(ROWS[0].encode().replace(b"done", b"gone") + ROWS[1].encode())
+    assert kept(path) == [ROWS[1]]
 
 
 def test_one_process_writes_at_a_time(tmp_path: Path) -> None:
@@ -77,11 +96,11 @@ def test_a_full_disk_leaves_whole_lines(tmp_path: Path, monkeypatch: pytest.Monk
         return write(file, data[: len(data) // 2])
 
     with Journal(path) as journal:
-        journal.append(*ROWS[0])
+        journal.append(ROWS[0])
         monkeypatch.setattr(os, "write", filling)
         with pytest.raises(OSError, match="No space"):
-            journal.append(*ROWS[1])
-        assert path.read_bytes() == line_of(*ROWS[0])
+            journal.append(ROWS[1])
+        assert path.read_bytes() == ROWS[0].encode()
         monkeypatch.undo()
-        journal.append(*ROWS[1])
-    assert kept(path) == [list(row) for row in ROWS]
+        journal.append(ROWS[1])
+    assert kept(path) == ROWS
