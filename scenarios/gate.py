@@ -116,23 +116,30 @@ def check(
         If a scenario or a baseline is none, or an engine is neither installed nor in a baseline.
     """
     folder = BASELINES if baselines is None else baselines
-    scenarios = [_as_gated(*load_scenario(source)) for source in (sources or gated_names())]
+    scenarios = [as_gated(source) for source in (sources or gated_names())]
     known = {name: read_baseline(name, folder, scenario) for name, scenario in scenarios}
     judged = _to_judge(engines, known)
     verdicts: list[tuple[str, Verdict]] = []
     fresh: dict[str, dict[str, Any]] = {}
     for name, scenario in scenarios:
-        held = _hold(name, scenario, judged, known[name], watch, chosen, trace, asked=bool(engines), hold_cpu=hold_cpu)
+        held = _hold(name, scenario, judged, known[name], watch, chosen, trace, bool(engines), hold_cpu)
         verdicts += [(name, verdict) for verdict in [*held.verdicts, *_without_verdict(judged, held)]]
-        fresh[name] = {"scenario": name} | _ride(scenario) | {"content": content(scenario)}
-        fresh[name] |= {"libraries": library_versions(), "exact_error": held.exact_error, "engines": held.entries}
+        fresh[name] = {
+            "scenario": name,
+            **_ride(scenario),
+            "content": content(scenario),
+            "libraries": library_versions(),
+            "exact_error": held.exact_error,
+            "engines": held.entries,
+        }
     if not verdicts:
         raise ScenarioError("nothing was judged: no engine and no scenario go together")
     return verdicts, fresh
 
 
-def _as_gated(name: str, scenario: Scenario) -> tuple[str, Scenario]:
-    """A scenario as the gate rides it."""
+def as_gated(source: str) -> tuple[str, Scenario]:
+    """Name of a scenario, and the scenario as the gate rides it."""
+    name, scenario = load_scenario(source)
     gate = scenario.gate or Gate()
     simulation = Simulation(duration=gate.duration, output_rate=gate.output_rate)
     return name, scenario.model_copy(update={"gate": gate, "simulation": simulation})
@@ -191,7 +198,6 @@ def _hold(
         exact = find_exact(start)
     except ScenarioError as error:
         raise ScenarioError(f"{name}: {error}") from error
-    gate, duration = scenario.gate or Gate(), scenario.simulation.duration
     held = _Held([], {}, [], exact.error)
     for engine_name in engines:
         entry = baseline.get(engine_name)
@@ -202,10 +208,10 @@ def _hold(
                 sample,
                 start,
                 exact,
-                gate,
+                scenario.gate or Gate(),
                 engine,
                 settings,
-                watch=partial(_report, watch, engine_name, duration),
+                watch=partial(_report, watch, engine_name, scenario.simulation.duration),
                 known_noise=(entry or {}).get("step_noise"),
                 hold_cpu=hold_cpu,
             )

@@ -61,9 +61,7 @@ def check_command(
     unfinished = _unfinished({junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN})
     with showing_traceback(traceback), unfinished, present.Progress() as progress:
         trace = print_traceback if traceback else None
-        verdicts, fresh = gate.check(
-            progress.watch, scenario, engine, baselines, configure, trace=trace, hold_cpu=hold_cpu
-        )
+        verdicts, fresh = gate.check(progress.watch, scenario, engine, baselines, configure, trace, hold_cpu)
     for path, page in files:
         if path is not None:
             write_text(path, page(verdicts))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,22 +24,26 @@ Simulate = Callable[[Engine, Problem, Any, Progress], Trajectory]
 
 
 @cache
-def _starting(scenario: str) -> tuple[Start, Exact]:
-    start = make_start(Scenario.model_validate_json(scenario))
-    return start, find_exact(start)
+def _start_of(scenario: str) -> Start:
+    return make_start(Scenario.model_validate_json(scenario))
+
+
+@cache
+def _exact_of(scenario: str) -> Exact:
+    return find_exact(_start_of(scenario))
 
 
 def compute_starts_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compute the gated motions once: it is the engines that are altered."""
-    exact = {}
+    scenarios: dict[int, str] = {}
 
     def start_of(scenario: Scenario) -> Start:
-        start, found = _starting(scenario.model_dump_json())
-        exact[id(start)] = found
-        return start
+        text = scenario.model_dump_json()
+        scenarios[id(_start_of(text))] = text
+        return _start_of(text)
 
     monkeypatch.setattr(gate, "make_start", start_of)
-    monkeypatch.setattr(gate, "find_exact", lambda start: exact[id(start)])
+    monkeypatch.setattr(gate, "find_exact", lambda start: _exact_of(scenarios[id(start)]))
 
 
 def measure_rides_only(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -95,7 +99,9 @@ class _Simulated(Altered):
 
     def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
         assert self.replaced is not None
-        return self.replaced(self.inner, problem, settings, progress)
+        found = self.replaced(self.inner, problem, settings, progress)
+        # It says nothing of what it did.
+        return replace(found, engine=self.name, version=self.version, settings=settings.model_dump(mode="json"))
 
 
 def simulated(simulate: Simulate) -> Chosen:

@@ -17,7 +17,7 @@ from sweeping import UPRIGHT, data_set, here, planned, rows, swept
 from engines.admission import ride
 from reference.bicycle import Bicycle
 from scenarios.error import ScenarioError
-from scenarios.runner import measure_one, plan_run
+from scenarios.runner import claimed_noise, measure_one, plan_run
 from scenarios.scenario import load_scenario
 from scenarios.sweep import rows as columns
 from scenarios.sweep.journal import finished
@@ -53,7 +53,8 @@ def test_a_row_has_the_parameters_and_the_metrics_of_a_run(tmp_path: Path) -> No
         name: ride(engine, alone.start.problem, settings, lambda _: None)
         for name, (engine, settings) in alone.engines.items()
     }
-    measured = measure_one(alone.start, rides["mujoco-multipliers"], rides["reference"])
+    noise = claimed_noise(*alone.engines["mujoco-multipliers"])
+    measured = measure_one(alone.start, rides["mujoco-multipliers"], rides["reference"], step_noise=noise)
     differing = set(columns.TIMING)
     flat = {name: value for name, value in columns.flat(measured).items() if name not in differing}
     assert set(flat) == set(columns.METRICS) - {"family", "growth_rate", "size"}
