@@ -263,10 +263,11 @@ def _never_without(evidence: Evidence) -> Line:
     (rest, slow), (fast, quick) = _at_rest(evidence), _infinitely_fast(evidence)
     inside = [alpha for alpha in _BETWEEN if rest < alpha < fast]
     found = [evidence.found(alpha) for alpha in inside]
-    squares = []
-    for at, motion in ((rest, slow), (fast, quick)):
-        for alpha in inside:
-            squares.append(squared_rates(carry_pivot(evidence.bicycle, motion, at, alpha)[-1][1]))
+    squares = [
+        squared_rates(carry_pivot(evidence.bicycle, motion, at, alpha)[-1][1])
+        for at, motion in ((rest, slow), (fast, quick))
+        for alpha in inside
+    ]
     none = sum(len(each.pivoting) for each in found)
     least = min((len(each.pivoting) for each in found), default=0)
     return words(

@@ -21,6 +21,7 @@ from engines.exudyn.solve import Integration, integrate, silent
 from reference.bicycle import Bicycle
 from reference.contact import observe
 from reference.dae import consistent_state
+from reference.rim import rim_search
 from reference.simulate import simulate
 from reference.surface import Paraboloid, Plane, Surface, SurfaceFunction, surface_function
 
@@ -179,6 +180,8 @@ def test_a_wheel_without_contact_has_no_normal():
     where[:, 3] = 1.0
     where[:, 2] = 0.3, np.nan
     shape = (np.zeros((2, 3)), np.stack([np.eye(3)] * 2), np.array([0.3, 0.3]))
-    next(kernel.normals(where, *shape, Plane().function.real, Plane().parameters, out))
+    ground = Plane()
+    looking = rim_search(ground, (0.3, 0.3))
+    next(kernel.normals(where, *shape, looking, ground.function.real, ground.parameters, out))
     np.testing.assert_allclose(out[0], [0.0, 0.0, 1.0], atol=4 * ROUND_OFF)
     assert np.isnan(out[1]).all()
