@@ -33,7 +33,8 @@ DENSE = 20000
 
 
 def rough(spacing: float, height: float) -> HeightField:
-    return HeightField(height * np.random.default_rng(7).standard_normal((40, 40)), spacing, (-20 * spacing,) * 2)
+    heights = height * np.random.default_rng(7).standard_normal((40, 40))
+    return HeightField(heights.tolist(), spacing, (-20 * spacing, -20 * spacing))
 
 
 GROUNDS = {
@@ -42,7 +43,7 @@ GROUNDS = {
     "cone": Cone(0.8, 0.4),
     "torus": Torus(2.0, 0.8),
     "polynomial": PolynomialProfile((1.2, -0.05, 0.001)),
-    "spline": SplineProfile(np.linspace(0, 4, 9), 0.3 * np.cos(np.arange(9.0))),
+    "spline": SplineProfile(np.linspace(0, 4, 9).tolist(), (0.3 * np.cos(np.arange(9.0))).tolist()),
     "rough": rough(0.25, 0.02),
     "rougher": rough(0.1, 0.02),
 }
