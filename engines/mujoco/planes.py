@@ -12,7 +12,7 @@ from numba import typeof
 
 from engines.engine import EngineError, Problem
 from engines.mujoco.convergence import watched
-from engines.mujoco.ride import Rig, bodies, contact_forces, look_stride, rim_look, start, wheel_geoms
+from engines.mujoco.ride import Rig, bodies, contact_forces, look_stride, rim_look, rim_stride, start, wheel_geoms
 from engines.mujoco.settings import ContactSettings
 from engines.mujoco.tangent import place
 from reference.kernels.dynamics import guess_contacts
@@ -49,7 +49,7 @@ def build(problem: Problem, settings: ContactSettings) -> Rig:
         wheels=wheels,
         follow=follow,
         stride=1 if moving else look_stride(settings.step),
-        look=rim_look(data, problem),
+        look=rim_look(data, problem, rim_stride(problem, settings.step)),
         forces=partial(contact_forces, model, data, wheels),
         callbacks=lambda: watched(model, data, settings.converged_below),
         judged=settings.noslip_iterations == 0,

@@ -9,10 +9,13 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from functools import partial
+from itertools import count
 from time import process_time
 
 import mujoco
 import numpy as np
+from numba import typeof
 
 from engines.engine import EngineError, Problem, Progress
 from engines.mujoco.convergence import Convergence, share
@@ -153,8 +156,8 @@ def start(problem: Problem, settings: StepSettings, touching: Touching) -> tuple
     return model, data
 
 
-def rim_look(data: mujoco.MjData, problem: Problem) -> Callable[[float], Ending | None]:
-    """Make the look at both rims of a `Rig`.
+def rim_look(data: mujoco.MjData, problem: Problem, every: int = 1) -> Callable[[float], Ending | None]:
+    """Make the look at both rims of a `Rig`, which looks only at every so many calls.
 
     Raises
     ------
@@ -167,10 +170,14 @@ def rim_look(data: mujoco.MjData, problem: Problem) -> Callable[[float], Ending 
         raise EngineError(str(error)) from error
     if not watch.needed:
         return lambda _: None
-    c = constants(problem.bicycle)
+    calls, arguments = count(), (data.qpos, constants(problem.bicycle), watch.centre, watch.axle)
+    # Finding the types out at every call would take numba longer than MuJoCo its step.
+    pose = partial(wheel_poses.compile(tuple(typeof(argument) for argument in arguments)), *arguments)
 
     def look(time: float) -> Ending | None:
-        wheel_poses(data.qpos, c, watch.centre, watch.axle)
+        if next(calls) % every:
+            return None
+        pose()
         return watch.look(time)
 
     return look
@@ -251,9 +258,9 @@ def advance(rig: Rig, step: float, steps: int, until: int) -> tuple[int, bool, E
     Returns the steps, whether the wheels stand, and why the ride ends if a rim touches the ground twice.
     """
     while steps < until:
-        count = min(until - steps, rig.stride - steps % rig.stride)
-        mujoco.mj_step(rig.model, rig.data, count)
-        steps += count
+        more = min(until - steps, rig.stride - steps % rig.stride)
+        mujoco.mj_step(rig.model, rig.data, more)
+        steps += more
         if steps % rig.stride == 0:
             if not rig.follow():
                 return steps, False, None
