@@ -266,7 +266,7 @@ def _never_without(evidence: Evidence) -> Line:
     squares = []
     for at, motion in ((rest, slow), (fast, quick)):
         squares += [squared_rates(carry_pivot(evidence.bicycle, motion, at, alpha)[-1][1]) for alpha in inside]
-    highest = max(squares, default=np.nan)
+    lowest, highest = min(squares, default=np.nan), max(squares, default=np.nan)
     none = sum(len(each.pivoting) for each in found)
     least = min((len(each.pivoting) for each in found), default=0)
     return words(
@@ -275,7 +275,7 @@ def _never_without(evidence: Evidence) -> Line:
         thresholds=[equals("least number of pivoting motions at alphas between the five cases", least, 1)],
         measured=f"from alpha = {rest:.11f}, where G comes to rest, to {fast:.11f}, from where on there is another "
         f"that begins infinitely fast, there is no pivoting motion: at alpha = {', '.join(f'{a:g}' for a in inside)} a "
-        f"search finds {none}, and both, carried on there, would have negative squared rates, {min(squares, default=np.nan):.1f} to "
+        f"search finds {none}, and both, carried on there, would have negative squared rates, {lowest:.1f} to "
         f"{highest:.1f} rad^2/s^2. Both ends are solved for, what lies between is sampled",
         source=source(
             "alphas at which the pivoting motion's squared rates are zero, and infinite; searches between",
