@@ -14,10 +14,11 @@ from .kernels.pose import aligned
 from .kinematics import FRONT_ANGLE, LEAN, REAR_ANGLE, STEER, YAW, constants
 from .surface import Surface, is_level
 
-# Both of a matrix's largest eigenvalue. Real parts nearer to each other are equal but for round-off, which is some
+# All of a matrix's largest eigenvalue. Real parts nearer to each other are equal but for round-off, which is some
 # 1e-15 times an eigenvalue's condition, 1e2 to 1e4 along the families. A double zero splits by the root of that, 1e-8
-# to 1e-7; the slowest pair, of circles of a kilometre on the plane, turns at 1e-4.
-_EQUAL, _ZERO = 1e-9, 1e-6
+# to 1e-7; the slowest pair, of circles of a kilometre on the plane, turns at 1e-4. Growth below the last cannot be
+# told from none: on other kernels of BLAS the families' growth rates differ by up to 1e-13.
+_EQUAL, _ZERO, _NO_GROWTH = 1e-9, 1e-6, 1e-12
 
 # x and y in the heading frame.
 VARIABLES = ("x", "y", "lean", "steer", "lean_rate", "steer_rate", "rear_rate")
@@ -164,9 +165,10 @@ def free_eigenvalues(surface: Surface, eigenvalues: np.ndarray, yaw_rate: np.nda
 def growth_rates(surface: Surface, eigenvalues: np.ndarray, yaw_rate: np.ndarray | float) -> np.ndarray:
     """Largest real parts (...) among the eigenvalues (..., 7) that symmetry does not fix [1/s].
 
-    Negative: Lyapunov stable.
+    Negative: Lyapunov stable. Zero where its sign is round-off, as on a bowl that is level but for 1e-13.
     """
-    return np.real(free_eigenvalues(surface, eigenvalues, yaw_rate)).max(axis=-1)
+    growth = np.real(free_eigenvalues(surface, eigenvalues, yaw_rate)).max(axis=-1)
+    return np.where(np.abs(growth) > _NO_GROWTH * np.abs(eigenvalues).max(axis=-1), growth, 0.0)
 
 
 def growth_rate(surface: Surface, eigenvalues: np.ndarray, yaw_rate: float) -> float:

@@ -35,6 +35,7 @@ TESTS = (
 SHORT_TESTS = (
     *(f"tests/reference/test_{name}.py" for name in ("families", "running_direction", "stability")),
     "tests/reports/test_modes.py",
+    "tests/scenarios/test_paper.py",
 )
 ALPHAS = (0.0, 1 / 200, 1 / 5, 1.0)
 # Of a row's largest number: a double zero splits by the root of round-off times its condition, 1e-7.
@@ -194,7 +195,7 @@ def _tested(machine: Machine, tests: tuple[str, ...]) -> list[str]:
 
 def main() -> int:
     """Parse the command line; exit status 1 where a machine fails."""
-    parser = argparse.ArgumentParser(prog="python -m tests.machines", description=__doc__.partition(":")[0])
+    parser = argparse.ArgumentParser(prog="python -m tests.machines", description="Run tests as other machines would.")
     parser.add_argument("--short", action="store_true", help="three machines and the tests that sway most")
     parser.add_argument("--only", metavar="NAME", action="append", help="this machine; may be given again")
     parser.add_argument("--kernels", action="store_true", help=argparse.SUPPRESS)

@@ -13,7 +13,7 @@ from reference.curve import sample
 from reference.families import Family, trace
 from reference.kernels.steady import STANDING, direction
 from reference.modes import modes
-from reference.sections import sample_family
+from reference.sections import sample_family, stable_sections
 from reference.special import special_points
 from reference.stability import are_zero, eigenvalue_order, sorted_eigenvalues
 from reference.surface import Paraboloid
@@ -163,6 +163,17 @@ def test_halves_of_modes_have_one_order(alpha: float, number: int) -> None:
         assert np.all(np.imag(first[turning]) > 0)
         assert np.all(first[turning] == np.conj(second[turning]))
         assert np.all(np.real(first[~turning]) <= np.real(second[~turning]))
+
+
+def test_growth_that_is_round_off_is_none() -> None:
+    """So level a bowl is that the pair of its free centre grows by less than what eigenvalues are known to."""
+    curve = trace(BICYCLE, Paraboloid(1e-15), 2, 0.1)
+    seen, level = sample_family(curve), sample_family(family(0.0, 2))
+    assert level.stable.any()
+    assert not seen.stable.any()
+    assert stable_sections(curve) == []
+    # Where the bicycle itself is unstable it is told.
+    assert seen.growth_rate.max() > 1
 
 
 def test_shaken_round_off_changes_no_name_and_no_flag(monkeypatch: pytest.MonkeyPatch) -> None:
