@@ -38,7 +38,10 @@ def rate_lines(evidence: Evidence) -> Iterator[Line]:
                     finite.append(f"{rate:.2f} (alpha = {alpha:g}, family {number})")
     rising = min(_rising(evidence, alpha) for alpha in evidence.cases)
     starts = max(float(evidence.samples(alpha, 3).rear_rate.min()) for alpha in evidence.cases)
-    slowest, worst = min(end.rear_rate for end in flat), max(end.change for end in flat)
+    slowest = min((end.rear_rate for end in flat), default=np.nan)
+    worst = max((end.change for end in flat), default=np.nan)
+    nearest = max((end.distance for end in flat), default=np.nan)
+    least = min(infinite, default=np.nan)
     yield words(
         section="3.2",
         claim="rear rates of circular motions run over [0, infinity)",
@@ -49,10 +52,10 @@ def rate_lines(evidence: Evidence) -> Iterator[Line]:
             below("largest change of their squared rear rate times the lean's distance from pi/2", worst, _LAW),
         ],
         measured=f"{len(flat)} ends of families in the five cases tend to flat bicycles: followed to a distance of "
-        f"{max(end.distance for end in flat):.0e} rad, rear rates of {slowest:.0f} rad/s and more, they grow like one "
+        f"{nearest:.0e} rad, rear rates of {slowest:.0f} rad/s and more, they grow like one "
         f"over its root, to {worst:.0e}: without bound, if the law that three decades show goes on; {len(infinite)} "
         "ends with a fast front wheel are solved at infinite speed itself, where weight no longer counts: there the "
-        f"rear rate is {min(infinite):.4f} of the root of all squared rates, or more. Large circles end at finite "
+        f"rear rate is {least:.4f} of the root of all squared rates, or more. Large circles end at finite "
         f"rates, here cut off: {', '.join(finite)} rad/s",
         source=source(
             "flat ends followed at fixed leans, fast ends solved at infinite speed, by equations in which rest and "
@@ -63,7 +66,7 @@ def rate_lines(evidence: Evidence) -> Iterator[Line]:
         ),
         checks=[
             evidence.residual(),
-            Check("least share of the rear wheel's rate at infinite speed (must not be zero)", -min(infinite), -1e-3),
+            Check("least share of the rear wheel's rate at infinite speed (must not be zero)", -least, -1e-3),
         ],
     )
 

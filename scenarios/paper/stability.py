@@ -153,7 +153,12 @@ def _next_to_cusps(evidence: Evidence, alpha: float, cusps: dict[int, str]) -> L
         claim=f"at alpha = {alpha:g} stable motions neighbour the cusp {' and '.join(cusps.values())}",
         thresholds=[
             equals("cusps found", len(gaps), len(cusps)),
-            below("largest distance of a stable section from its cusp", max(gaps.values()), _NEIGHBOUR, "rad"),
+            below(
+                "largest distance of a stable section from its cusp",
+                max(gaps.values(), default=np.inf),
+                _NEIGHBOUR,
+                "rad",
+            ),
         ],
         measured="they begin "
         + ", ".join(f"{gap:.5f} rad from {name}" for name, gap in gaps.items())

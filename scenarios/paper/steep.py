@@ -263,11 +263,10 @@ def _never_without(evidence: Evidence) -> Line:
     (rest, slow), (fast, quick) = _at_rest(evidence), _infinitely_fast(evidence)
     inside = [alpha for alpha in _BETWEEN if rest < alpha < fast]
     found = [evidence.found(alpha) for alpha in inside]
-    squares = [
-        squared_rates(carry_pivot(evidence.bicycle, motion, at, alpha)[-1][1])
-        for at, motion in ((rest, slow), (fast, quick))
-        for alpha in inside
-    ]
+    squares = []
+    for at, motion in ((rest, slow), (fast, quick)):
+        squares += [squared_rates(carry_pivot(evidence.bicycle, motion, at, alpha)[-1][1]) for alpha in inside]
+    lowest, highest = min(squares, default=np.nan), max(squares, default=np.nan)
     none = sum(len(each.pivoting) for each in found)
     least = min((len(each.pivoting) for each in found), default=0)
     return words(
@@ -276,8 +275,8 @@ def _never_without(evidence: Evidence) -> Line:
         thresholds=[equals("least number of pivoting motions at alphas between the five cases", least, 1)],
         measured=f"from alpha = {rest:.11f}, where G comes to rest, to {fast:.11f}, from where on there is another "
         f"that begins infinitely fast, there is no pivoting motion: at alpha = {', '.join(f'{a:g}' for a in inside)} a "
-        f"search finds {none}, and both, carried on there, would have negative squared rates, {min(squares):.1f} to "
-        f"{max(squares):.1f} rad^2/s^2. Both ends are solved for, what lies between is sampled",
+        f"search finds {none}, and both, carried on there, would have negative squared rates, {lowest:.1f} to "
+        f"{highest:.1f} rad^2/s^2. Both ends are solved for, what lies between is sampled",
         source=source(
             "alphas at which the pivoting motion's squared rates are zero, and infinite; searches between",
             pivot_at,
@@ -286,7 +285,7 @@ def _never_without(evidence: Evidence) -> Line:
             search=found[0].described if found else None,
         ),
         checks=[
-            Check("squared rates of the two between, over 1 rad^2/s^2 (must be negative)", max(squares), -1.0),
+            Check("squared rates of the two between, over 1 rad^2/s^2 (must be negative)", highest, -1.0),
             evidence.searched_again(*inside),
             *(_solved(each) for each in found),
         ],
@@ -312,8 +311,10 @@ def _always(evidence: Evidence) -> Iterator[Line]:
         section="5",
         claim="in the static equilibrium both wheels stand, in the pivoting motion the rear wheel alone",
         thresholds=[
-            below("largest squared rates of a static equilibrium, over 400 rad^2/s^2,", max(rests), 1e-12),
-            above("least front rate of a pivoting motion", min(rates), 0.0, "rad/s"),
+            below(
+                "largest squared rates of a static equilibrium, over 400 rad^2/s^2,", max(rests, default=np.nan), 1e-12
+            ),
+            above("least front rate of a pivoting motion", min(rates, default=np.nan), 0.0, "rad/s"),
         ],
         measured=f"in the five cases; front rates {', '.join(f'{rate:.4f}' for rate in rates)} rad/s",
         source=searched,
