@@ -142,8 +142,8 @@ def test_an_older_run_is_never_touched(tmp_path: Path) -> None:
     ("error", "words"),
     [
         (EngineError("no contact at the start"), "no contact at the start"),
-        (ZeroDivisionError("division by\nzero"), "ZeroDivisionError: division by zero (altered.py:59)"),
-        (MemoryError(), "MemoryError: (altered.py:59)"),
+        (ZeroDivisionError("division by\nzero"), "ZeroDivisionError: division by zero (altered.py:67)"),
+        (MemoryError(), "MemoryError: (altered.py:67)"),
     ],
 )
 def test_an_engine_that_breaks_costs_only_itself(error: Exception, words: str, tmp_path: Path) -> None:
