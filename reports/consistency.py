@@ -109,7 +109,9 @@ class Mismatch:
     @property
     def share(self) -> float:
         """The difference in units of its limit."""
-        return self.difference / self.limit if self.difference > 0 else 0.0
+        if self.difference == 0:
+            return 0.0
+        return self.difference / self.limit if self.limit > 0 else np.inf
 
     def as_json(self) -> dict[str, Any]:
         """Fields as JSON values."""
@@ -221,7 +223,9 @@ def _furthest(
     """The sample and part furthest in its limit; what is not finite is said elsewhere and counts as no difference."""
     apart = np.where(np.isfinite(apart), apart, 0.0)
     limit = np.broadcast_to(limit, apart.shape)
-    sample, part = np.unravel_index(np.argmax(apart / limit), apart.shape)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(apart > 0, apart / limit, 0.0)
+    sample, part = np.unravel_index(np.argmax(share), apart.shape)
     return Mismatch(
         quantity, parts[part], float(apart[sample, part]), float(limit[sample, part]), unit, float(time[sample])
     )
@@ -249,7 +253,7 @@ def _integrals(time: np.ndarray, values: np.ndarray, samples: int) -> np.ndarray
     nodes = (time[nearest] - time[:-1, None]) / interval[:, None]
     moments = 1 / np.arange(1, samples + 1)
     # On an even grid all stencils but those at the ends are one.
-    kinds, kind = np.unique(np.round(nodes, 9), axis=0, return_inverse=True)
-    powers = kinds[:, None, :] ** np.arange(samples)[:, None]
+    _, kinds, kind = np.unique(np.round(nodes, 9), axis=0, return_index=True, return_inverse=True)
+    powers = nodes[kinds, None, :] ** np.arange(samples)[:, None]
     weights = np.linalg.solve(powers, np.broadcast_to(moments, (len(kinds), samples))[..., None])[..., 0]
     return interval[:, None] * np.einsum("ks,ksj->kj", weights[kind.reshape(-1)], values[nearest])

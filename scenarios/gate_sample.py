@@ -188,7 +188,7 @@ def _ride_values(
     start: Start, reported: Trajectory, standing: Trajectory, exact: Trajectory, scale: Scale
 ) -> dict[str, float | None]:
     """Quantities of the part of a ride that is standing, as reported and as it follows from its coordinates."""
-    measured = measure_one(start, reported, exact, step_noise=0.0, followed=standing)
+    measured = measure_one(start, reported, exact, followed=standing)
     errors = position_errors(standing, exact)
     found = measured | {
         "short_error": float(errors[min(int(np.searchsorted(exact.time, SHORT_HORIZON)), len(errors) - 1)]),

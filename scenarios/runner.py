@@ -193,7 +193,7 @@ def measure_one(
     trajectory: Trajectory,
     reference: Trajectory | None,
     *,
-    step_noise: float,
+    step_noise: float = ROUND_OFF,
     followed: Trajectory | None = None,
 ) -> dict[str, Any]:
     """Metrics of a trajectory from a start, against a reference where there is one; see `reports.metrics.metrics`."""
