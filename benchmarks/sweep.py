@@ -25,7 +25,7 @@ from rich.table import Table
 from scenarios.sweep.plan import Plan, plan_sweep
 from scenarios.sweep.pool import ONE_THREAD
 from scenarios.sweep.run import Work, locally, run_sweep
-from scenarios.sweep.store import JOURNAL, RESULTS, TIMINGS, write_results
+from scenarios.sweep.store import JOURNAL, RESULTS, TIMINGS, open_folder, write_results
 
 # Starts of a straight ride are computed in a millisecond: what is left beside the engine is the sweep's own.
 SWEEP = """
@@ -90,8 +90,9 @@ def measured(plan: Plan, work: Work) -> Measured:
         elapsed, own = time.perf_counter() - begin, time.process_time() - own
         others = (busy() - with_children() - before) / elapsed
         assert outcome.stopped is None, outcome.stopped
+        opened = open_folder(out, plan, resume=True)
         begin = time.process_time()
-        write_results(out, plan)
+        write_results(out, plan, opened)
         finish = time.process_time() - begin
         timing = pq.read_table(out / TIMINGS)
         columns = {name: timing.column(name).to_numpy() for name in ("engine_time", "task_time", "finished")}

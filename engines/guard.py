@@ -20,7 +20,7 @@ _T = TypeVar("_T")
 _LONGEST = 200  # letters of what an engine says as it exits
 # Packages that stand between a call and the engine's own code: none of their lines is where an engine is wrong.
 _BETWEEN = (
-    *("importlib", "pydantic", "scenarios", "reports"),
+    *("importlib", "importlib_metadata", "pydantic", "scenarios", "reports"),
     *("engines.guard", "engines.engine", "engines.admission", "engines.identify"),
 )
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import os
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -18,12 +20,12 @@ NAME = "planted"
 SWEEP = (
     f'engines = ["{NAME}"]\nmemory_limit = 300\n'
     + UPRIGHT.replace("60.0", "5.0")
-    + f'"engines.{NAME}.fault" = ["hang", "crash", "none", "hog", "raise", "abort"]\n'
+    + f'"engines.{NAME}.fault" = ["hang", "crash", "none", "hog", "raise", "abort", "exit", "leave"]\n'
 )
 
 
 class PlantedSettings(Settings):
-    fault: Literal["none", "crash", "abort", "hang", "hog", "raise"] = "none"
+    fault: Literal["none", "crash", "abort", "hang", "hog", "raise", "exit", "leave"] = "none"
 
 
 class Planted:
@@ -53,11 +55,21 @@ class Planted:
                 held.append(bytearray(20_000_000))
         elif settings.fault == "raise":
             raise RuntimeError("out of\norder")
+        elif settings.fault == "exit":
+            sys.exit(0)
+        elif settings.fault == "leave":
+            os._exit(0)
         ride = INNER.simulate(problem, INNER.settings(), progress)
         return replace(ride, engine=NAME, version=self.version, settings=settings.model_dump())
 
 
 ENGINE = Planted()
+
+
+def line_of(statement: str) -> int:
+    """Line of this file on which a statement stands."""
+    (found,) = (i for i, line in enumerate(Path(__file__).read_text().splitlines(), 1) if line.strip() == statement)
+    return found
 
 
 def announce(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -66,5 +78,5 @@ def announce(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     info.mkdir(parents=True)
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: velodrome-planted\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(f"[velodrome.engines]\n{NAME} = planted:ENGINE\n")
-    monkeypatch.setenv("PYTHONPATH", f"{folder}:{Path(__file__).parent}")
+    monkeypatch.setenv("PYTHONPATH", f"{folder}:{Path(__file__).parent}:{os.environ.get('PYTHONPATH', '')}")
     monkeypatch.syspath_prepend(str(folder))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,37 @@ def test_rows_that_broke_are_named_with_their_reason(in_process: Path, capsys: p
 def test_workers_belong_to_this_machine(in_process: Path) -> None:
     with pytest.raises(ScenarioError, match="--workers goes without --scheduler"):
         command.sweep(written(in_process, THREE), "tcp://127.0.0.1:1", 2, None, resume=False, as_json=False)
+
+
+@pytest.mark.parametrize(
+    ("retry", "resume", "said"),
+    [
+        (["timeout"], False, "--retry: it belongs to --resume"),
+        (["timeout", "late"], True, "--retry late: no row has such a status; there are done, fell, ended, no-motion"),
+    ],
+)
+def test_what_is_to_be_tried_again_must_be_a_status(
+    in_process: Path, retry: list[str], resume: bool, said: str
+) -> None:
+    with pytest.raises(ScenarioError, match=said):
+        command.sweep(written(in_process, THREE), None, None, None, resume=resume, as_json=False, retry=retry)
+    assert not (in_process / "sweeps").exists()
+
+
+def test_a_stopped_retry_says_how_to_go_on(
+    in_process: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_: object) -> Generator[Done]:
+        raise KeyboardInterrupt
+        yield
+
+    path = written(in_process, THREE)
+    assert command.sweep(path, None, None, None, resume=False, as_json=False) == 0
+    monkeypatch.setattr(command, "_work", lambda *_: interrupted)
+    assert command.sweep(path, None, None, None, resume=True, as_json=False, retry=["done", "fell"]) == 130
+    said = " ".join(capsys.readouterr().out.split())
+    assert "--resume --retry done --retry fell" in said
+    assert "3 of 3 runs are missing, what is done is kept" in said
 
 
 def test_the_live_view_counts_and_says_what_failed_and_why(tmp_path: Path) -> None:

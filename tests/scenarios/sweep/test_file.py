@@ -72,6 +72,15 @@ def test_a_scenario_may_stand_in_the_file_or_beside_it(tmp_path: Path) -> None:
     assert inside.tasks == beside.tasks
 
 
+def test_a_drawn_value_out_of_its_range_refuses_its_point_only(tmp_path: Path) -> None:
+    text = 'scenario = "iftomm-1"\n[latin_hypercube]\ncount = 10\nseed = 3\nranges.motion.speed = [-5.0, 5.0]'
+    tasks = planned(tmp_path, text).tasks
+    assert len(tasks) == 10
+    for task in tasks:
+        assert (task.refused is None) == (task.changes["motion.speed"] > 0)
+        assert task.refused is None or task.refused.startswith("motion.speed: ")
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -100,6 +109,18 @@ def test_a_scenario_may_stand_in_the_file_or_beside_it(tmp_path: Path) -> None:
         ("scenario = 'q2'\ngrid.surface.alpha = [1]\n[[list]]\nsurface.alpha = 2", "is changed by"),
         ("scenario = 'q2'\ngrid.motion.near = [{lean=1,steer=1}]\n[[list]]\nmotion.near.lean = 2", "is changed by"),
         ("scenario = 'q2'\nlist = 3", "list"),
+        # Every point is refused, or every point of an engine.
+        ("scenario = 'q2'\ngrid.simulation.duration = [0.0015]", "no whole number of output intervals"),
+        (
+            "scenario = 'iftomm-1'\nengines = ['reference', 'exudyn']\n[grid]\nengines.exudyn.step = [0.003]",
+            "engines.exudyn",
+        ),
+        # A wrong name or type is the file's, though other rows are right; so is a drawn whole number.
+        ("scenario = 'q2'\n[[list]]\nsurface.alpha = 0.1\n[[list]]\nsurface.alfa = 0.1", "unknown key 'alfa'"),
+        ("scenario = 'q2'\n[[list]]\nbicycle.trail = 0.1\n[[list]]\nbicycle.tral = 0.1", "'tral' is unknown"),
+        ("scenario = 'q2'\n[[list]]\nsurface.alpha = 0.1\n[[list]]\nsurface.alpha = 'x'", "valid number"),
+        ("scenario = 'q2'\n[latin_hypercube]\ncount = 3\nseed = 1\nranges.motion.family = [1, 4]", "motion.family"),
+        ("scenario = 'q2'\n[latin_hypercube]\ncount = 3\nseed = 1\nranges.motion.rear_ratte = [1, 4]", "rear_ratte"),
         ("scenario = ", "not valid TOML"),
         ("scenario = 'q2'\n[latin_hypercube]\ncount=9999999\nseed=1\nranges.surface.alpha=[0, 1]", "at most"),
     ],

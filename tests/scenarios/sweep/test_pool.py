@@ -2,16 +2,39 @@
 
 from __future__ import annotations
 
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import planted
 import pytest
+from processes import alive
 from sweeping import UPRIGHT, data_set, here, planned, rows, swept
 
 from scenarios.sweep import pool
 from scenarios.sweep.pool import Pool, WorkersBroken
 from scenarios.sweep.summary import status_of
 from scenarios.sweep.worker import Setup
+
+RAISE = 'raise RuntimeError("out of\\norder")'
+
+
+@contextmanager
+def within(seconds: float) -> Iterator[None]:
+    """Break off what waits for ever."""
+
+    def give_up(*_: object) -> None:
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, give_up)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def test_one_worker_two_workers_and_this_process_give_equal_bits(tmp_path: Path) -> None:
@@ -34,12 +57,49 @@ def test_each_fault_is_one_row_and_the_others_go_on(tmp_path: Path, monkeypatch:
         ("crash", "killed"): "its process ended 3 times, last by SIGSEGV",
         ("none", "done"): None,
         ("hog", "memory"): "more memory than the sweep's memory_limit, or than there is",
-        ("raise", "failed"): "RuntimeError: out of order",
+        ("raise", "failed"): f"RuntimeError: out of order (planted.py:{planted.line_of(RAISE)})",
+        ("exit", "failed"): f"it called sys.exit(0) (planted.py:{planted.line_of('sys.exit(0)')})",
+        ("leave", "killed"): "its process ended 3 times, last by exit status 0",
         ("abort", "killed"): "its process ended 3 times, last by SIGABRT",
     }
     assert {row["version"] for row in rows(tmp_path / "out", "planted")} == {"1.0"}
-    assert outcome.counts["planted"] == {"timeout": 1, "killed": 2, "done": 1, "memory": 1, "failed": 1}
+    assert outcome.counts["planted"] == {"timeout": 1, "killed": 3, "done": 1, "memory": 1, "failed": 2}
     assert status_of(outcome) == 1
+
+
+def test_a_keeper_that_is_stopped_while_its_child_dies_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pool, "_PATIENCE", 1.0)
+    plan = planned(tmp_path, UPRIGHT + "perturbation.lean_rate = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]\n")
+    # No time limit comes to the rescue, and nobody else does the work.
+    with within(120.0), Pool(Setup(plan.base, 1000.0, None), 1) as workers:
+        arriving = workers.run(plan.tasks)
+        found = [next(arriving)]
+        (worker,) = workers._workers
+        assert worker.child is not None
+        os.kill(worker.process.pid, signal.SIGSTOP)
+        os.kill(worker.child, signal.SIGKILL)
+        found += arriving
+        assert workers._workers != [worker]
+    assert sorted(done.index for done in found) == list(range(6))
+    assert {done.row["status"] for done in found} == {"done"}
+    assert not alive(worker.process.pid)
+
+
+@pytest.mark.slow
+def test_a_keeper_that_is_stopped_before_its_first_child_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = planned(tmp_path, UPRIGHT)
+    monkeypatch.setattr(pool, "_STARTING", 0.0)
+    with within(120.0), Pool(Setup(plan.base, 1000.0, None), 1) as workers:
+        (worker,) = workers._workers
+        os.kill(worker.process.pid, signal.SIGSTOP)
+        monkeypatch.undo()
+        (done,) = workers.run(plan.tasks)
+    assert done.row["status"] == "done"
+    assert not alive(worker.process.pid)
 
 
 def test_workers_that_do_not_start_are_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

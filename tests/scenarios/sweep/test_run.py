@@ -8,23 +8,27 @@ from collections.abc import Generator, Sequence
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from sweeping import UPRIGHT, data_set, here, planned, rows, swept
 
+from reference.bicycle import Bicycle
 from scenarios.error import ScenarioError
 from scenarios.runner import claimed_noise, measure_one, plan_run
 from scenarios.scenario import load_scenario
 from scenarios.sweep import rows as columns
 from scenarios.sweep.journal import finished
-from scenarios.sweep.plan import Task
+from scenarios.sweep.plan import Task, plan_sweep
 from scenarios.sweep.pool import Done
-from scenarios.sweep.run import Work
+from scenarios.sweep.run import Work, run_sweep
 from scenarios.sweep.store import JOURNAL, MANIFEST, RESULTS, TIMINGS
 from scenarios.sweep.summary import status_of, summary
+from scenarios.sweep.task import Tasks
 from scenarios.sweep.worker import Setup
 
+CASES = Path(__file__).parents[2] / "cases"
 LEANING = UPRIGHT + "perturbation.lean_rate = [0.0, 0.1, 0.2, 0.3]\n"
 
 
@@ -163,6 +167,123 @@ def test_a_damaged_manifest_is_said(tmp_path: Path, text: str) -> None:
     (tmp_path / MANIFEST).write_text(text)
     with pytest.raises(ScenarioError, match="is not of a sweep"):
         swept(plan, tmp_path, resume=True)
+
+
+def without_its_manifest(out: Path) -> bytes:
+    (out / MANIFEST).unlink()
+    return (out / JOURNAL).read_bytes()
+
+
+def test_a_journal_without_its_manifest_is_not_adopted(tmp_path: Path) -> None:
+    plan, out = planned(tmp_path, LEANING), tmp_path / "out"
+    swept(plan, out)
+    journal = without_its_manifest(out)
+    other = planned(tmp_path, LEANING.replace("0.3", "0.4"))
+    for one in (other, plan):
+        with pytest.raises(ScenarioError, match=r"out: holds the journal\.txt of a sweep without its sweep\.json"):
+            swept(one, out)
+    assert (out / JOURNAL).read_bytes() == journal
+    assert not (out / MANIFEST).exists()
+
+
+def test_rows_of_another_sweep_are_refused_and_kept(tmp_path: Path) -> None:
+    plan, out = planned(tmp_path, LEANING), tmp_path / "out"
+    swept(plan, out)
+    journal = without_its_manifest(out)
+    # Another sweep's manifest beside them: one of the four runs is another, so three keys are the same.
+    other = planned(tmp_path, LEANING.replace("0.3", "0.4"))
+    swept(other, tmp_path / "other")
+    (out / MANIFEST).write_bytes((tmp_path / "other" / MANIFEST).read_bytes())
+    with pytest.raises(ScenarioError, match=r"journal\.txt: has the row 000000\d-.*, which is not of this sweep"):
+        swept(other, out, resume=True)
+    assert (out / JOURNAL).read_bytes() == journal
+    # And one line among its own.
+    with (tmp_path / "other" / JOURNAL).open("ab") as file:
+        file.write(journal.splitlines(keepends=True)[0])
+    with pytest.raises(ScenarioError, match="which is not of this sweep"):
+        swept(other, tmp_path / "other", resume=True)
+
+
+def test_a_sweep_of_an_earlier_version_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    plan, out = planned(tmp_path, LEANING), tmp_path / "out"
+    swept(plan, out)
+    manifest = json.loads((out / MANIFEST).read_text())
+    del manifest["format"]
+    (out / MANIFEST).write_text(json.dumps(manifest))
+    with pytest.raises(ScenarioError, match=r"begun by another version of velodrome.* in another folder by --out"):
+        swept(plan, out, resume=True)
+
+
+def slow(after: int) -> Work:
+    """Work that finds a timeout in all but the first so many rows."""
+
+    def work(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
+        for number, done in enumerate(here(setup, tasks)):
+            lost = {"status": "timeout", "reason": f"no result within {setup.time_limit!r} s"}
+            yield done if number < after else Done(done.index, lost, {})
+
+    return work
+
+
+def test_rows_that_timed_out_are_tried_again_when_asked(tmp_path: Path) -> None:
+    plan, out = planned(tmp_path, LEANING), tmp_path / "out"
+    first = swept(plan, out, slow(1))
+    assert (first.counts, status_of(first)) == ({"reference": {"done": 1, "timeout": 3}}, 1)
+    assert swept(plan, out, resume=True).counts == first.counts
+    stopped = run_sweep(plan, out, breaking_off(1, KeyboardInterrupt()), True, lambda *_: None, ["timeout"])
+    assert (stopped.counts, stopped.missing) == ({"reference": {"done": 2, "timeout": 2}}, 2)
+    assert json.loads((out / MANIFEST).read_text())["complete"] is False
+    seen: list[tuple[int, bool]] = []
+    last = run_sweep(plan, out, here, True, lambda task, _, fresh: seen.append((task.index, fresh)), ["timeout"])
+    assert (last.counts, last.missing, status_of(last)) == ({"reference": {"done": 4}}, 0, 0)
+    assert [fresh for _, fresh in seen] == [False, False, True, True]
+    assert sorted(index for index, _ in seen) == [0, 1, 2, 3]
+    swept(plan, tmp_path / "undisturbed")
+    assert data_set(out) == data_set(tmp_path / "undisturbed")
+
+
+def test_another_time_limit_asks_for_the_rows_that_it_ended(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    swept(planned(tmp_path, LEANING), out, slow(1))
+    longer = planned(tmp_path, LEANING.replace("60.0", "600.0"))
+    with pytest.raises(ScenarioError, match=r"status timeout that are of time_limit 60\.0, .* by --retry timeout"):
+        swept(longer, out, resume=True)
+    assert run_sweep(longer, out, here, True, lambda *_: None, ["timeout"]).counts == {"reference": {"done": 4}}
+    assert swept(longer, out, resume=True).stopped is None
+
+
+def test_a_point_that_is_none_is_a_row_and_the_others_ride(tmp_path: Path) -> None:
+    plan, out = plan_sweep(CASES / "sweep-inertia.toml"), tmp_path / "out"
+    outcome = swept(plan, out)
+    found = {row["index"]: row for row in rows(out)}
+    assert (len(found), status_of(outcome)) == (20, 0)
+    for row in found.values():
+        inertia = np.array([row[f"bicycle.rear_frame_I{axis}"] for axis in ("xx", "yy", "zz")])
+        tensor = np.diag(inertia)
+        tensor[0, 2] = tensor[2, 0] = Bicycle().rear_frame_Ixz
+        principal = np.linalg.eigvalsh(tensor)
+        possible = principal[0] > 0 and principal[2] <= principal[0] + principal[1]
+        assert row["status"] == ("done" if possible else "refused")
+        if not possible:
+            assert "are not those of a rigid body" in row["reason"]
+            assert row["version"] is not None
+    assert outcome.counts["reference"].keys() == {"done", "refused"}
+    document = summary(plan, outcome)
+    assert all(reason.startswith("refused: bicycle param") for reason in document["engines"]["reference"]["reasons"])
+    again = run_sweep(plan, out, breaking_off(0, OSError("no one is asked")), True, lambda *_: None, ["refused"])
+    assert again.missing == 0
+
+
+def test_a_step_that_an_engine_refuses_is_a_row_when_another_is_not(tmp_path: Path) -> None:
+    text = 'engines = ["exudyn"]\n' + UPRIGHT + '"engines.exudyn.step" = [0.01, 0.003]\n'
+    plan = planned(tmp_path, text)
+    outcome = swept(plan, tmp_path / "out")
+    assert outcome.counts == {"exudyn": {"done": 1, "refused": 1}}
+    planning = [row["reason"] for row in rows(tmp_path / "out", "exudyn")]
+    # The same where planning has asked often enough, and the worker finds it.
+    (task,) = (task for task in plan.tasks if task.refused)
+    row, _ = Tasks(plan.base).do("exudyn", task.changes)
+    assert (row["status"], row["reason"]) == ("refused", planning[1])
 
 
 def test_parameters_keep_their_types_and_tables_become_json(tmp_path: Path) -> None:
