@@ -48,6 +48,8 @@ def remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]
         lines.append(f"{name}: the ground pulls a wheel, by up to {pull:.3g} N; no contact could")
     if metrics["ended"] is not None:
         lines.append(f"{name} ended early: {metrics['ended']}")
+    if _equals_reference(metrics):
+        lines.append(f"{name}: its ride equals the reference's to the last bit, so nothing was compared")
     # Folders of earlier versions do not have it.
     if metrics.get("unconverged_steps"):
         residual = metrics.get("largest_residual")
@@ -69,6 +71,13 @@ def remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]
             f"{name}: beyond {metrics['horizon']:.2f} s the motion's own instability makes the error meaningless"
         )
     return lines
+
+
+def _equals_reference(metrics: Mapping[str, Any]) -> bool:
+    """Whether the path, the frame's orientation and the wheel's rate have no error at all over the whole ride."""
+    errors = [metrics.get("position_error"), metrics.get("orientation_error"), {"max": metrics.get("rear_rate_error")}]
+    whole = metrics["ended"] is None and metrics["fell_at"] is None
+    return whole and all(error is not None and error["max"] == 0 for error in errors)
 
 
 def summary(

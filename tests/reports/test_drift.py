@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from reports.drift import BELOW_NOISE, CHANGES, Verdict, judge, missing
+from reports.drift import BELOW_NOISE, CHANGES, HELD_CPU, Verdict, judge, missing
 
 SETTINGS = {"step": 0.001, "tolerance": 1e-10}
 ENTRY = {"version": "1.0", "settings": SETTINGS, "quantities": {"short_error": 1e-5, "max_slip": None}}
@@ -149,3 +149,21 @@ def test_the_baselines_date_is_told() -> None:
     (verdict,) = judged(2e-5, entry=ENTRY | {"created": "2026-01-31"})
     assert verdict.reason.endswith("same version and settings as the baseline of 2026-01-31")
     assert verdict.share == pytest.approx(100)
+
+
+def test_what_is_shown_is_not_judged() -> None:
+    entry = ENTRY | {"quantities": ENTRY["quantities"] | {"required_friction": 0.5}}
+    values = {"short_error": 1e-5, "required_friction": 0.9, "cpu_ratio": 30.0}
+    verdicts = judge("exudyn", values, entry, ALLOWED, SETTINGS, "1.0")
+    shown = {verdict.quantity: verdict for verdict in verdicts if verdict.status == "shown"}
+    assert set(shown) == {"required_friction", "cpu_ratio"}
+    assert all(verdict.passes and not verdict.moved and not verdict.told for verdict in shown.values())
+    assert shown["required_friction"].reason == "0.5 -> 0.9, not judged"
+    assert shown["cpu_ratio"].reason == "30, not judged"
+
+
+@pytest.mark.parametrize(("value", "status"), [(0.1, "holds"), (1.9, "holds"), (2.1, "worse")])
+def test_less_cpu_time_is_no_fault(value: float, status: str) -> None:
+    entry = ENTRY | {"quantities": {HELD_CPU: 1.0}}
+    (verdict,) = judge("exudyn", {HELD_CPU: value}, entry, {HELD_CPU: 0.5 * value}, SETTINGS, "1.0")
+    assert verdict.status == status

@@ -17,7 +17,7 @@ from reference.kinematics import REAR_ANGLE
 from reference.stability import linearise
 from reference.surface import Paraboloid
 from reports.drift import RIDE_QUANTITIES
-from reports.limits import Scale, eigenvalue_limits, noise, order_limit, ride_limits
+from reports.limits import Scale, eigenvalue_limits, noise, order_limit, ride_limits, step_force
 from reports.metrics import metrics
 
 SCALE = Scale(radius=2.0, speed=5.0, rear_rate=18.0, growth_rate=-0.1, duration=4.0, gravity=9.81, height=0.9)
@@ -52,6 +52,7 @@ def test_limits_are_noise_times_sensitivity() -> None:
         "report_mismatch": 1.0,
         "contact_force_error": 1e-7 * 18**2 * 2 / 9.81,
         "settled_force_error": 1e-7 * 18**2 * 2 / 9.81,
+        "rms_force_error": 1e-7 * 18**2 * 2 / 9.81,
         "fell_at": 2e-7 / np.sqrt(2 * 9.81 * 0.9),
         "steps": 1.0,
     }
@@ -59,6 +60,16 @@ def test_limits_are_noise_times_sensitivity() -> None:
     assert found == pytest.approx(expected, rel=1e-14)
     # Every quantity has a limit, or it would never be judged.
     assert set(found) == set(RIDE_QUANTITIES)
+    # What a step's noise adds to the forces, and a step more or less at every border of the ground's pieces.
+    more = ride_limits(SCALE, 1e-7, step_force=1e-6, borders=3)
+    forces = ("contact_force_error", "settled_force_error", "rms_force_error")
+    expected |= {name: expected[name] + 1e-6 for name in forces} | {"steps": 4.0}
+    assert more == pytest.approx(expected, rel=1e-14)
+
+
+def test_a_steps_noise_put_right_within_the_step_takes_a_force() -> None:
+    # 1e-12 of 2 m in steps of 1 ms, by a method whose beta is 1/4: 8e-6 m/s^2 of 9.81.
+    assert step_force(SCALE, 1e-12, 1e-3) == pytest.approx(8e-6 / 9.81, rel=1e-14)
 
 
 @given(hnp.arrays(float, len(EXACT.time), elements=st.floats(-1, 1)))

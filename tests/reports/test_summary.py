@@ -81,6 +81,10 @@ def test_no_news_is_no_remark() -> None:
             {"unconverged_steps": 1, "largest_residual": None},
             ["exudyn: its iterations did not converge in 1 of 20000 steps; its figures are not those of its equations"],
         ),
+        (
+            {"position_error": {"max": 0.0}, "orientation_error": {"max": 0.0}, "rear_rate_error": 0.0},
+            ["exudyn: its ride equals the reference's to the last bit, so nothing was compared"],
+        ),
         ({"horizon": 7.25}, ["exudyn", "7.25 s", "instability"]),
         ({"contact_force_error_at": 0.0}, ["exudyn", "first sample"]),
     ],

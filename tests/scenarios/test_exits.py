@@ -264,7 +264,7 @@ def test_an_exit_from_nowhere_is_no_success(velodrome, monkeypatch: pytest.Monke
 
 
 def test_bad_input_leaves_no_file_of_verdicts(velodrome, tmp_path: Path) -> None:
-    result = velodrome("check", "iftomm-1", "--engine", "reference", "--junit", "gate.xml", "--markdown", "gate.md")
+    result = velodrome("check", "q2", "--engine", "warp", "--junit", "gate.xml", "--markdown", "gate.md")
     assert (result.status, result.stdout) == (2, "")
     assert not list(tmp_path.iterdir())
 
