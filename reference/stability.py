@@ -17,8 +17,9 @@ from .surface import Surface, is_level
 # All of a matrix's largest eigenvalue. Real parts nearer to each other are equal but for round-off, which is some
 # 1e-15 times an eigenvalue's condition, 1e2 to 1e4 along the families. A double zero splits by the root of that, 1e-8
 # to 1e-7; the slowest pair, of circles of a kilometre on the plane, turns at 1e-4. Growth below the last cannot be
-# told from none: on other kernels of BLAS the families' growth rates differ by up to 1e-13.
-_EQUAL, _ZERO, _NO_GROWTH = 1e-9, 1e-6, 1e-12
+# told from none: on other kernels of BLAS the families' growth rates differ by up to 1e-13 1/s, and their largest
+# eigenvalues are some ten. The flattest bowl that a scenario may have, 1e-12 1/m, draws its circles in at 2e-12 1/s.
+_EQUAL, _ZERO, _NO_GROWTH = 1e-9, 1e-6, 2e-14
 
 # x and y in the heading frame.
 VARIABLES = ("x", "y", "lean", "steer", "lean_rate", "steer_rate", "rear_rate")

@@ -17,6 +17,7 @@ from reference.bowls import Cone, Sphere, Torus
 from reference.circular import LARGEST_RESIDUAL, CircularMotion
 from reference.contact import observe
 from reference.families import FAMILIES, find_motion, trace_all
+from reference.kernels.steady import STANDING
 from reference.kinematics import YAW
 from reference.profile import PolynomialProfile, SplineProfile
 from reference.simulate import simulate
@@ -296,7 +297,10 @@ def test_a_very_slow_or_fast_motion_is_one_or_is_refused(rate: float, family: in
     with refusing() as said:
         found = start({"kind": "paraboloid", "alpha": 0.005}, {"rear_rate": rate, "family": family})
         assert found.motion is not None
-        assert found.motion.rear_rate == pytest.approx(rate, rel=1e-9, abs=1e-12)
+        # A rear wheel that is slower than this share of all three speeds together stands, but for round-off.
+        speeds = found.motion.yaw_rate, found.motion.rear_rate, found.motion.front_rate
+        standing = 2 * STANDING * float(np.linalg.norm(speeds))
+        assert found.motion.rear_rate == pytest.approx(rate, rel=1e-9, abs=standing)
         assert_rides(found)
     # Family 2 ends in the pivoting motion on steep bowls only; at 1e4 rad/s the wheels' weight is nothing.
     assert (not said) == (rate < 1 and family != 2)
