@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
-from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,8 +33,6 @@ if TYPE_CHECKING:
 
     from .run_folder import Plan
     from .runner import Outcome
-
-_NAME_WIDTH = 13  # of an engine's name on a narrow terminal, where that holds the table in one piece
 
 
 class Progress:
@@ -120,13 +117,7 @@ def _metric_tables(cells: Mapping[str, list[str]], width: int) -> Iterator[Table
     """
     texts = [(*title.split(), unit) for title, unit, _, _ in COLUMNS]
     widths = [max(map(len, (*text, *(row[k] for row in cells.values())))) for k, text in enumerate(texts)]
-    names = {name: name for name in cells}
     gap, room = 2, width - max((len(name) for name in cells), default=0)
-    if sum(widths) + gap * len(widths) > room:
-        short = {name: wrap(name, _NAME_WIDTH, break_long_words=False) for name in cells}
-        longest = max((len(line) for lines in short.values() for line in lines), default=0)
-        if longest + sum(widths) + len(widths) <= width:
-            names, gap, room = {name: "\n".join(lines) for name, lines in short.items()}, 1, width - longest
     parts, used = [[]], 0
     for k, column in enumerate(widths):
         if parts[-1] and used + gap + column > room:
@@ -140,7 +131,7 @@ def _metric_tables(cells: Mapping[str, list[str]], width: int) -> Iterator[Table
         for k in part:
             table.add_column("{}\n{}\n[dim]{}[/dim]".format(*texts[k]), justify="right", no_wrap=True)
         for name, row in cells.items():
-            table.add_row(names[name], *(row[k] for k in part))
+            table.add_row(name, *(row[k] for k in part))
         yield table
 
 
