@@ -5,6 +5,8 @@ STAMP := .venv/set-up
 # The oldest versions of the direct dependencies that the suite claims to work with.
 LOWEST := .venv-lowest
 LOWEST_STAMP := $(LOWEST)/set-up
+# Two processes, a file of tests in one of them: what its tests share is computed once.
+PYTEST := -m pytest -n 2 --dist loadfile
 
 .PHONY: run test test-all test-lowest test-machines test-machines-short lint check
 
@@ -12,13 +14,13 @@ run: $(STAMP)
 	$(BIN)/velodrome run q2-plus
 
 test: $(STAMP)
-	$(BIN)/python -m pytest
+	$(BIN)/python $(PYTEST)
 
 test-all: $(STAMP)
-	$(BIN)/python -m pytest -m ""
+	$(BIN)/python $(PYTEST) -m ""
 
 test-lowest: $(LOWEST_STAMP)
-	$(LOWEST)/bin/python -m pytest
+	$(LOWEST)/bin/python $(PYTEST)
 
 # The tests that round-off could sway, as other CPUs would run them.
 test-machines: $(STAMP)
@@ -43,5 +45,5 @@ $(STAMP): pyproject.toml constraints.txt
 
 $(LOWEST_STAMP): pyproject.toml constraints-lowest.txt
 	$(PYTHON) -m venv $(LOWEST)
-	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints-lowest.txt --editable '.[benchmark,cluster]' hypothesis pillow pytest
+	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints-lowest.txt --editable '.[benchmark,cluster]' hypothesis pillow pytest pytest-xdist
 	touch $@
