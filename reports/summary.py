@@ -10,7 +10,7 @@ from engines.engine import REFERENCE
 from .consistency import describe
 from .markdown import escaped
 
-# (title, unit, metric, part of a metric that has parts): eight, so that a terminal of 80 columns holds them.
+# (title, unit, metric, part of a metric that has parts).
 COLUMNS: tuple[tuple[str, str, str, str | None], ...] = (
     ("position error", "m", "position_error", "max"),
     ("rotation error", "rad", "orientation_error", "max"),
