@@ -10,7 +10,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,44 +22,13 @@ from reference.bicycle import Bicycle
 from reference.families import find_motion
 from reference.surface import Paraboloid
 from reports.drift import Verdict, missing
-from scenarios import cli, gate, runner
+from scenarios import gate, runner
 from scenarios.scenario import library_names
 from tests.literature import published, rounds_to
 
 COMMAND = Path(sys.executable).with_name("velodrome")
 XIONG = published("xiong2020")
 Q2 = ("--alpha", "0.005", "--rear-rate", "18")
-
-
-@dataclass(frozen=True)
-class Result:
-    status: int
-    stdout: str
-    stderr: str
-
-    def json(self) -> Any:
-        """Stdout as one strict JSON document."""
-
-        def refuse(constant: str) -> None:
-            raise AssertionError(f"{constant} is no JSON")
-
-        return json.loads(self.stdout, parse_constant=refuse)
-
-
-@pytest.fixture
-def velodrome(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    """Call the command in this process, in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: str) -> Result:
-        monkeypatch.setattr(sys, "argv", ["velodrome", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        assert isinstance(ended.value.code, int)
-        captured = capsys.readouterr()
-        return Result(ended.value.code, captured.out, captured.err)
-
-    return call
 
 
 def test_list_names_every_scenario_and_engine(velodrome) -> None:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import subprocess
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,7 @@ from quitting import LINE, NAME, announce
 
 from engines.engine import Engine, Settings, Trajectory
 from reports.drift import CHANGES, Verdict
-from scenarios import cli, gate, runner
+from scenarios import gate, runner
 from scenarios.commands import options
 from scenarios.runner import configure
 
@@ -35,29 +33,6 @@ PRECISION = ("precision", "plane-circle", "--engine", NAME, "--duration", "0.5",
 SWEEP = f'scenario = "iftomm-1"\nengines = ["reference", "{NAME}"]\n[grid]\nsimulation.duration = [0.1]\n'
 
 
-@dataclass(frozen=True)
-class Result:
-    status: int
-    stdout: str
-    stderr: str
-
-
-@pytest.fixture
-def velodrome(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    """Call the command in this process, in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments: str) -> Result:
-        monkeypatch.setattr(sys, "argv", ["velodrome", *arguments])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        assert isinstance(ended.value.code, int)
-        captured = capsys.readouterr()
-        return Result(ended.value.code, captured.out, captured.err)
-
-    return call
-
-
 @pytest.fixture
 def planted(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch):
     """Install an engine that runs a statement at a place."""
@@ -72,7 +47,7 @@ def planted(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monkey
 def test_an_engine_that_exits_fails_the_check_wherever_it_does(place: str, planted, velodrome, tmp_path: Path) -> None:
     planted(place, "sys.exit(0)")
     result = velodrome(*CHECK, "--junit", "gate.xml", "--markdown", "gate.md", "--json")
-    document = json.loads(result.stdout)
+    document = result.json()
     (verdict,) = document["verdicts"]
     assert (result.status, document["passes"], verdict["status"]) == (1, False, "missing")
     assert verdict["reason"].startswith("did not run: ")
@@ -95,7 +70,7 @@ def test_whatever_would_end_the_process_is_a_failure_of_the_engine(statement: st
 def test_a_run_keeps_the_others_and_is_status_1(statement: str, planted, velodrome) -> None:
     planted("progress", statement)
     result = velodrome(*RUN, "--json")
-    (entry,) = json.loads(result.stdout)["runs"]
+    (entry,) = result.json()["runs"]
     assert (result.status, entry["complete"], list(entry["engines"])) == (1, True, ["reference"])
     assert entry["failures"] == {NAME: f"{DEEDS[statement]} {AT}"}
     assert f"{NAME} did not run: {DEEDS[statement]} {AT}" in result.stderr
@@ -116,7 +91,7 @@ def test_an_engine_that_exits_before_its_ride_is_told_in_one_line(
 def test_precision_is_status_1_when_an_engine_rides_at_no_step(planted, velodrome) -> None:
     planted("simulate", "sys.exit(0)")
     result = velodrome(*PRECISION, "--json")
-    entry = json.loads(result.stdout)["engines"][NAME]
+    entry = result.json()["engines"][NAME]
     assert (result.status, entry["ran"], entry["points"]) == (1, False, [])
     assert {failure["reason"] for failure in entry["failures"]} == {f"it called sys.exit(0) {AT}"}
 
@@ -125,7 +100,7 @@ def test_a_sweep_has_a_row_for_an_engine_that_exits(planted, velodrome, tmp_path
     planted("simulate", "sys.exit(0)")
     (tmp_path / "s.toml").write_text(SWEEP)
     result = velodrome("sweep", "s.toml", "--workers", "1", "--json")
-    document = json.loads(result.stdout)
+    document = result.json()
     assert (result.status, document["missing"]) == (1, 0)
     assert document["engines"][NAME]["reasons"] == [f"failed: it called sys.exit(0) {AT}"]
     assert document["engines"]["reference"]["rows"] == {"done": 1}
@@ -146,14 +121,14 @@ def test_a_diff_says_which_engine_it_could_not_ask(planted, velodrome, tmp_path:
     folders = [str(next((tmp_path / out).iterdir())) for out in ("a", "b")]
     result = velodrome("diff", *folders, "--json")
     assert result.status == 0
-    assert json.loads(result.stdout)["notes"] == [
+    assert result.json()["notes"] == [
         f"{NAME} cannot be asked here: it called sys.exit(0) {AT}; its steps are allowed round-off only"
     ]
 
 
 def test_list_shows_an_engine_that_exits_with_its_reason(planted, velodrome) -> None:
     planted("import", "sys.exit(0)")
-    engines = {entry["name"]: entry for entry in json.loads(velodrome("list", "--json").stdout)["engines"]}
+    engines = {entry["name"]: entry for entry in velodrome("list", "--json").json()["engines"]}
     assert engines[NAME]["error"].endswith(f"it called sys.exit(0) {AT}")
 
 
