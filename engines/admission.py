@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,7 @@ def ride(engine: Engine, problem: Problem, settings: Any, progress: Progress) ->
         raise EngineError(f"it gave a {type(trajectory).__name__}, not a Trajectory")
     for wrong in _faults(engine, problem, settings, trajectory):
         raise EngineError(wrong)
+    trajectory = _own(trajectory)
     asked = problem.times[: len(trajectory.time)]
     if not np.array_equal(trajectory.time, asked):
         trajectory = replace(trajectory, time=asked.copy())
@@ -66,6 +68,13 @@ def ride(engine: Engine, problem: Problem, settings: Any, progress: Progress) ->
         raise EngineError("its first state is not finite")
     ended = f"its state is not finite at {trajectory.time[bad]:.6g} s"
     return _until_second_touch(problem, replace(trajectory.first(bad), ended=trajectory.ended or ended))
+
+
+def _own(trajectory: Trajectory) -> Trajectory:
+    """Copy a trajectory's numbers: an engine may use its arrays again for the next ride, and have numpy's numbers."""
+    given = {name: value for name in SHAPES if (value := getattr(trajectory, name)) is not None}
+    copies = {name: np.array(value, dtype=float, order="C") for name, value in given.items()}
+    return replace(trajectory, **copies, steps=int(trajectory.steps), cpu_time=float(trajectory.cpu_time))
 
 
 def _until_second_touch(problem: Problem, trajectory: Trajectory) -> Trajectory:
@@ -115,6 +124,8 @@ def _faults(engine: Engine, problem: Problem, settings: Settings, trajectory: Tr
             yield f"it gives {name}, which it does not list in gives"
         if not isinstance(value, np.ndarray) or value.dtype.kind != "f":
             yield f"its {name} is no array of floats"
+        elif type(value) is not np.ndarray or value.dtype not in (np.float64, np.float32):
+            yield f"its {name} is a {type(value).__name__} of {value.dtype}; it must be a plain ndarray of float64"
         elif value.shape != (samples, *shape):
             yield f"its {name} has shape {value.shape}; it must be {(samples, *shape)}"
     if samples == 0:
@@ -122,9 +133,13 @@ def _faults(engine: Engine, problem: Problem, settings: Settings, trajectory: Tr
     yield from _time_faults(problem.times, trajectory.time)
     if samples < len(problem.times) and trajectory.ended is None:
         yield f"it ends at {trajectory.time[-1]:.6g} s and does not say why"
-    for name in ("steps", "cpu_time"):
-        if not np.isfinite(getattr(trajectory, name)):
-            yield f"its {name} is {getattr(trajectory, name)!r}"
+    for name, kind, what in (("steps", Integral, "a whole number"), ("cpu_time", Real, "a finite number of seconds")):
+        value = getattr(trajectory, name)
+        if not isinstance(value, kind) or isinstance(value, bool) or not 0 <= value < np.inf:
+            yield f"its {name} is {value!r}; it must be {what}, not negative"
+    ended = trajectory.ended
+    if ended is not None and not (isinstance(ended, str) and ended.strip() and ended.isprintable()):
+        yield f"its ended is {ended!r}; it must be one line of text, or None"
     count, residual = trajectory.unconverged_steps, trajectory.largest_residual
     if count is not None and not (isinstance(count, int) and 0 <= count <= trajectory.steps):
         yield f"its unconverged_steps is {count!r}; it must be a number of its {trajectory.steps} steps, or None"

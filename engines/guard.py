@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass, replace
 from pathlib import Path
 from traceback import walk_tb
 from types import FrameType
@@ -36,6 +38,9 @@ def call_engine(function: Callable[_P, _T], *arguments: _P.args, **keywords: _P.
     of a Rust extension, for one) for a wish to end the process. An engine has no say in that: they are failures of
     the engine. An interrupt from the user stays one, also where the engine swallows it or makes another error of it.
 
+    What the function prints goes to stderr: stdout belongs to the command's own document. The current folder and the
+    standard streams are as before afterwards, whatever the function does to them.
+
     Raises
     ------
     EngineError
@@ -45,7 +50,7 @@ def call_engine(function: Callable[_P, _T], *arguments: _P.args, **keywords: _P.
     Exception
         Whatever else the function raises.
     """
-    with _interrupts() as pressed:
+    with _interrupts() as pressed, _surroundings_kept():
         try:
             result = function(*arguments, **keywords)
         except BaseException as error:
@@ -58,6 +63,23 @@ def call_engine(function: Callable[_P, _T], *arguments: _P.args, **keywords: _P.
         if pressed:
             raise KeyboardInterrupt
         return result
+
+
+@contextmanager
+def _surroundings_kept() -> Iterator[None]:
+    """Keep the current folder and the standard streams, and let prints go to stderr meanwhile."""
+    output, errors = sys.stdout, sys.stderr
+    try:
+        folder = os.getcwd()
+    except OSError:  # deleted meanwhile
+        folder = None
+    try:
+        with redirect_stdout(errors):
+            yield
+    finally:
+        sys.stdout, sys.stderr = output, errors
+        if folder is not None:
+            os.chdir(folder)
 
 
 @contextmanager
@@ -139,7 +161,7 @@ def simulate(engine: Engine, problem: Problem, settings: Any, progress: Progress
             raise
 
     try:
-        trajectory = call_engine(engine.simulate, problem, settings, report)
+        trajectory = call_engine(engine.simulate, _copy_problem(problem), settings, report)
     except Exception:
         if raised:
             raise raised[0] from None
@@ -147,6 +169,11 @@ def simulate(engine: Engine, problem: Problem, settings: Any, progress: Progress
     if raised:
         raise raised[0]
     return trajectory
+
+
+def _copy_problem(problem: Problem) -> Problem:
+    """Copy a problem's arrays: an engine may write into its own, and all engines must start from the same state."""
+    return replace(problem, q=problem.q.copy(), qd=problem.qd.copy(), times=problem.times.copy())
 
 
 @dataclass(frozen=True)
@@ -172,7 +199,7 @@ class GuardedEngine:
 
     def check(self, problem: Problem, settings: Any) -> None:
         """Refuse a problem that the engine cannot run."""
-        call_engine(self.inner.check, problem, settings)
+        call_engine(self.inner.check, _copy_problem(problem), settings)
 
     def step_noise(self, settings: Any) -> float:
         """Relative error that one step may add."""

@@ -115,14 +115,19 @@ def require_clear_rims(bicycle: Bicycle, surface: Surface, q: np.ndarray, contac
         return
     if contact is None:
         contact = contact_parameters(bicycle, surface, q)
-    clear = rim_clearances(bicycle, surface, q, contact) > 0
-    if clear.all():
-        return
-    distance, k, point = min(_deepest(bicycle, surface, q, k) for k in (0, 1) if not clear[k])
-    place = f"x = {point[0]:.4g} m, y = {point[1]:.4g} m"
+    deepest = [_deepest(bicycle, surface, q, k) for k in (0, 1)]
+    distance, k, point = min(deepest)
+    # The contact that is searched anew may itself lie inside the ground: the start has settled on another place.
     if distance < -_TOUCHING:
+        place = _place(point)
         raise ValueError(f"the {WHEELS[k]} rim lies {-1e3 * distance:.3g} mm inside the ground at {place}")
-    raise ValueError(f"the {WHEELS[k]} rim touches the ground at a second place, not only at {place}")
+    for (_, k, point), clear in zip(deepest, rim_clearances(bicycle, surface, q, contact) > 0, strict=True):
+        if not clear:
+            raise ValueError(f"the {WHEELS[k]} rim touches the ground at a second place, not only at {_place(point)}")
+
+
+def _place(point: tuple[float, float]) -> str:
+    return f"x = {point[0]:.4g} m, y = {point[1]:.4g} m"
 
 
 def _deepest(bicycle: Bicycle, surface: Surface, q: np.ndarray, k: int) -> tuple[float, int, tuple[float, float]]:

@@ -232,6 +232,8 @@ def _order(start: Start, engine: Engine, settings: Settings, step_noise: float) 
     for one, factor in zip(rides, FACTORS, strict=True):
         if one.ended is not None:
             return none, {"observed_order": f"with {factor:g} times its step it ended: {one.ended}"}
+    if any(np.array_equal(one.q, other.q) for one, other in pairwise(rides)):
+        return none, {"observed_order": "its step changes nothing: rides of different steps are equal to the last bit"}
     samples = min(len(one.time) for one in rides)
     paths = [one.q[:samples, :3] for one in rides]
     first, second = (float(np.abs(b - a).max()) for a, b in pairwise(paths))

@@ -46,7 +46,35 @@ def taken(given: Any, gives: tuple[str, ...] = LagrangeEngine.gives) -> Trajecto
 
 
 def test_a_whole_trajectory_is_taken_as_it_is() -> None:
-    assert taken(ridden()) is ridden()
+    found = taken(ridden())
+    for name in SHAPES:
+        assert np.array_equal(getattr(found, name), getattr(ridden(), name)), name
+    assert (found.steps, found.cpu_time, found.ended) == (ridden().steps, ridden().cpu_time, None)
+
+
+def test_numbers_of_an_engine_are_taken_over() -> None:
+    """An engine may use its arrays again for its next ride, and count with numpy."""
+    given = replace(ridden(), q=ridden().q.copy(), steps=np.int64(7), cpu_time=np.float32(0.5))
+    found = taken(given)
+    given.q[:] = 0.0
+    assert np.array_equal(found.q, ridden().q)
+    assert (type(found.steps), type(found.cpu_time)) == (int, float)
+
+
+def test_what_an_engine_writes_into_its_problem_changes_no_other_ride() -> None:
+    class Writing(LagrangeEngine):
+        def simulate(self, problem: Problem, settings: Any, progress: Any) -> Trajectory:
+            trajectory = super().simulate(problem, settings, progress)
+            problem.q[4] += 1.0
+            problem.qd[:] = 0.0
+            problem.times[1:] += 1.0
+            return trajectory
+
+    before = problem()
+    kept = [array.copy() for array in (before.q, before.qd, before.times)]
+    ride(Writing(), before, ENGINE.settings(), lambda _: None)
+    for array, copy in zip((before.q, before.qd, before.times), kept, strict=True):
+        assert np.array_equal(array, copy)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +96,16 @@ def test_a_whole_trajectory_is_taken_as_it_is() -> None:
         ),
         ({"time": np.arange(11) / 100 + 1e-12}, "its sample 0 is at 1e-12 s by its own clock"),
         ({"time": np.where(np.arange(11) == 3, np.nan, np.arange(11) / 100)}, "its sample 3 is at nan s"),
+        ({"q": np.ma.masked_array(np.zeros((11, 9)))}, "its q is a MaskedArray of float64; it must be a plain ndarray"),
+        ({"q": np.zeros((11, 9), ">f8")}, "its q is a ndarray of >f8; it must be a plain ndarray of float64"),
+        ({"contact_force": np.zeros((11, 2, 3), np.float16)}, "its contact_force is a ndarray of float16"),
         ({"cpu_time": float("nan")}, "its cpu_time is nan"),
+        ({"cpu_time": -1.0}, "its cpu_time is -1.0; it must be a finite number of seconds, not negative"),
+        ({"steps": 12.5}, "its steps is 12.5; it must be a whole number, not negative"),
+        ({"steps": True}, "its steps is True; it must be a whole number"),
+        ({"steps": "12"}, "its steps is '12'; it must be a whole number"),
+        ({"ended": ""}, "its ended is ''; it must be one line of text, or None"),
+        ({"ended": "fell\nover"}, "its ended is 'fell\\nover'; it must be one line of text, or None"),
         ({"unconverged_steps": -1}, "its unconverged_steps is -1; it must be a number of its "),
         ({"unconverged_steps": 10**9}, "its unconverged_steps is 1000000000; it must be a number of its "),
         ({"unconverged_steps": 0.5}, "its unconverged_steps is 0.5; it must be a number of its "),

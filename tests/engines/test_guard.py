@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from engines import guard
-from engines.engine import EngineError, load_engine, why_failed
+from engines.engine import EngineError, Problem, load_engine, why_failed
 from engines.guard import GuardedEngine, call_engine, where_raised
+from reference.bicycle import Bicycle
+from reference.surface import Plane
+
+PROBLEM = Problem(Bicycle(), Plane(), np.zeros(9), np.zeros(9), np.zeros(1))
 
 
 def raising(error: BaseException) -> Callable[[], None]:
@@ -107,14 +115,14 @@ class Reporting:
 def test_what_the_callback_raises_is_no_failure_of_the_engine(error: BaseException, swallows: bool) -> None:
     engine: Any = Reporting(0.5, swallows)
     with pytest.raises(type(error)) as caught:
-        guard.simulate(engine, None, None, lambda _: raising(error)())  # pyright: ignore[reportArgumentType]
+        guard.simulate(engine, PROBLEM, None, lambda _: raising(error)())
     assert caught.value is error
 
 
 def test_a_time_that_is_none_is_a_failure_of_the_engine() -> None:
     engine: Any = Reporting("soon")
     with pytest.raises(ValueError, match="could not convert string to float") as caught:
-        guard.simulate(engine, None, None, lambda _: None)  # pyright: ignore[reportArgumentType]
+        guard.simulate(engine, PROBLEM, None, lambda _: None)
     place = where_raised(caught.value)
     assert place is not None
     assert place.startswith("test_guard.py:")
@@ -142,3 +150,20 @@ def test_the_line_that_is_named_is_the_engines_own() -> None:
 
 def test_engines_are_loaded_behind_the_guard() -> None:
     assert isinstance(load_engine("reference"), GuardedEngine)
+
+
+def test_an_engine_changes_neither_the_folder_nor_the_streams(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, output = Path.cwd(), sys.stdout
+
+    def wander() -> None:
+        print("solver done")
+        os.chdir(tmp_path)
+        sys.stdout = sys.stderr
+
+    call_engine(wander)
+    assert Path.cwd() == folder
+    assert sys.stdout is output
+    said = capsys.readouterr()
+    assert (said.out, said.err) == ("", "solver done\n")

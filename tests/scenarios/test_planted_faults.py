@@ -221,7 +221,7 @@ FAULTS: dict[str, Fault] = {
     ),
     "rear frame's inertia off by 1e-3": Fault(REFERENCE, with_factors(rear_frame_Ixx=1.001), PATH, everywhere=False),
     "front frame's inertia off by 1e-3": Fault(REFERENCE, with_factors(front_frame_Izz=1.001), PATH, everywhere=False),
-    "wheel radius off by 0.1 mm": Fault(REFERENCE, with_factors(front_wheel_radius=1 + 1e-4 / 0.35), {"state_error"}),
+    "wheel radius off by 0.1 mm": Fault(REFERENCE, with_factors(front_wheel_radius=1 - 1e-4 / 0.35), {"state_error"}),
     "forces wrong while they change": Fault(
         REFERENCE,
         with_force(weaker_while_leaning),
