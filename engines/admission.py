@@ -135,7 +135,7 @@ def _faults(engine: Engine, problem: Problem, settings: Settings, trajectory: Tr
         yield f"it ends at {trajectory.time[-1]:.6g} s and does not say why"
     for name, kind, what in (("steps", Integral, "a whole number"), ("cpu_time", Real, "a finite number of seconds")):
         value = getattr(trajectory, name)
-        if not isinstance(value, kind) or isinstance(value, bool) or not 0 <= value < np.inf:
+        if not isinstance(value, kind) or isinstance(value, bool) or not 0 <= float(value) < np.inf:
             yield f"its {name} is {value!r}; it must be {what}, not negative"
     ended = trajectory.ended
     if ended is not None and not (isinstance(ended, str) and ended.strip() and ended.isprintable()):
