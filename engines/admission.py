@@ -48,7 +48,7 @@ def ride(engine: Engine, problem: Problem, settings: Any, progress: Progress) ->
         Whatever the engine raises.
     """
     try:
-        require_clear_rims(problem.bicycle, problem.surface, problem.q)
+        require_clear_rims(problem.bicycle, problem.surface, problem.q, may_sink=True)
     except ValueError as error:
         raise EngineError(str(error)) from error
     trajectory = simulate(engine, problem, settings, progress)

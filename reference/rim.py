@@ -98,13 +98,17 @@ def rim_clearances(bicycle: Bicycle, surface: Surface, q: np.ndarray, contact: n
     return clearances
 
 
-def require_clear_rims(bicycle: Bicycle, surface: Surface, q: np.ndarray, contact: np.ndarray | None = None) -> None:
+def require_clear_rims(
+    bicycle: Bicycle, surface: Surface, q: np.ndarray, contact: np.ndarray | None = None, may_sink: bool = False
+) -> None:
     """Refuse a pose in which a rim lies inside the ground or touches it at a second place.
 
     Parameters
     ----------
     bicycle, surface, q, contact
         As in `rim_clearances`; without ``contact`` it is searched.
+    may_sink : bool
+        Whether a contact itself may lie inside the ground, as soft contacts do.
 
     Raises
     ------
@@ -118,10 +122,12 @@ def require_clear_rims(bicycle: Bicycle, surface: Surface, q: np.ndarray, contac
     deepest = [_deepest(bicycle, surface, q, k) for k in (0, 1)]
     distance, k, point = min(deepest)
     # The contact that is searched anew may itself lie inside the ground: the start has settled on another place.
-    if distance < -_TOUCHING:
+    if not may_sink and distance < -_TOUCHING:
         place = _place(point)
         raise ValueError(f"the {WHEELS[k]} rim lies {-1e3 * distance:.3g} mm inside the ground at {place}")
-    for (_, k, point), clear in zip(deepest, rim_clearances(bicycle, surface, q, contact) > 0, strict=True):
+    for (depth, k, point), clear in zip(deepest, rim_clearances(bicycle, surface, q, contact) > 0, strict=True):
+        if not clear and depth < -_TOUCHING:
+            raise ValueError(f"the {WHEELS[k]} rim lies {-1e3 * depth:.3g} mm inside the ground at {_place(point)}")
         if not clear:
             raise ValueError(f"the {WHEELS[k]} rim touches the ground at a second place, not only at {_place(point)}")
 
