@@ -178,7 +178,7 @@ class RimWatch:
 
     def __init__(self, bicycle: Bicycle, surface: Surface, q: np.ndarray) -> None:
         known = bicycle_rim_search(bicycle, surface)
-        require_clear_rims(bicycle, surface, q)
+        require_clear_rims(bicycle, surface, q, may_sink=True)
         self.needed = known.curved
         self.centre, self.axle = np.zeros((2, 3)), np.zeros((2, 3))
         self._clock, self._clearance = np.zeros(2), np.full((2, 2), np.nan)
