@@ -44,7 +44,7 @@ _FEWEST = 4  # samples of a ride from which the quadrature's error can be seen
 
 _WHEELS = tuple(f"{wheel}_wheel" for wheel in WHEELS)
 # Known up to whole turns.
-_TURNING = [YAW, REAR_ANGLE, FRONT_ANGLE]
+TURNING = [YAW, REAR_ANGLE, FRONT_ANGLE]
 
 
 def follow(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> Trajectory:
@@ -180,7 +180,7 @@ def coordinate_differences(trajectory: Trajectory, exact: Trajectory) -> np.ndar
 
 
 def _less_turns(apart: np.ndarray) -> np.ndarray:
-    apart[:, _TURNING] -= 2 * np.pi * np.round(apart[:, _TURNING] / (2 * np.pi))
+    apart[:, TURNING] -= 2 * np.pi * np.round(apart[:, TURNING] / (2 * np.pi))
     return apart
 
 
@@ -220,10 +220,10 @@ def _lengths(vectors: np.ndarray) -> np.ndarray:
 def _furthest(
     quantity: str, parts: tuple[str, ...], unit: str, apart: np.ndarray, limit: np.ndarray, time: np.ndarray
 ) -> Mismatch:
-    """The sample and part furthest in its limit; what is not finite is said elsewhere and counts as no difference."""
-    apart = np.where(np.isfinite(apart), apart, 0.0)
+    """The sample and part furthest in its limit; a difference to what is no number is said elsewhere and is none."""
+    apart = np.minimum(np.where(np.isnan(apart), 0.0, apart), np.finfo(float).max)
     limit = np.broadcast_to(limit, apart.shape)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         share = np.where(apart > 0, apart / limit, 0.0)
     sample, part = np.unravel_index(np.argmax(share), apart.shape)
     return Mismatch(
@@ -234,9 +234,13 @@ def _furthest(
 def _rates(reported: Trajectory, exact: Trajectory, room: np.ndarray) -> Mismatch:
     """The rate furthest from its coordinate's derivative, means over output intervals; ``room`` (n - 1, 9) [m, rad]."""
     time, q, qd = reported.time, coordinate_differences(reported, exact), reported.qd - exact.qd
-    way = _integrals(time, qd, _SAMPLES)
-    unsure = sum(np.abs(way - _integrals(time, qd, fewer)) for fewer in (2, _SAMPLES - 2))
+    with np.errstate(over="ignore", invalid="ignore"):
+        way = _integrals(time, qd, _SAMPLES)
+        unsure = sum(np.abs(way - _integrals(time, qd, fewer)) for fewer in (2, _SAMPLES - 2))
     left = np.abs(_less_turns(np.diff(q, axis=0) - way))
+    # Rates whose integrals overflow are nobody's derivatives.
+    overflowed = ~np.isfinite(unsure + left)
+    unsure, left = np.where(overflowed, 0.0, unsure), np.where(overflowed, np.inf, left)
     last = 16 * np.finfo(float).eps * np.abs(reported.q).max(axis=0)
     interval = np.diff(time)[:, None]
     room = room * (1 + float(np.abs(reported.qd[:, YAW:]).max()) * interval)

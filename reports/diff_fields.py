@@ -10,6 +10,8 @@ A field may move by what the state may (`reports.diff`), times the size that the
                                         the circle's radius: they follow accelerations, whose sensitivity to the
                                         state is the square of its fastest rate
     energies                            twice the total, since they are quadratic in the speeds
+
+Yaw and the wheels' angles are compared up to whole turns, and quaternions up to their sign.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from engines.storage import columns
 from reference.bicycle import BODIES
 from reference.kinematics import FRONT_ANGLE, REAR_ANGLE
 
+from .consistency import TURNING
 from .limits import Scale
 from .metrics import number
 
@@ -68,6 +71,8 @@ def field_differences(
             continue
         if field == "body_quaternion":
             b = _same_sign(a, b)
+        if field == "q":
+            b = _same_turns(a, b)
         kept = [j for j in range(len(names)) if j not in _LEFT_OUT.get(field, ())]
         if kept:
             apart = _apart(a.reshape(samples, -1), b.reshape(samples, -1))[:, kept]
@@ -79,6 +84,14 @@ def field_differences(
 def _same_sign(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Quaternions (n, k, 4) with the sign that is nearer to those of another ride: both are one orientation."""
     return np.where(np.sum(a * b, axis=-1, keepdims=True) < 0, -b, b)
+
+
+def _same_turns(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Coordinates (n, 9) with the whole turns of yaw and wheels nearest to another ride's: both are one state."""
+    turns = np.nan_to_num(np.round((a - b)[:, TURNING] / (2 * np.pi)), nan=0.0, posinf=0.0, neginf=0.0)
+    alike = b.copy()
+    alike[:, TURNING] += 2 * np.pi * turns
+    return alike
 
 
 def _apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from engines.identify import Identified
 from .metrics import number, position_errors
 
 SMALL = 0.1  # of the motion's size: what nonlinearity adds to an error up to here, the next powers of the step take
+
+SAME_BITS = "its step changes nothing: rides of different steps are equal to the last bit"
 
 
 @dataclass(frozen=True)
@@ -73,9 +76,10 @@ def convergence(levels: Sequence[Level], reference: Trajectory, size: float) -> 
     Returns
     -------
     Convergence or None
-        None with fewer than two levels, or where not even the first samples agree.
+        None with fewer than two levels, where two of them are equal to the last bit, or where not even the first
+        samples agree.
     """
-    if len(levels) < 2:
+    if len(levels) < 2 or step_changes_nothing(levels):
         return None
     errors = np.array([position_errors(level.trajectory, reference) for level in levels]).max(axis=0)
     beyond = np.flatnonzero(errors > SMALL * size)
@@ -87,6 +91,11 @@ def convergence(levels: Sequence[Level], reference: Trajectory, size: float) -> 
     distance = np.linalg.norm(limit.value - reference.q[:samples, :3], axis=1)
     window = float(reference.time[samples - 1])
     return Convergence(window, observed_orders(paths), float(distance.max()), limit.uncertainty)
+
+
+def step_changes_nothing(levels: Sequence[Level]) -> bool:
+    """Whether two successive levels are equal to the last bit, so that neither order nor limit can be seen."""
+    return any(np.array_equal(a.trajectory.q, b.trajectory.q) for a, b in pairwise(levels))
 
 
 def engine_document(
@@ -111,9 +120,10 @@ def engine_document(
     """
     found = convergence(levels, reference, size)
     orders = [] if found is None else found.orders
+    unseen = [{"step": None, "reason": SAME_BITS}] if step_changes_nothing(levels) else []
     return {
         "points": [_point(level, reference, horizon) for level in levels],
-        "failures": list(failures),
+        "failures": [*failures, *unseen],
         "observed_order": number(orders[-1]) if orders else None,
         "orders": [number(order) for order in orders],
         "richardson_error": None if found is None else found.limit_error,

@@ -24,7 +24,7 @@ from reports.fall import fell_at, until_fall
 from reports.inspection import rms_force_error, state_error
 from reports.limits import Scale, eigenvalue_limits, noise, order_limit, ride_limits, step_force
 from reports.metrics import position_errors
-from reports.precision import match
+from reports.precision import SAME_BITS, match
 
 from .gate_exact import Exact, scale_of
 from .runner import measure_one
@@ -233,7 +233,7 @@ def _order(start: Start, engine: Engine, settings: Settings, step_noise: float) 
         if one.ended is not None:
             return none, {"observed_order": f"with {factor:g} times its step it ended: {one.ended}"}
     if any(np.array_equal(one.q, other.q) for one, other in pairwise(rides)):
-        return none, {"observed_order": "its step changes nothing: rides of different steps are equal to the last bit"}
+        return none, {"observed_order": SAME_BITS}
     samples = min(len(one.time) for one in rides)
     paths = [one.q[:samples, :3] for one in rides]
     first, second = (float(np.abs(b - a).max()) for a, b in pairwise(paths))

@@ -41,6 +41,7 @@ def run_supervised(main: Callable[[], NoReturn]) -> NoReturn:
         os.close(ours)
         _end_with(parent)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        _keep_stdout()
         _run(main, theirs)
     os.close(theirs)
     ended, told = _wait(child), b""
@@ -58,14 +59,17 @@ def _end_with(parent: int) -> None:
 
 
 def _run(main: Callable[[], NoReturn], report: int) -> NoReturn:
+    own = os.getpid()
+    status = 1  # of a fault of the suite, which Python shows
     try:
         main()
     except SystemExit as end:
-        os.write(report, str(end.code).encode())
+        status = end.code or 0
         raise
-    except BaseException:  # a fault of the suite, which Python shows
-        os.write(report, b"1")
-        raise
+    finally:
+        # A copy of this process that an engine has forked passes here too; it has no say.
+        if os.getpid() == own:
+            os.write(report, f"{status}\n".encode())
 
 
 def _wait(child: int) -> int:
@@ -90,7 +94,21 @@ def _status(ended: int, told: bytes) -> int:
         if -ended not in _SIGNALS:
             print(f"velodrome: its process was ended by {name} before it was done", file=sys.stderr)
         return 128 - ended
-    if not told:
+    said = told.decode(errors="replace").removesuffix("\n")
+    if not said.isdecimal():
         print(f"velodrome: its process ended itself with status {ended} before it was done", file=sys.stderr)
         return ended or 1
-    return ended or int(told)
+    return ended or int(said)
+
+
+def _keep_stdout() -> None:
+    """Let only Python's ``sys.stdout`` write to stdout; what compiled code prints there goes to stderr.
+
+    stdout belongs to the command's own document, which another program may read.
+    """
+    if sys.stdout is None or sys.stderr is None:
+        return
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    sys.stdout = os.fdopen(kept, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)

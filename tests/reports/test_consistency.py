@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -118,6 +119,15 @@ def test_rates_must_be_the_derivatives_of_the_coordinates() -> None:
     q = EXACT.q.copy()
     q[50:, YAW] += 2 * np.pi
     assert found(replace(EXACT, q=q))["qd"].holds
+
+
+def test_rates_too_large_to_integrate_are_no_derivatives() -> None:
+    for samples in (slice(None, None, 2), slice(50, None), slice(20, 21)):
+        qd = EXACT.qd.copy()
+        qd[samples, 0] = 1e308
+        mismatch = found(replace(EXACT, qd=qd))["qd"]
+        assert not mismatch.holds
+        json.dumps(mismatch.as_json(), allow_nan=False)
 
 
 def test_one_error_of_coordinates_and_rates_is_no_contradiction() -> None:

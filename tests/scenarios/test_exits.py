@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import subprocess
 import sys
@@ -185,6 +186,9 @@ BY = "velodrome: its process was ended by {} before it was done\n"
         ("os.kill(os.getpid(), signal.SIGKILL)", 137, BY.format("SIGKILL")),
         # The verdict stands, whatever a handler does afterwards.
         ("atexit.register(os._exit, 0) and sys.exit(1)", 1, ""),
+        # A copy of the process that an engine has left behind has no say.
+        ("sys.exit(0) if os.fork() == 0 else os.wait() and sys.exit(1)", 1, ""),
+        ("sys.exit(0) if os.fork() == 0 else os.wait() and os._exit(0)", 1, ITSELF.format(0)),
         # Signals are passed on.
         ("os.kill(os.getppid(), signal.SIGTERM) or time.sleep(60)", 143, ""),
     ],
@@ -195,6 +199,14 @@ def test_a_supervised_command_ends_with_the_status_that_it_told(
     code = "import atexit, os, signal, sys, time; from scenarios.supervision import run_supervised\n"
     done = in_a_process(f"{code}run_supervised(lambda: {main})", folder=tmp_path)
     assert (done.returncode, done.stderr) == (status, said)
+
+
+def test_what_compiled_code_prints_does_not_reach_stdout(planted, tmp_path: Path) -> None:
+    planted("progress", "os.write(1, b'printed by C')")
+    code = "import sys; from scenarios.cli import supervised_main; sys.argv[0] = 'velodrome'; supervised_main()"
+    done = in_a_process(code, *RUN, "--json", folder=tmp_path)
+    assert (done.returncode, list(json.loads(done.stdout)["runs"][0]["engines"])) == (0, ["reference", NAME])
+    assert "printed by C" in done.stderr
 
 
 def test_a_supervised_interrupt_reaches_the_command_once(tmp_path: Path) -> None:

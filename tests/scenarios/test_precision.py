@@ -13,8 +13,10 @@ import pytest
 from engines.admission import ride
 from engines.engine import REFERENCE, load_engine
 from reports.metrics import position_errors
+from reports.precision import SAME_BITS, Level, engine_document
 from scenarios.error import ScenarioError
 from scenarios.precision import precision, write_precision
+from scenarios.runner import measure_one
 from scenarios.scenario import load_scenario
 from scenarios.start import make_start
 
@@ -83,6 +85,17 @@ def test_the_references_levels_converge_to_itself() -> None:
     assert errors[0] > errors[-1] > 0
     # Order 8 in tolerances that fall by 256: even its noisiest halving gains a factor of 4.
     assert errors[-1] < errors[0] / 4**3
+
+
+def test_a_step_that_changes_nothing_shows_neither_order_nor_limit() -> None:
+    start = make_start(load_scenario("plane-circle", {"simulation.duration": 0.2})[1])
+    engine = load_engine(REFERENCE)
+    same = ride(engine, start.problem, engine.settings(), lambda _: None)
+    measured = measure_one(start, same, same, step_noise=0.0)
+    levels = [Level(step, same, measured) for step in (0.02, 0.01, 0.005)]
+    entry = engine_document(levels, [], same, start.size, None)
+    assert (entry["observed_order"], entry["richardson_error"], entry["window"]) == (None, None, None)
+    assert [failure["reason"] for failure in entry["failures"]] == [SAME_BITS]
 
 
 def test_eigenvalues_are_part_of_the_study() -> None:
