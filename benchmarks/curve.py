@@ -14,14 +14,14 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from reference.anchors import ANCHORS, anchor
-from reference.atlas import SIZE, atlas, spacing
-from reference.bicycle import Bicycle
-from reference.circular import Steady
-from reference.continuation import follow
-from reference.curve import sample
-from reference.stability import linearise
-from reference.surface import Paraboloid, SurfaceOfRevolution
+from velodrome.reference.anchors import ANCHORS, anchor
+from velodrome.reference.atlas import SIZE, atlas, spacing
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.circular import Steady
+from velodrome.reference.continuation import follow
+from velodrome.reference.curve import sample
+from velodrome.reference.stability import linearise
+from velodrome.reference.surface import Paraboloid, SurfaceOfRevolution
 
 BICYCLE = Bicycle()
 LONGEST = 0.02

@@ -16,13 +16,13 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from engines.engine import Problem
-from engines.exudyn.engine import BUILTIN, ENGINE, PLANE_NORMAL, ExudynEngine
-from engines.exudyn.model import Model, build_model
-from engines.exudyn.solve import Integration, silent, simulation_settings
-from reference.bicycle import Bicycle
-from reference.dae import consistent_state
-from reference.surface import Paraboloid, Plane, Surface
+from velodrome.engines.engine import Problem
+from velodrome.engines.exudyn.engine import BUILTIN, ENGINE, PLANE_NORMAL, ExudynEngine
+from velodrome.engines.exudyn.model import Model, build_model
+from velodrome.engines.exudyn.solve import Integration, silent, simulation_settings
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.dae import consistent_state
+from velodrome.reference.surface import Paraboloid, Plane, Surface
 
 STEP, DURATION = 1e-3, 1.0
 LEVEL, BOWL = Plane(), Paraboloid(0.005)

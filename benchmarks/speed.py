@@ -6,7 +6,7 @@ each method takes the largest tolerance, on a grid of four a decade, whose error
 the target. The error is the distance of the rear contact from where the reference at tolerance 1e-14
 has it.
 
-    reference         the reference as everybody calls it, `reference.simulate.simulate`
+    reference         the reference as everybody calls it, `velodrome.reference.simulate.simulate`
     same in scipy     the same right-hand side, compiled, in scipy's DOP853: the same method in Python
     symbrim in scipy  the equations that symbrim derives, compiled to C, in scipy's DOP853
 
@@ -32,15 +32,15 @@ from rich.console import Console
 from rich.table import Column, Table
 from scipy.integrate import solve_ivp
 
-from reference.bicycle import Bicycle
-from reference.dae import consistent_state, contact_parameters
-from reference.families import find_motion
-from reference.kernels.lean import derivative
-from reference.kernels.pose import aligned
-from reference.kernels.vector import jit
-from reference.kinematics import constants
-from reference.simulate import simulate
-from reference.surface import Paraboloid, Plane, Surface
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.dae import consistent_state, contact_parameters
+from velodrome.reference.families import find_motion
+from velodrome.reference.kernels.compilation import jit
+from velodrome.reference.kernels.lean import derivative
+from velodrome.reference.kernels.pose import aligned
+from velodrome.reference.kinematics import constants
+from velodrome.reference.simulate import simulate
+from velodrome.reference.surface import Paraboloid, Plane, Surface
 
 BICYCLE = Bicycle()
 SPEED, LEAN_RATE, DURATION = 4.6, 0.5, 20.0  # iftomm-2

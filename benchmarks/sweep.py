@@ -22,10 +22,10 @@ import pyarrow.parquet as pq
 from rich.console import Console
 from rich.table import Table
 
-from scenarios.sweep.plan import Plan, plan_sweep
-from scenarios.sweep.pool import ONE_THREAD
-from scenarios.sweep.run import Work, locally, run_sweep
-from scenarios.sweep.store import JOURNAL, RESULTS, TIMINGS, open_folder, write_results
+from velodrome.scenarios.sweep.plan import Plan, plan_sweep
+from velodrome.scenarios.sweep.pool import ONE_THREAD
+from velodrome.scenarios.sweep.run import Work, locally, run_sweep
+from velodrome.scenarios.sweep.store import JOURNAL, RESULTS, TIMINGS, open_folder, write_results
 
 # Starts of a straight ride are computed in a millisecond: what is left beside the engine is the sweep's own.
 SWEEP = """
@@ -163,7 +163,7 @@ def speed_table(folder: Path, count: int, rounds: int) -> Table:
 
 def cluster_table(folder: Path, sizes: list[int], count: int) -> Table:
     """Rows per second of Dask clusters on this machine, and what their scheduler and client spend."""
-    from scenarios.sweep.cluster import on_cluster
+    from velodrome.scenarios.sweep.cluster import on_cluster
 
     table = Table("Dask workers", "rows/s", "worker", "client", "scheduler", box=None, pad_edge=False)
     plan = planned(folder, ["reference"], count)

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from reference.bicycle import Bicycle
+from velodrome.reference.bicycle import Bicycle
 
 # symbrim and what it brings along are an extra: `pip install -e '.[benchmark]'`.
 # pyright: reportMissingImports=false

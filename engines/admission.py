@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from reference.rim import find_second_touch, require_clear_rims
-
+from ..reference.rim import find_second_touch, require_clear_rims
 from .engine import REQUIRED, SHAPES, Engine, EngineError, Problem, Progress, Settings, Trajectory
 from .guard import simulate
 
-# By how much a sample's time may be off, relative to it. `reference.simulate.steps_per_output` lets a step be off by as
-# much. An engine that adds its step up errs by half a unit of round-off an addition at the most: less in nine million
-# steps.
+# By how much a sample's time may be off, relative to it. `velodrome.reference.simulate.steps_per_output` lets a step be
+# off by as much. An engine that adds its step up errs by half a unit of round-off an addition at the most: less in nine
+# million steps.
 CLOCK_ERROR = 1e-9
 
 

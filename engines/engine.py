@@ -16,11 +16,9 @@ from typing import Any, Protocol, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from reference.bicycle import Bicycle
-from reference.surface import Surface
-
-from .guard import EngineError as EngineError
-from .guard import GuardedEngine, call_engine, where_raised
+from ..reference.bicycle import Bicycle
+from ..reference.surface import Surface
+from .guard import EngineError, GuardedEngine, call_engine, where_raised
 
 ENTRY_POINT_GROUP = "velodrome.engines"
 REFERENCE = "reference"
@@ -78,11 +76,11 @@ class Trajectory:
         The settings it ran with, JSON values.
     time : ndarray, shape (n,)
         Times of the samples by the engine's own clock [s], one for each of the problem's, or fewer where the run
-        ended early. `engines.admission.ride` holds them against the problem's.
+        ended early. `velodrome.engines.admission.ride` holds them against the problem's.
     q, qd : ndarray, shape (n, 9)
         Generalised coordinates and rates.
     body_position : ndarray, shape (n, 4, 3)
-        Centres of mass, in the order of `reference.bicycle.BODIES` [m].
+        Centres of mass, in the order of `velodrome.reference.bicycle.BODIES` [m].
     body_quaternion : ndarray, shape (n, 4, 4)
         Orientations (w, x, y, z), body to inertial axes.
     contact_point : ndarray or None, shape (n, 2, 3)

@@ -22,8 +22,8 @@ _T = TypeVar("_T")
 _LONGEST = 200  # letters of what an engine says as it exits
 # Packages that stand between a call and the engine's own code: none of their lines is where an engine is wrong.
 _BETWEEN = (
-    *("importlib", "importlib_metadata", "pydantic", "scenarios", "reports"),
-    *("engines.guard", "engines.engine", "engines.admission", "engines.identify"),
+    *("importlib", "importlib_metadata", "pydantic", "velodrome.scenarios", "velodrome.reports"),
+    *("velodrome.engines.guard", "velodrome.engines.engine", "velodrome.engines.admission"),
 )
 
 
@@ -125,8 +125,8 @@ def where_raised(error: BaseException) -> str | None:
     inside = [(frame, line) for frame, line in found[last + 1 :] if not _is_between(frame)]
     if not inside:
         return None
-    package = _module(inside[0][0]).partition(".")[0]
-    frame, line = [one for one in inside if _module(one[0]).partition(".")[0] == package][-1]
+    package = _package(inside[0][0])
+    frame, line = [one for one in inside if _package(one[0]) == package][-1]
     path = Path(frame.f_code.co_filename)
     # As the package has it, wherever it is installed: rows of a sweep are the same on every machine.
     parts = _module(frame).count(".") + 1 + (path.name == "__init__.py")
@@ -135,6 +135,12 @@ def where_raised(error: BaseException) -> str | None:
 
 def _module(frame: FrameType) -> str:
     return str(frame.f_globals.get("__name__", ""))
+
+
+def _package(frame: FrameType) -> str:
+    """Return the package that a frame's code belongs to; a floor of the suite counts as one of its own."""
+    names = _module(frame).split(".")
+    return ".".join(names[: 2 if names[0] == "velodrome" else 1])
 
 
 def _is_between(frame: FrameType) -> bool:
@@ -178,7 +184,7 @@ def _copy_problem(problem: Problem) -> Problem:
 
 @dataclass(frozen=True)
 class GuardedEngine:
-    """An engine whose code is called through `call_engine` only; see `engines.engine.Engine`.
+    """An engine whose code is called through `call_engine` only; see `velodrome.engines.engine.Engine`.
 
     What it says of itself is asked once, when it is loaded.
 

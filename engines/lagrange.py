@@ -8,10 +8,9 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field
 
-from reference.contact import observe
-from reference.kinematics import body_positions, body_quaternions
-from reference.simulate import simulate, simulate_modified_euler, steps_per_output
-
+from ..reference.contact import observe
+from ..reference.kinematics import body_positions, body_quaternions
+from ..reference.simulate import simulate, simulate_modified_euler, steps_per_output
 from .engine import REFERENCE, EngineError, Problem, Progress, Settings, Trajectory, package_version
 
 ORDER = 8  # of dop853: a step's error goes with this power of it
@@ -48,7 +47,7 @@ class LagrangeEngine:
         return package_version("velodrome")
 
     def check(self, problem: Problem, settings: LagrangeSettings) -> None:
-        """Refuse output times that the fixed step does not meet; see `engines.engine.Engine`."""
+        """Refuse output times that the fixed step does not meet; see `velodrome.engines.engine.Engine`."""
         if settings.integrator == "modified-euler":
             steps_per_output(problem.times, settings.step)
 
@@ -57,7 +56,7 @@ class LagrangeEngine:
         return settings.tolerance if settings.integrator == "dop853" else 2.0**-52
 
     def simulate(self, problem: Problem, settings: LagrangeSettings, progress: Progress) -> Trajectory:
-        """Run a problem; see `engines.engine.Engine`."""
+        """Run a problem; see `velodrome.engines.engine.Engine`."""
         where = (problem.bicycle, problem.surface)
         state = (problem.q, problem.qd, problem.times)
         # Compile, or load what is compiled, before the clock starts.

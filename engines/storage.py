@@ -17,9 +17,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from reference.bicycle import BODIES
-from reference.kinematics import COORDINATES, WHEELS
-
+from ..reference.bicycle import BODIES
+from ..reference.kinematics import COORDINATES, WHEELS
 from .engine import REQUIRED, SHAPES, Trajectory
 from .files import whole
 

@@ -30,9 +30,9 @@ import numpy as np
 from exudyn.itemInterface import SensorBody
 from exudyn.rigidBodyUtilities import InertiaCylinder
 
-from engines.exudyn.joint import CreateRollingJointOnSurface
-from engines.exudyn.sensor import CreateRollingJointSensor
-from reference.surface import Paraboloid, Surface, evaluate
+from velodrome.engines.exudyn.joint import CreateRollingJointOnSurface
+from velodrome.engines.exudyn.sensor import CreateRollingJointSensor
+from velodrome.reference.surface import Paraboloid, Surface, evaluate
 
 GRAVITY = 9.81
 RADIUS = 0.3

@@ -86,7 +86,7 @@ class Anchor:
     directions : tuple of ndarray, shape (22,)
         One or two in which the curve runs from there.
     condition : callable
-        What singles the solution out on its curve: maps unknowns to a `reference.circular.Condition`.
+        What singles the solution out on its curve: maps unknowns to a `velodrome.reference.circular.Condition`.
     """
 
     family: int

@@ -32,7 +32,7 @@ class AtlasCurve:
         [1/m].
     family : int
     ends : tuple of str
-        See `reference.families.Family`.
+        See `velodrome.reference.families.Family`.
     seen : Samples
         Its motions in the order of the curve.
     sections : list of (SectionEnd, SectionEnd)

@@ -1,7 +1,7 @@
 """One circular motion: 21 constants (Xiong et al. 2020, Eqs. 9-14).
 
-Solved are the eight equations in nine unknowns of `reference.kernels.circle`; speeds, contact points and
-forces follow from them, and all 22 unknowns of `reference.kernels.steady` describe the solution.
+Solved are the eight equations in nine unknowns of `velodrome.reference.kernels.circle`; speeds, contact points and
+forces follow from them, and all 22 unknowns of `velodrome.reference.kernels.steady` describe the solution.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ class Point:
     Attributes
     ----------
     unknowns : ndarray, shape (22,)
-        See `reference.kernels.steady`.
+        See `velodrome.reference.kernels.steady`.
     tangent : ndarray, shape (22,)
         Of unit length in the arclength's metric.
     """
@@ -243,7 +243,7 @@ def crossings(
     points : iterable of Point
         In the order followed.
     condition : callable
-        Maps unknowns to a `reference.circular.Condition` of order one.
+        Maps unknowns to a `velodrome.reference.circular.Condition` of order one.
 
     Yields
     ------

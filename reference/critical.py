@@ -1,7 +1,7 @@
 """Critical shapes of the bowl: where families exchange parts, and where their last stable section vanishes.
 
 Two curves touch where the Jacobian of the steady equations loses a rank. The eight equations
-F(u, alpha) = 0 in nine unknowns (`reference.kernels.circle`) have full rank on a curve, and the touching
+F(u, alpha) = 0 in nine unknowns (`velodrome.reference.kernels.circle`) have full rank on a curve, and the touching
 point is a regular root of
 
     F(u, alpha) = 0,    w . dF/du = 0,    |w|^2 = 1

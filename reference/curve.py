@@ -29,7 +29,7 @@ class Samples:
     normal_force : ndarray, shape (n, 2)
         Of the ground on the rear and the front wheel [N].
     eigenvalues : ndarray, shape (n, 7), complex
-        In the order of `reference.stability.eigenvalue_order` [1/s].
+        In the order of `velodrome.reference.stability.eigenvalue_order` [1/s].
     growth_rate : ndarray, shape (n,)
         Largest real part among those that symmetry does not fix [1/s].
     """
@@ -64,7 +64,7 @@ def sample(equations: Steady, unknowns: np.ndarray) -> Samples:
     ----------
     equations : Steady
     unknowns : ndarray, shape (n, 22)
-        Solutions, see `reference.kernels.steady`.
+        Solutions, see `velodrome.reference.kernels.steady`.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 """Solution families: curves of circular motions, followed from their anchors to both ends.
 
-See `reference.anchors` for where they are got hold of. From there a curve is followed by pseudo-arclength.
+See `velodrome.reference.anchors` for where they are got hold of. From there a curve is followed by pseudo-arclength.
 On steep bowls families join and leave parts behind: those are further curves, each under the number of the
 family that it was a part of.
 """
@@ -135,7 +135,7 @@ def trace(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, longest: 
 
 
 def trace_from(start: Anchor, longest: float = LONGEST_STEP) -> Family:
-    """Follow a curve from an anchor to both ends, see `reference.anchors.anchor` and `trace`."""
+    """Follow a curve from an anchor to both ends, see `velodrome.reference.anchors.anchor` and `trace`."""
     halves = []
     for towards in start.directions:
         points = list(_to_an_end(follow(start.equations, start.unknowns, towards, longest)))

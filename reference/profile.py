@@ -132,7 +132,7 @@ class SplineProfile:
 
     @property
     def parameters(self) -> np.ndarray:
-        """As `reference.kernels.spline.piecewise` takes them: breaks in r^2, then coefficients."""
+        """As `velodrome.reference.kernels.spline.piecewise` takes them: breaks in r^2, then coefficients."""
         return self._parameters
 
     @cached_property

@@ -1,4 +1,4 @@
-"""The whole rims of both wheels above the ground, see `reference.kernels.rim`.
+"""The whole rims of both wheels above the ground, see `velodrome.reference.kernels.rim`.
 
 A wheel that rolls touches the ground in one point. Where its rim comes to touch a second one, something hits
 the wheel: a ride ends there. A start with a rim inside the ground is no start.
@@ -85,7 +85,7 @@ def rim_clearances(bicycle: Bicycle, surface: Surface, q: np.ndarray, contact: n
     q : ndarray, shape (9,)
         Coordinates.
     contact : ndarray, shape (6,)
-        Contact parameters of both wheels there, as `reference.dae.contact_parameters` gives them.
+        Contact parameters of both wheels there, as `velodrome.reference.dae.contact_parameters` gives them.
     """
     known, function, parameters = bicycle_rim_search(bicycle, surface), surface.function.real, surface.parameters
     clearances = np.empty(2)

@@ -17,9 +17,9 @@ from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numba import cfunc, types
+from numba import types
 
-from .kernels.vector import jit
+from .kernels.compilation import compile_callback, jit
 
 _PARAMETERS = types.Array(types.float64, 1, "C")
 
@@ -46,12 +46,12 @@ class SurfaceFunction:
     @cached_property
     def real(self) -> Any:
         """Compiled for real x and y."""
-        return cfunc(_signature(types.float64), cache=self.cached)(self.source)
+        return compile_callback(_signature(types.float64), cache=self.cached)(self.source)
 
     @cached_property
     def complex(self) -> Any:
         """Compiled for complex x and y."""
-        return cfunc(_signature(types.complex128), cache=self.cached)(self.source)
+        return compile_callback(_signature(types.complex128), cache=self.cached)(self.source)
 
 
 def surface_function(function: Callable[..., tuple]) -> SurfaceFunction:
@@ -77,8 +77,8 @@ class Surface(Protocol):
     """Any smooth ground z = f(x, y) of gravity's half space.
 
     Two more properties are read where a surface has them, when the whole rim of a wheel is looked at
-    (`reference.rim`): ``bend``, a bound of the largest eigenvalue of the Hessian anywhere [1/m], which saves most of
-    the looking, and ``detail``, the length within which the ground does not bend to and fro [m], which says how
+    (`velodrome.reference.rim`): ``bend``, a bound of the largest eigenvalue of the Hessian anywhere [1/m], which saves
+    most of the looking, and ``detail``, the length within which the ground does not bend to and fro [m], which says how
     closely to look where it is less than a wheel's radius.
     """
 

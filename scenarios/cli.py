@@ -11,14 +11,22 @@ from typing import NoReturn
 
 import typer
 
-from .commands.check import check_command
-from .commands.motions import atlas_command, circular_command, critical_command, families_command
-from .commands.run import list_command, run_command
-from .commands.stored import diff_command, view_command
-from .commands.studies import paper_command, precision_command
-from .commands.sweep import sweep_command
+from .commands import (
+    atlas_command,
+    check_command,
+    circular_command,
+    critical_command,
+    diff_command,
+    families_command,
+    list_command,
+    paper_command,
+    precision_command,
+    run_command,
+    run_supervised,
+    sweep_command,
+    view_command,
+)
 from .error import ScenarioError
-from .supervision import run_supervised
 
 app = typer.Typer(
     name="velodrome",

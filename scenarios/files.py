@@ -6,8 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from engines.files import whole
-
+from ..engines.files import whole
 from .error import ScenarioError
 
 

@@ -28,14 +28,15 @@ from tests.shaken import shake
 ROOT = Path(__file__).parent.parent
 TESTS = (
     "tests/reference",
-    *(f"tests/reports/test_{name}.py" for name in ("drift", "ledger", "limits", "metrics", "modes")),
-    *(f"tests/scenarios/test_{name}.py" for name in ("gate", "paper", "precision")),
-    "tests/engines/test_identify.py",
+    *(f"tests/reports/measure/test_{name}.py" for name in ("excited_modes", "identify", "limits", "metrics")),
+    *(f"tests/scenarios/gate/test_{name}.py" for name in ("gate", "verdict")),
+    *(f"tests/scenarios/paper/test_{name}.py" for name in ("ledger", "paper")),
+    "tests/scenarios/studies/test_precision.py",
 )
 SHORT_TESTS = (
     *(f"tests/reference/test_{name}.py" for name in ("families", "running_direction", "stability")),
-    "tests/reports/test_modes.py",
-    "tests/scenarios/test_paper.py",
+    "tests/reports/measure/test_excited_modes.py",
+    "tests/scenarios/paper/test_paper.py",
 )
 ALPHAS = (0.0, 1 / 200, 1 / 5, 1.0)
 # Of a row's largest number: a double zero splits by the root of round-off times its condition, 1e-7.
@@ -101,14 +102,14 @@ def write_documents(path: Path, seed: int | None, paper: bool) -> None:
     """Write what must be the same everywhere, as this process computes it, to a JSON file."""
     if seed is not None:
         shake(seed)
-    from reports.paper.ledger import document
-    from scenarios.paper import ledger
-    from scenarios.survey import families_document
+    from velodrome.scenarios.motions.families import families_document
+    from velodrome.scenarios.paper.claims import make_ledger
+    from velodrome.scenarios.paper.ledger import document
 
     found: dict[str, Any] = {f"families at alpha = {alpha:g}": families_document(alpha) for alpha in ALPHAS}
     if paper:
         told = ("claim", "kind", "verdict", "fault")
-        found["paper"] = [{name: line[name] for name in told} for line in document(ledger())["lines"]]
+        found["paper"] = [{name: line[name] for name in told} for line in document(make_ledger())["lines"]]
     path.write_text(json.dumps(found))
 
 

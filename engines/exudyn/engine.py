@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from engines.engine import EngineError, Problem, Progress, Trajectory, UnsuitableProblem, package_version
-from reference.kinematics import quaternions
-from reference.simulate import steps_per_output
-from reference.surface import is_level
-
+from ...reference.kinematics import quaternions
+from ...reference.simulate import steps_per_output
+from ...reference.surface import is_level
+from ..engine import EngineError, Problem, Progress, Trajectory, UnsuitableProblem, package_version
 from .settings import ExudynSettings, SolverSettings
 
 if TYPE_CHECKING:
@@ -52,13 +51,13 @@ class ExudynEngine:
         return package_version("exudyn")
 
     def check(self, problem: Problem, settings: SolverSettings) -> None:
-        """Refuse output times that the step does not meet, and ground; see `engines.engine.Engine`."""
+        """Refuse output times that the step does not meet, and ground; see `velodrome.engines.engine.Engine`."""
         if self.level_only and not is_level(problem.surface):
             raise UnsuitableProblem("it rolls on the level plane only; exudyn rides on any surface")
         steps_per_output(problem.times, settings.step)
 
     def step_noise(self, settings: SolverSettings) -> float:
-        """What Newton's method may leave unconverged in a step; see `engines.engine.Engine`.
+        """What Newton's method may leave unconverged in a step; see `velodrome.engines.engine.Engine`.
 
         Its residual falls by the tolerance from the bodies' weights, which are some 1 kN: it leaves the tolerance of
         the forces, and as many metres of gaps and of slip in a step, on a motion of some metres.
@@ -66,7 +65,7 @@ class ExudynEngine:
         return settings.newton_relative_tolerance
 
     def simulate(self, problem: Problem, settings: SolverSettings, progress: Progress) -> Trajectory:
-        """Run a problem; see `engines.engine.Engine.simulate`.
+        """Run a problem; see `velodrome.engines.engine.Engine.simulate`.
 
         Raises
         ------

@@ -36,9 +36,8 @@ from exudyn.itemInterface import (
     ObjectConnectorCoordinateVector,
 )
 
-from reference.rim import rim_search
-from reference.surface import Surface
-
+from ...reference.rim import rim_search
+from ...reference.surface import Surface
 from . import kernel
 
 SLIP_ROWS = (0, 1)  # of a wheel's three
@@ -102,7 +101,7 @@ def CreateRollingJointOnSurface(
     discRadius : float or sequence of float
         Radius of the edge [m], one for all or one each.
     surface : Surface
-        The ground, fixed in space; see `reference.surface`.
+        The ground, fixed in space; see `velodrome.reference.surface`.
     newmarkRatio : float
         Newmark's beta / gamma of the time integration: 0.5 for the trapezoidal rule, up to 2/3 for
         generalized alpha (see `method`). It changes nothing but how fast Newton's method converges.

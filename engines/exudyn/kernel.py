@@ -14,9 +14,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from reference.kernels import contact
-from reference.kernels.rim import find_contact
-from reference.kernels.vector import add, cross, dot, jit
+from ...reference.kernels import contact
+from ...reference.kernels.compilation import jit
+from ...reference.kernels.rim import find_contact
+from ...reference.kernels.vector import add, cross, dot
 
 
 @jit
@@ -59,7 +60,7 @@ def wheel_contact(coordinates, centre, triad, radius, ground, function, paramete
     """Return (gap, A p + d, (lateral, forward, normal)) of a wheel at its node's coordinates (7,).
 
     ``centre`` (3,) is p, the rows of ``triad`` (3, 3) are right-handed unit vectors of the body with the
-    axle in the middle. ``ground`` is the `reference.kernels.rim.RimSearch`.
+    axle in the middle. ``ground`` is the `velodrome.reference.kernels.rim.RimSearch`.
     """
     body = axes(coordinates[3], coordinates[4], coordinates[5], coordinates[6])
     offset = turned(body, centre)

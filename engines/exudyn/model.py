@@ -11,11 +11,10 @@ import numpy as np
 from exudyn.itemInterface import SensorBody
 from exudyn.rigidBodyUtilities import RigidBodyInertia
 
-from engines.engine import EngineError, Problem
-from reference.bicycle import BODIES, Bicycle
-from reference.kinematics import angular_velocities, body_positions, body_velocities, rotations
-from reference.rim import Ending, RimWatch
-
+from ...reference.bicycle import BODIES, Bicycle
+from ...reference.kinematics import angular_velocities, body_positions, body_velocities, rotations
+from ...reference.rim import Ending, RimWatch
+from ..engine import EngineError, Problem
 from .settings import SolverSettings
 from .wheels import LEFT, MASS_UNIT, PutOnGround, Rolling
 
@@ -111,7 +110,7 @@ def _watch(system: exu.MainSystem, body: Any) -> dict[str, Any]:
 
 
 def rim_look(model: Model, problem: Problem) -> Callable[[float], Ending | None]:
-    """Make the look at both rims that `engines.exudyn.solve.integrate` calls at every step.
+    """Make the look at both rims that `velodrome.engines.exudyn.solve.integrate` calls at every step.
 
     Raises
     ------

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engines.engine import Problem
-from reference.bicycle import BODIES, Bicycle
-from reference.kinematics import YAW, coordinates_from_bodies
-from reference.rim import rim_search
-
+from ...reference.bicycle import BODIES, Bicycle
+from ...reference.kinematics import YAW, coordinates_from_bodies
+from ...reference.rim import rim_search
+from ..engine import Problem
 from . import kernel
 from .model import Model, Motion
 from .wheels import MASS_UNIT, wheel_radii
@@ -18,7 +17,7 @@ from .wheels import MASS_UNIT, wheel_radii
 
 @dataclass(frozen=True)
 class Contacts:
-    """Contacts of both wheels along a run, shapes as in `engines.engine.Trajectory`."""
+    """Contacts of both wheels along a run, shapes as in `velodrome.engines.engine.Trajectory`."""
 
     point: np.ndarray
     force: np.ndarray

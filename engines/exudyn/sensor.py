@@ -8,8 +8,7 @@ import exudyn as exu
 import numpy as np
 from exudyn.itemInterface import SensorUserFunction
 
-from reference.rim import rim_search
-
+from ...reference.rim import rim_search
 from . import kernel
 from .joint import RollingJoint
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from engines.engine import Settings
+from ..engine import Settings
 
 
 class SolverSettings(Settings):

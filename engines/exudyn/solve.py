@@ -13,9 +13,8 @@ from typing import Any
 
 import exudyn as exu
 
-from engines.engine import EngineError, Progress
-from reference.rim import Ending
-
+from ...reference.rim import Ending
+from ..engine import EngineError, Progress
 from .settings import SolverSettings
 from .start import Start, begin, correct, second_order_start
 
@@ -26,7 +25,7 @@ PROGRESS_STEPS = 100
 class Integration:
     """How to integrate: until ``end`` [s] in equal ``steps``, with ``samples`` evenly spaced samples after the start.
 
-    With ``slip_equations`` generalized alpha starts as in `engines.exudyn.start`; None leaves the start to
+    With ``slip_equations`` generalized alpha starts as in `velodrome.engines.exudyn.start`; None leaves the start to
     the engine.
     """
 

@@ -25,8 +25,7 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
-from engines.engine import EngineError
-
+from ..engine import EngineError
 from .method import generalized_alpha
 
 INITIAL: Any = exu.ConfigurationType.Initial

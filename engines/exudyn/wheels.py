@@ -10,9 +10,8 @@ import exudyn as exu
 import numpy as np
 from exudyn.itemInterface import SensorObject
 
-from engines.engine import Problem
-from reference.rim import rim_search
-
+from ...reference.rim import rim_search
+from ..engine import Problem
 from . import kernel
 from .joint import CreateRollingJointOnSurface, RollingJoint, slip_equations
 from .method import generalized_alpha

@@ -13,9 +13,9 @@ from typing import Any
 
 import mujoco
 
-from engines.engine import EngineError
-from engines.mujoco.compiled import board
-from engines.mujoco.library import collision_slot
+from ..engine import EngineError
+from .compiled import board
+from .library import collision_slot
 
 _in_use = Lock()
 

@@ -1,7 +1,7 @@
 """Compiled callbacks that MuJoCo calls inside its step: knife-edge contacts, and forces instead of contacts.
 
 A wheel is a circle of radius r about its geom's z axis. Its contact with the ground z = f(x, y) is the
-closest approach of the two (`reference.kernels.contact`), and a material point of the rim there has
+closest approach of the two (`velodrome.reference.kernels.contact`), and a material point of the rim there has
 
     velocity      v = Jp q'
     acceleration  Jp q'' + gamma,    gamma = Jp' q' + w x (r a' t)
@@ -35,11 +35,12 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 
-from engines.mujoco.library import announce
-from reference.kernels import contact
-from reference.kernels.linear import factorise, solve_factorised
-from reference.kernels.rim import RimSearch, find_contact, level_axes
-from reference.kernels.vector import add, cross, dot, jit, scale
+from ...reference.kernels import contact
+from ...reference.kernels.compilation import compile_callback, jit
+from ...reference.kernels.linear import factorise, solve_factorised
+from ...reference.kernels.rim import RimSearch, find_contact, level_axes
+from ...reference.kernels.vector import add, cross, dot, scale
+from .library import announce
 
 WHEELS = 8  # the most that a blackboard has room for
 # A wheel whose centre is less than this above its contact lies flat [m].
@@ -55,7 +56,7 @@ BLACKBOARD = np.dtype(
         ("surface", _ADDRESS),
         ("parameters", _ADDRESS),
         ("parameter_count", np.int64),
-        # How closely to look at rims, `reference.kernels.rim.RimSearch`.
+        # How closely to look at rims, `velodrome.reference.kernels.rim.RimSearch`.
         ("curved", np.int64),
         ("bends", _ADDRESS),
         ("bend_count", np.int64),
@@ -284,7 +285,7 @@ def _motion(board, k, model, data, rows, turning):
     return here, velocity, add((gamma[0], gamma[1], gamma[2]), cross(spin, scale(along, here.tangent)))
 
 
-@cfunc(COLLISION, cache=True, error_model="numpy")
+@compile_callback(COLLISION, error_model="numpy")
 def touch(model, data, made, ground, geom, margin):
     """Collision function for planes and cylinders: a knife edge's contact with the true ground.
 
@@ -438,7 +439,7 @@ def judge(boards):
     _judge(boards[0])
 
 
-@cfunc(CONTROL, cache=True, error_model="numpy")
+@compile_callback(CONTROL, error_model="numpy")
 def watch(model, data):
     """Control callback: look at what MuJoCo's solver leaves unconverged, and change nothing."""
     board = _blackboard()
@@ -475,7 +476,7 @@ def _start_sticking(board, model, data, rows, softness, target):
             start[j] += spread[i, j] * force[i]
 
 
-@cfunc(CONTROL, cache=True, error_model="numpy")
+@compile_callback(CONTROL, error_model="numpy")
 def correct(model, data):
     """Control callback: bring the contacts' own acceleration into MuJoCo's reference accelerations.
 
@@ -511,7 +512,7 @@ def correct(model, data):
         _start_sticking(board, model, data, rows[:used], numbers[0, :used], numbers[1, :used])
 
 
-@cfunc(CONTROL, cache=True, error_model="numpy")
+@compile_callback(CONTROL, error_model="numpy")
 def press(model, data):
     """Control callback: the contact forces of rolling without slip, as applied forces."""
     board = _blackboard()

@@ -24,9 +24,9 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
-from engines.mujoco import compiled
-from engines.mujoco.callbacks import installed
-from engines.mujoco.settings import WRONG
+from . import compiled
+from .callbacks import installed
+from .settings import WRONG
 
 STATE = (
     "qvel",

@@ -10,7 +10,7 @@ The model is that of `native`, and it falls on circles that a bicycle rides, for
 
 from __future__ import annotations
 
-from engines.mujoco.engine import MujocoEngine
-from engines.mujoco.settings import DefaultSettings
+from .engine import MujocoEngine
+from .settings import DefaultSettings
 
-ENGINE = MujocoEngine("mujoco-default", DefaultSettings, "engines.mujoco.planes:build")
+ENGINE = MujocoEngine("mujoco-default", DefaultSettings, "velodrome.engines.mujoco.planes:build")

@@ -9,11 +9,11 @@ from functools import partial
 
 import numpy as np
 
-from engines.engine import Problem
-from engines.mujoco.knife_edge import pressing_forces, rolling_forces, standing, stiffen, watched_edges
-from engines.mujoco.ride import Rig, bodies, contact_forces, rim_look, rim_stride, start, wheel_geoms
-from engines.mujoco.settings import ExactContactSettings, MultiplierSettings
-from reference.kinematics import WHEELS
+from ...reference.kinematics import WHEELS
+from ..engine import Problem
+from .knife_edge import pressing_forces, rolling_forces, standing, stiffen, watched_edges
+from .ride import Rig, bodies, contact_forces, rim_look, rim_stride, start, wheel_geoms
+from .settings import ExactContactSettings, MultiplierSettings
 
 GROUNDS: dict[str, str] = dict.fromkeys(WHEELS, "ground")
 

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
-from engines.engine import Problem, Progress, Trajectory, package_version
-from engines.mujoco.settings import StepSettings
-from engines.mujoco.state import from_mujoco
-from reference.contact import observe
+from ...reference.contact import observe
+from ..engine import Problem, Progress, Trajectory, package_version
+from .settings import StepSettings
+from .state import from_mujoco
 
 if TYPE_CHECKING:
-    from engines.mujoco.ride import Rig
+    from .ride import Rig
 
 S = TypeVar("S", bound=StepSettings)
 GIVES = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
@@ -66,11 +66,11 @@ class MujocoEngine(Generic[S]):
         return package_version("mujoco")
 
     def check(self, problem: Problem, settings: Any) -> None:
-        """Refuse output times that the step does not meet; see `engines.engine.Engine`."""
+        """Refuse output times that the step does not meet; see `velodrome.engines.engine.Engine`."""
         step_counts(problem.times, settings.step)
 
     def step_noise(self, settings: Any) -> float:
-        """What the contact solver may leave unconverged in a step, or round-off; see `engines.engine.Engine`."""
+        """What the contact solver may leave unconverged in a step, or round-off; see `Engine`."""
         return settings.noise
 
     def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
@@ -97,7 +97,7 @@ class MujocoEngine(Generic[S]):
             If MuJoCo refuses the model, or a wheel stands nowhere at the start.
         """
         counts = step_counts(problem.times, settings.step)
-        from engines.mujoco.ride import ride
+        from .ride import ride
 
         module, name = self.builder.split(":")
         build: Callable[[Problem, Any], Rig] = getattr(import_module(module), name)

@@ -8,7 +8,7 @@ is looked at in every evaluation (`convergence`). What is left is the softness o
 
 from __future__ import annotations
 
-from engines.mujoco.engine import MujocoEngine
-from engines.mujoco.settings import ExactContactSettings
+from .engine import MujocoEngine
+from .settings import ExactContactSettings
 
-ENGINE = MujocoEngine("mujoco-exact-contact", ExactContactSettings, "engines.mujoco.edges:build_contacts")
+ENGINE = MujocoEngine("mujoco-exact-contact", ExactContactSettings, "velodrome.engines.mujoco.edges:build_contacts")

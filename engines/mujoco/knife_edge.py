@@ -35,12 +35,12 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
-from engines.engine import EngineError
-from engines.mujoco import compiled, layout
-from engines.mujoco.callbacks import installed
-from engines.mujoco.convergence import WRONG, Convergence, judged, share
-from reference.rim import rim_search
-from reference.surface import Surface
+from ...reference.rim import rim_search
+from ...reference.surface import Surface
+from ..engine import EngineError
+from . import compiled, layout
+from .callbacks import installed
+from .convergence import WRONG, Convergence, judged, share
 
 
 @contextmanager

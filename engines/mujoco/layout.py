@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 from mujoco.introspect import ast_nodes, enums, functions, structs
 
-from engines.engine import EngineError
+from ..engine import EngineError
 
 _SIZES = {
     "mjtNum": 8,

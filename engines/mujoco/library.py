@@ -13,7 +13,7 @@ from typing import Any
 import llvmlite.binding as llvm
 import mujoco
 
-from engines.engine import EngineError
+from ..engine import EngineError
 
 _GEOM_TYPES = 9  # mjNGEOMTYPES, the table's width
 _PATTERNS = ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll")

@@ -22,10 +22,10 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
 
-from engines.mujoco.settings import ContactSettings, StepSettings
-from engines.mujoco.tangent import HALF_THICKNESS
-from reference.bicycle import Bicycle
-from reference.kinematics import WHEELS
+from ...reference.bicycle import Bicycle
+from ...reference.kinematics import WHEELS
+from .settings import ContactSettings, StepSettings
+from .tangent import HALF_THICKNESS
 
 Touching = Literal["plane", "planes", "edges", "nothing"]
 # A start on the constraints has gaps of round-off, of either sign, and MuJoCo gives a pair apart no

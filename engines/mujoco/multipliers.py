@@ -8,7 +8,7 @@ lift off nor slide, whatever the forces.
 
 from __future__ import annotations
 
-from engines.mujoco.engine import MujocoEngine
-from engines.mujoco.settings import MultiplierSettings
+from .engine import MujocoEngine
+from .settings import MultiplierSettings
 
-ENGINE = MujocoEngine("mujoco-multipliers", MultiplierSettings, "engines.mujoco.edges:build_multipliers")
+ENGINE = MujocoEngine("mujoco-multipliers", MultiplierSettings, "velodrome.engines.mujoco.edges:build_multipliers")

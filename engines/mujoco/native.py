@@ -15,7 +15,7 @@ constants.
 
 from __future__ import annotations
 
-from engines.mujoco.engine import MujocoEngine
-from engines.mujoco.settings import NativeSettings
+from .engine import MujocoEngine
+from .settings import NativeSettings
 
-ENGINE = MujocoEngine("mujoco-native", NativeSettings, "engines.mujoco.planes:build")
+ENGINE = MujocoEngine("mujoco-native", NativeSettings, "velodrome.engines.mujoco.planes:build")

@@ -10,14 +10,14 @@ from functools import partial
 import numpy as np
 from numba import typeof
 
-from engines.engine import EngineError, Problem
-from engines.mujoco.convergence import watched
-from engines.mujoco.ride import Rig, bodies, contact_forces, look_stride, rim_look, rim_stride, start, wheel_geoms
-from engines.mujoco.settings import ContactSettings
-from engines.mujoco.tangent import place
-from reference.kernels.dynamics import guess_contacts
-from reference.kinematics import constants
-from reference.surface import is_level
+from ...reference.kernels.dynamics import guess_contacts
+from ...reference.kinematics import constants
+from ...reference.surface import is_level
+from ..engine import EngineError, Problem
+from .convergence import watched
+from .ride import Rig, bodies, contact_forces, look_stride, rim_look, rim_stride, start, wheel_geoms
+from .settings import ContactSettings
+from .tangent import place
 
 
 def build(problem: Problem, settings: ContactSettings) -> Rig:

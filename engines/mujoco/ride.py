@@ -17,15 +17,15 @@ import mujoco
 import numpy as np
 from numba import typeof
 
-from engines.engine import EngineError, Problem, Progress
-from engines.mujoco.convergence import Convergence, share
-from engines.mujoco.model import Touching, mjcf
-from engines.mujoco.settings import StepSettings
-from engines.mujoco.state import to_mujoco
-from engines.mujoco.tangent import wheel_poses
-from reference.bicycle import BODIES
-from reference.kinematics import WHEELS, constants
-from reference.rim import Ending, RimWatch, bicycle_rim_search
+from ...reference.bicycle import BODIES
+from ...reference.kinematics import WHEELS, constants
+from ...reference.rim import Ending, RimWatch, bicycle_rim_search
+from ..engine import EngineError, Problem, Progress
+from .convergence import Convergence, share
+from .model import Touching, mjcf
+from .settings import StepSettings
+from .state import to_mujoco
+from .tangent import wheel_poses
 
 REPORT_INTERVAL = 0.05
 # How often a bicycle is looked at whose ground needs no care: a wheel turns by far less than half a turn meanwhile.

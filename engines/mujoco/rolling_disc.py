@@ -1,6 +1,6 @@
 """A coin that rolls in a circle: how to use the knife edges in a model of one's own.
 
-    python -m engines.mujoco.rolling_disc
+    python -m velodrome.engines.mujoco.rolling_disc
 
 A thin disc of mass m, radius r and moments of inertia I1 (across) and I3 (about its axle) leans by an angle
 theta towards the centre of the circle, of radius rho, that its centre runs on. It does so steadily at
@@ -22,8 +22,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from engines.mujoco.knife_edge import knife_edges, stiffen
-from reference.surface import Plane, Surface
+from ...reference.surface import Plane, Surface
+from .knife_edge import knife_edges, stiffen
 
 MASS, RADIUS, GRAVITY = 0.5, 0.3, 9.81
 ACROSS, AXIAL = MASS * RADIUS**2 / 4, MASS * RADIUS**2 / 2

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from engines.engine import Settings
+from ..engine import Settings
 
 Impedance = Annotated[float, Field(gt=0, lt=1)]
 Impedances = tuple[

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from reference.kinematics import FRONT_ANGLE, LEAN, PITCH, REAR_ANGLE, STEER, YAW, unwrap
+from ...reference.kinematics import FRONT_ANGLE, LEAN, PITCH, REAR_ANGLE, STEER, YAW, unwrap
 
 # Order of the hinges in the tree.
 HINGES = [REAR_ANGLE, STEER, FRONT_ANGLE]

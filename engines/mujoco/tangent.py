@@ -13,9 +13,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from reference.kernels import contact
-from reference.kernels.dynamics import find_contacts, wheels
-from reference.kernels.vector import dot, jit
+from ...reference.kernels import contact
+from ...reference.kernels.compilation import jit
+from ...reference.kernels.dynamics import find_contacts, wheels
+from ...reference.kernels.vector import dot
 
 # MuJoCo has no knife edge: its wheels are this thick on each side of their plane [m].
 HALF_THICKNESS = 1e-4

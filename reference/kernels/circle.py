@@ -26,9 +26,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .pose import inline, pose, times, to_aligned, to_inertial
+from .compilation import jit, jit_inline
+from .pose import pose, times, to_aligned, to_inertial
 from .reduction import build, front_force, solve
-from .vector import add, combine, cross, dot, jit, scale, subtract
+from .vector import add, combine, cross, dot, scale, subtract
 
 COORDINATES, ROWS = 9, 8
 SIGMA_UNIT = 400.0  # (20 rad/s)^2: keeps the unknown of the size of the others
@@ -65,7 +66,7 @@ class Turn(NamedTuple):
     system: Any
 
 
-@inline
+@jit_inline
 def rim_point(here, wheel, x, y, z, function, parameters):
     """`RimPoint` of a wheel of a `Pose` with D at (x, y, z)."""
     rho = to_inertial(here, wheel.rho)
@@ -75,7 +76,7 @@ def rim_point(here, wheel, x, y, z, function, parameters):
     return RimPoint(z + rho[2] - f, dot(wheel.t, normal), normal, xi, eta)
 
 
-@inline
+@jit_inline
 def _roll(here, wheel, x, y, z, function, parameters):
     point = rim_point(here, wheel, x, y, z, function, parameters)
     velocity = to_aligned(here, -point.eta, point.xi, 0 * point.xi)
@@ -83,7 +84,7 @@ def _roll(here, wheel, x, y, z, function, parameters):
     return Rolling(point, slip, -dot(velocity, wheel.t) / wheel.radius)
 
 
-@inline
+@jit_inline
 def _turn(u, function, parameters, a):
     """Set up a turn from the unknowns ``u`` (9,); ``a`` the `Aligned` constants."""
     here = pose(0 * u[3], u[3], u[4], u[5], u[7], u[8], a)

@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .compilation import jit
 from .kinematics import rim
 from .linear import solve_three
-from .vector import cross, dot, jit
+from .vector import cross, dot
 
 
 class Contact(NamedTuple):

@@ -19,9 +19,9 @@ from __future__ import annotations
 import numpy as np
 
 from .circle import COORDINATES, FULL, ROWS, STEP, circle_jacobian, circle_residual, unfold
+from .compilation import jit
 from .reduced import FRONT, REAR, VARIABLES, reduced_jacobian, telling_spin
 from .steady import running_rates, steady_energy
-from .vector import jit
 
 CHOSEN = np.array([0, 1, 2, 3, 4, 5, 9, 12, 15])  # the nine among the 22
 X, Y, Z, LEAN, REAR_SPEED, FRONT_SPEED, SIGMA = 0, 1, 2, 3, 7, 8, 9

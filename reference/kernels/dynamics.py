@@ -20,10 +20,11 @@ from __future__ import annotations
 import numpy as np
 
 from . import contact
+from .compilation import jit
 from .kinematics import angular_velocities, frames
 from .linear import factorise, solve, solve_factorised
 from .rim import find_contact
-from .vector import add, combine, cross, dot, jit, scale
+from .vector import add, combine, cross, dot, scale
 
 # Dependent and independent generalised speeds of a consistent state.
 DEPENDENT = np.array([0, 1, 2, 3, 5, 8])

@@ -12,12 +12,12 @@ import math
 import numpy as np
 
 from . import lean
+from .compilation import jit
 from .dynamics import wheels
 from .lean import derivative
 from .pose import aligned
 from .projection import project
 from .rim import bound, least_clearance
-from .vector import jit
 
 SIZE = 24
 DONE, MORE, FAILED, REAR_TOUCHED, FRONT_TOUCHED = 0, 1, 2, 3, 4

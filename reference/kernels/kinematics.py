@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .vector import add, combine, cross, jit, scale
+from .compilation import jit
+from .vector import add, combine, cross, scale
 
 
 class Constants(NamedTuple):

@@ -27,12 +27,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from .pose import angle_rates, angular_velocity, inline, pose, times, to_aligned, to_inertial
+from .compilation import jit, jit_inline
+from .pose import angle_rates, angular_velocity, pose, times, to_aligned, to_inertial
 from .reduction import build, front_force, solve
-from .vector import add, combine, cross, dot, jit, scale, subtract
+from .vector import add, combine, cross, dot, scale, subtract
 
 
-@inline
+@jit_inline
 def _contact_rates(here, wheel, velocity, w, xi, eta, function, parameters):
     """Rates of (xi, eta, rim angle), ``velocity`` the rim point's as fixed in its frame."""
     _, fx, fy, fxx, fxy, fyy = function(xi, eta, parameters)
@@ -44,7 +45,7 @@ def _contact_rates(here, wheel, velocity, w, xi, eta, function, parameters):
     return vx + r * rate * tx, vy + r * rate * ty, rate
 
 
-@inline
+@jit_inline
 def _beta(wheel, w, carried, spin, rate):
     """Acceleration of the contact's material point that rates alone give; ``carried`` is w x rho."""
     r = wheel.radius
@@ -63,7 +64,7 @@ class Motion(NamedTuple):
     system: Any
 
 
-@inline
+@jit_inline
 def _motion(y, function, parameters, a):
     """Set up the equations of y = (q, qd, contact parameters); ``a`` the `Aligned` constants."""
     here = pose(y[3], y[4], y[5], y[6], y[20], y[23], a)

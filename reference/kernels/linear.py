@@ -6,7 +6,7 @@ complex *symmetric* matrix and solve square systems with pivots chosen by their 
 
 from __future__ import annotations
 
-from .vector import jit
+from .compilation import jit
 
 
 @jit

@@ -14,14 +14,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numba as nb
 import numpy as np
 
-from .vector import add, combine, dot, jit, scale
-
-# Parts of one function, named for the reader: a call that passes a dozen tuples through memory costs
-# as much as the arithmetic in it (measured: a quarter of the right-hand side).
-inline = nb.njit(cache=True, error_model="numpy", forceinline=True)
+from .compilation import jit, jit_inline
+from .vector import add, combine, dot, scale
 
 
 class Aligned(NamedTuple):
@@ -109,7 +105,7 @@ class Pose(NamedTuple):
     i2: Any
 
 
-@inline
+@jit_inline
 def _wheel(hub, radius, angle, forward, a):
     sine, cosine = np.sin(angle), np.cos(angle)
     s, c = sine * a.cos_tilt + cosine * a.sin_tilt, cosine * a.cos_tilt - sine * a.sin_tilt
@@ -119,7 +115,7 @@ def _wheel(hub, radius, angle, forward, a):
     return Wheel((reach * forward[0], reach * forward[1], hub[1] - radius * c), e, t, radius)
 
 
-@inline
+@jit_inline
 def pose(yaw, lean, pitch, steer, rear_angle, front_angle, a):
     """Pose from yaw, lean, pitch, steer and the two rim angles; ``a`` the `Aligned` constants."""
     cy, sy, cl, sl, cd, sd = np.cos(yaw), np.sin(yaw), np.cos(lean), np.sin(lean), np.cos(steer), np.sin(steer)
@@ -149,7 +145,7 @@ def pose(yaw, lean, pitch, steer, rear_angle, front_angle, a):
     )
 
 
-@inline
+@jit_inline
 def times(k, v):
     """Symmetric matrix (xx, yy, zz, xy, xz, yz) times a vector."""
     return (
@@ -159,27 +155,27 @@ def times(k, v):
     )
 
 
-@inline
+@jit_inline
 def angular_velocity(here, turn, lean, pitch):
     """Angular velocity of the rear frame from its angles' rates."""
     w = combine(turn, here.z, lean, here.ahead)
     return w[0], w[1] + pitch, w[2]
 
 
-@inline
+@jit_inline
 def angle_rates(here, w):
     """Rates of yaw, lean and pitch from an angular velocity: the inverse of `angular_velocity`."""
     turn = dot(here.above, w) / here.cos_lean
     return turn, dot(here.ahead, w), w[1] - here.sin_lean * turn
 
 
-@inline
+@jit_inline
 def to_aligned(here, x, y, z):
     """Components along (u, y, s) from inertial ones."""
     return add(combine(x, here.x, y, here.y), scale(z, here.z))
 
 
-@inline
+@jit_inline
 def to_inertial(here, v):
     """Inertial components from those along (u, y, s)."""
     return dot(here.x, v), dot(here.y, v), dot(here.z, v)

@@ -9,14 +9,15 @@ finds it.
 from __future__ import annotations
 
 from . import contact
+from .compilation import jit, jit_inline
 from .dynamics import wheels
 from .linear import solve_three
-from .pose import angle_rates, angular_velocity, inline, pose, to_aligned, to_inertial
+from .pose import angle_rates, angular_velocity, pose, to_aligned, to_inertial
 from .reduction import build, solve
-from .vector import add, combine, cross, dot, jit, scale, subtract
+from .vector import add, combine, cross, dot, scale, subtract
 
 
-@inline
+@jit_inline
 def _gap_gradient(here, normal, rho):
     """Gradient of a gap in (yaw, lean, pitch, steer) as far as the wheel follows it; ``normal`` along (u, y, s)."""
     moment = cross(rho, normal)

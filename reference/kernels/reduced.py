@@ -23,10 +23,11 @@ from __future__ import annotations
 import numpy as np
 
 from .circle import STEP, rim_point
+from .compilation import jit, jit_inline
 from .lean import derivative
 from .linear import solve, solve_three
-from .pose import angular_velocity, inline, pose, to_inertial
-from .vector import add, combine, cross, jit, scale, subtract
+from .pose import angular_velocity, pose, to_inertial
+from .vector import add, combine, cross, scale, subtract
 
 VARIABLES = 7
 REAR, FRONT = 16, 17  # the spin's place in the state (q, qd, contact parameters)
@@ -40,7 +41,7 @@ def telling_spin(rear, front):
     return REAR if abs(rear) >= 0.2 * abs(front) else FRONT
 
 
-@inline
+@jit_inline
 def _touch(y, function, parameters, a):
     here = pose(y[3], y[4], y[5], y[6], y[20], y[23], a)
     rear = rim_point(here, here.rear, y[0], y[1], y[2], function, parameters)

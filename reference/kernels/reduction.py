@@ -25,7 +25,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from .pose import inline, times
+from .compilation import jit_inline
+from .pose import times
 from .vector import add, combine, cross, dot, scale, subtract
 
 
@@ -51,7 +52,7 @@ class System(NamedTuple):
     b: Any
 
 
-@inline
+@jit_inline
 def build(here, a, force, moment, steer_load, front_load, b):
     """Build the `System`.
 
@@ -98,7 +99,7 @@ def build(here, a, force, moment, steer_load, front_load, b):
     return System(k, subtract(moment, cross(rho, force)), steer, rear, front, subtract(here.front.rho, rho), b)
 
 
-@inline
+@jit_inline
 def _pivot(system):
     """Return whether the rear spin is the one to eliminate, the spin that is kept, the one that goes."""
     rear, front = system.rear, system.front
@@ -107,7 +108,7 @@ def _pivot(system):
     return False, rear, front
 
 
-@inline
+@jit_inline
 def solve(system):
     """Return (alpha, steer'', rear spin', front spin')."""
     k, load, steer, _, _, line, b = system
@@ -151,7 +152,7 @@ def solve(system):
     return (alpha, z1, z3, z2) if rear_goes else (alpha, z1, z2, z3)
 
 
-@inline
+@jit_inline
 def front_force(system, alpha, steer, rear, front):
     """Multiplier of the constraint, the force on the front wheel: line x F and c . F are the equations' residuals."""
     rear_goes, _, gone = _pivot(system)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .vector import jit
+from .compilation import jit
 
 _AXIS = 1e-60  # s below this is the axis: the complex step itself leaves s = -1e-60 there
 _TIP = 1e-25  # a slope on the axis beyond this is a tip's

@@ -32,8 +32,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import contact
+from .compilation import jit
 from .kinematics import rim
-from .vector import combine, cross, dot, jit, scale
+from .vector import combine, cross, dot, scale
 
 _GOLDEN = (math.sqrt(5) - 1) / 2
 _SECTIONS = 40  # of an interval between samples: to some 1e-9 of it, the square root of round-off

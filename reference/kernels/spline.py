@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .vector import jit
+from .compilation import jit
 
 DEGREE = 5
 

@@ -16,7 +16,7 @@ forces / weight (6). Rows (22): the 21 equations, speeds by their direction, and
 A solution holds for (a, b, c) and for (-a, -b, -c), the same circle ridden the other way. `direction` chooses: the
 rear wheel rolls forward, b > 0. Where it stands, b = 0 to round-off, the motion runs as the unknowns say. The solvers
 give a > 0, a turn to the left; where a family of curves ends in the pivoting motion, the signs stored there are those
-with which it turns as its neighbours on that curve do (`reference.families`).
+with which it turns as its neighbours on that curve do (`velodrome.reference.families`).
 
 Solutions are found in the smaller form of `circle`; this one describes them and measures how well they hold.
 """
@@ -26,8 +26,8 @@ from __future__ import annotations
 import numpy as np
 
 from .circle import SIGMA_UNIT, STEP
+from .compilation import jit
 from .dynamics import energies, mass_and_bias, residual
-from .vector import jit
 
 UNKNOWNS = 22
 STANDING = 1e-12  # of b, at most 1: the pivoting motion is solved for, and b there is round-off of either sign

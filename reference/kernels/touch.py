@@ -11,9 +11,9 @@ import math
 import numpy as np
 
 from . import contact
+from .compilation import jit
 from .dynamics import wheels
 from .rim import LIFTED, bound, deepest, find_contact, least_clearance, level_axes
-from .vector import jit
 
 _SMALL = 1 / 32  # of the ground's detail: how far a wheel moves between two looks
 # Samples of a ride nearer than this part of the detail are joined by cubics: their error is less than 1e-3 of what the

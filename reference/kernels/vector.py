@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numba as nb
-
-jit = nb.njit(cache=True, error_model="numpy")
+from .compilation import jit
 
 
 @jit

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..plots import PLOTS, RADIUS, Plot, Ride, drawable
+from ..drawing import PLOTS, RADIUS, Plot, Ride, drawable
 
 MOST = 1000  # points of a curve: as many as pixels side by side
 ALL = 40_000  # points of all curves together: under a megabyte of page
@@ -22,7 +22,7 @@ class Panel:
     Attributes
     ----------
     key : str
-        Of the plot in `reports.plots.PLOTS`.
+        Of the plot in `velodrome.reports.drawing.plots.PLOTS`.
     title : str
         The quantity in words.
     unit : str

@@ -5,22 +5,19 @@ from __future__ import annotations
 import base64
 import hashlib
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup
 
-from engines.engine import Trajectory
-from reference.surface import Surface, SurfaceOfRevolution
-
-from ..palette import colours
-from ..plots import Ride
-from ..summary import COLUMNS, cell, remarks, stability, verdict_line
+from ...engines.engine import Trajectory
+from ...reference.surface import Surface, SurfaceOfRevolution
+from ..drawing import COLUMNS, Ride, cell, colours, remarks, stability, verdict_line
 from . import curves, plan, trust, words
 from .ink import css, dashes, on_paper
 
-_PARTS = files("reports.page")
+_PARTS = Path(__file__).parent
 
 
 def page(
@@ -42,7 +39,7 @@ def page(
     measured : mapping
         Metrics by engine name, as in ``metrics.json``.
     verdicts : sequence of mapping
-        As `scenarios.runner.judge` gives them.
+        As `velodrome.scenarios.run.runner.judge` gives them.
     trajectories : mapping of str to Trajectory
         By engine name, in the order of display; may be empty.
     surface : Surface

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from engines.engine import REFERENCE
-
-from ..palette import Colour
+from ...engines.engine import REFERENCE
+from ..drawing import Colour
 
 # WCAG 2.2, success criterion 1.4.11: what a reader must tell apart stands out from its ground by 3 to 1.
 CONTRAST = 3.0

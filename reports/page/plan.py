@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from engines.engine import Trajectory
-
-from ..ground import ground_of_ride
-from ..plots import Ride
+from ...engines.engine import Trajectory
+from ..drawing import Ride, ground_of_ride
 from .curves import rounded
 
 MOST = 1200  # points of a trail: some hundred a turn

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
-from engines.engine import REFERENCE
+from ...engines.engine import REFERENCE
 
-# One a column of `reports.summary.COLUMNS`.
+# One a column of `velodrome.reports.drawing.summary.COLUMNS`.
 MEANINGS = {
     "position_error": "Largest distance of the point D, on the steering axis, from where the reference has it at the "
     "same time.",

@@ -1,1 +1,25 @@
 """The commands of `velodrome`; each imports what it needs, and none of them waits for the others'."""
+
+from .check import check_command
+from .motions import atlas_command, circular_command, critical_command, families_command
+from .run import list_command, run_command
+from .stored import diff_command, view_command
+from .studies import paper_command, precision_command
+from .supervision import run_supervised
+from .sweep import sweep_command
+
+__all__ = [
+    "atlas_command",
+    "check_command",
+    "circular_command",
+    "critical_command",
+    "diff_command",
+    "families_command",
+    "list_command",
+    "paper_command",
+    "precision_command",
+    "run_command",
+    "run_supervised",
+    "sweep_command",
+    "view_command",
+]

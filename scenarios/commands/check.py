@@ -44,12 +44,18 @@ def check_command(
     """The drift gate: run the gated scenarios and hold them against the committed baselines."""
     from rich.console import Console
 
-    from reports.verdicts import UNFINISHED_JUNIT, UNFINISHED_MARKDOWN, junit_xml, markdown_page
-
-    from .. import gate, present
     from ..files import write_text
-    from ..installed import installed
-    from ..runner import configure
+    from ..gate import (
+        UNFINISHED_JUNIT,
+        UNFINISHED_MARKDOWN,
+        check,
+        junit_xml,
+        markdown_page,
+        refused_verdicts,
+        update_baselines,
+    )
+    from ..run import configure, installed
+    from . import present
 
     if reason is not None and not update:
         raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
@@ -61,7 +67,7 @@ def check_command(
     unfinished = _unfinished({junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN})
     with showing_traceback(traceback), unfinished, present.Progress() as progress:
         trace = print_traceback if traceback else None
-        verdicts, fresh = gate.check(progress.watch, scenario, engine, baselines, configure, trace, hold_cpu)
+        verdicts, fresh = check(progress.watch, scenario, engine, baselines, configure, trace, hold_cpu)
     for path, page in files:
         if path is not None:
             write_text(path, page(verdicts))
@@ -76,8 +82,8 @@ def check_command(
         ]
         if absent:
             raise ScenarioError(f"no baseline written: {absent[0].engine} {absent[0].reason}")
-        written = [str(path) for path in gate.update(fresh, verdicts, reason, baselines)]
-    refused = gate.refused(verdicts) if update else []
+        written = [str(path) for path in update_baselines(fresh, verdicts, reason, baselines)]
+    refused = refused_verdicts(verdicts) if update else []
     passes = not refused if update else all(verdict.passes for _, verdict in verdicts)
     with ending_with(0 if passes else 1):
         if as_json:

@@ -21,7 +21,7 @@ def circular_command(
     """One circular motion: its 21 constants, contact forces, eigenvalues, verdict on stability."""
     from rich.console import Console
 
-    from .. import present
+    from . import present
 
     angles, ground = angles_of(near), ground_of(alpha, surface)
     with present.working(STARTING):
@@ -42,8 +42,8 @@ def families_command(
     """The four solution families by continuation: special points, stable sections."""
     from rich.console import Console
 
-    from .. import present
-    from ..survey import families_document, write_families
+    from ..motions import families_document, write_families
+    from . import present
 
     ground = ground_of(alpha, surface)
     with present.working(STARTING):
@@ -61,8 +61,8 @@ def critical_command(as_json: Json = False) -> None:
     """The critical α: cusps collide, families merge, their last stable sections vanish."""
     from rich.console import Console
 
-    from .. import present
-    from ..survey import critical_document
+    from ..motions import critical_document
+    from . import present
 
     with present.Progress() as progress:
         document = critical_document(progress.watch)
@@ -84,8 +84,8 @@ def atlas_command(
     """Stability of all circular motions over alpha and rear rate: data, boundaries, figures (half a minute)."""
     from rich.console import Console
 
-    from .. import present
-    from ..atlas import make_atlas
+    from ..motions import make_atlas
+    from . import present
 
     with present.Progress() as progress:
         document = make_atlas(out, size, largest, lambda done: progress.watch("atlas", done, 1.0))

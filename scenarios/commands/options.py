@@ -17,7 +17,7 @@ import typer
 from ..error import ScenarioError
 
 if TYPE_CHECKING:
-    from reference.surface import Surface
+    from ...reference.surface import Surface
 
 STARTING = "computing the motion (the first time on a machine, kernels are compiled: half a minute)"
 
@@ -48,7 +48,7 @@ def changed(change: list[str] | None, duration: float | None) -> dict[str, Any]:
 
 def _assignment(text: str) -> tuple[str, Any]:
     """Split KEY=VALUE; the value is TOML, or a plain word."""
-    from ..table import read_toml, shown
+    from ..scenario import read_toml, shown
 
     key, equals, value = text.partition("=")
     key = key.strip()
@@ -71,7 +71,7 @@ def angles_of(text: str | None) -> tuple[float, float] | None:
     try:
         lean, steer = (float(part) for part in text.split(","))
     except ValueError:
-        from ..table import shown
+        from ..scenario import shown
 
         raise ScenarioError(f"--near {shown(text)}: must be two angles LEAN,STEER in rad, e.g. 0.74,2.84") from None
     return lean, steer
@@ -84,7 +84,7 @@ def ground_of(alpha: float | None, surface: str | None) -> Surface | float:
     if surface is None:
         assert alpha is not None
         return alpha
-    from ..surfaces import parse_surface
+    from ..scenario import parse_surface
 
     return parse_surface(surface)
 

@@ -23,15 +23,13 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..run_folder import Plan
-    from ..runner import Outcome
+    from ..run import Outcome, Plan
 
 
 def list_command(as_json: Json = False) -> None:
     """Scenarios of the library and installed engines."""
-    from engines.engine import load_engine
-
-    from ..installed import installed
+    from ...engines.engine import load_engine
+    from ..run import installed
     from ..scenario import library_names, load_scenario
 
     scenarios = []
@@ -86,9 +84,8 @@ def run_command(
     """Run scenarios in every engine from the same computed start and compare with the reference."""
     from rich.console import Console
 
-    from .. import present
-    from ..installed import installed
-    from ..runner import run
+    from ..run import installed, run
+    from . import present
 
     sources = [*(scenario or []), *(_tagged(tag) if tag is not None else [])]
     if not sources:
@@ -121,7 +118,7 @@ def _status_of(outcomes: Sequence[Outcome]) -> int:
 
 
 def _plan(source: str, changes: dict[str, Any], wanted: list[str] | None) -> Plan:
-    from ..runner import plan_run
+    from ..run import plan_run
     from ..scenario import load_scenario
 
     name, scenario = load_scenario(source, changes)

@@ -24,9 +24,9 @@ def diff_command(
     """Two stored runs of one scenario against each other: what moved by more than round-off."""
     from rich.console import Console
 
-    from ..diff import diff, read_pair, write_diff
-    from ..installed import installed
-    from ..present_diff import show_diff
+    from ..compare import diff, read_pair, write_diff
+    from ..run import installed
+    from .present_diff import show_diff
 
     installed()  # an engine that two packages announce is no fault of either run
     pair = read_pair(before, after, engine)
@@ -48,11 +48,11 @@ def view_command(
     ] = None,
 ) -> None:
     """A run's recording in the native viewer, or its report page in the browser, for this machine only."""
-    from .. import view
+    from ..view import open_native, serve
 
     if web:
-        view.serve(run_folder, port or 0, lambda address: print(f"{address}\nCtrl-C ends it", flush=True))
+        serve(run_folder, port or 0, lambda address: print(f"{address}\nCtrl-C ends it", flush=True))
     elif port is not None:
         raise ScenarioError("--port goes with --web")
     else:
-        view.open_native(run_folder)
+        open_native(run_folder)

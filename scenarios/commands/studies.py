@@ -28,18 +28,14 @@ def paper_command(
     """Every figure and printed number of Xiong et al. (2020), computed and held against the print."""
     from rich.console import Console
 
-    from reports.paper.ledger import document
-    from reports.paper.table import show_ledger
-
-    from .. import present
     from ..files import make_folder
-    from ..paper import ledger
-    from ..paper_figures import write_paper
+    from ..paper import document, make_ledger, show_ledger, write_paper
+    from . import present
 
     if out is not None:
         make_folder(out)  # before the work: half a minute of it would be for nothing
     with present.Progress() as progress:
-        lines = ledger(lambda part, done, parts: progress.watch(part, done, parts))
+        lines = make_ledger(lambda part, done, parts: progress.watch(part, done, parts))
         written = [] if out is None else write_paper(out, lines, progress.watch)
     found = document(lines)
     with ending_with(0 if found["holds"] else 1):
@@ -72,10 +68,10 @@ def precision_command(
     """Work-precision: error and CPU time over step sizes, observed order, limit, the engine's own eigenvalues."""
     from rich.console import Console
 
-    from .. import present
     from ..files import make_folder
-    from ..precision import all_ran, precision, write_precision
     from ..scenario import load_scenario
+    from ..studies import all_ran, precision, write_precision
+    from . import present
 
     changes = changed(change, duration)
     name, loaded = load_scenario(scenario, changes)

@@ -32,7 +32,7 @@ def sweep_command(
     as_json: Json = False,
 ) -> None:
     """Many runs over a grid, a list or a Latin hypercube, on local processes or a Dask cluster."""
-    from ..sweep.command import sweep
+    from .run_sweep import sweep
 
     status = sweep(file, scheduler, workers, out, resume, as_json, retry or [])
     if status:

@@ -6,13 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference.circular import REAR_SPEED, STEER
-from reference.critical import reconnections
-from reference.families import FAMILIES, trace
-from reference.special import SpecialPoint, special_points
-from reports.paper.ledger import Check, Line, above, below, equals, source, words
-
+from ...reference.circular import REAR_SPEED, STEER
+from ...reference.critical import reconnections
+from ...reference.families import FAMILIES, trace
+from ...reference.special import SpecialPoint, special_points
 from .evidence import Evidence, families_command
+from .ledger import Check, Line, above, below, equals, source, words
 from .profile import abscissa, apart, figure_coordinates, nearest
 from .search import search
 

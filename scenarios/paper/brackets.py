@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from reference.bicycle import Bicycle
-from reference.dae import contact_parameters
-from reference.kernels import dynamics as kernel
-from reference.kinematics import LEAN, REAR_ANGLE, STEER, constants
-from reference.surface import Paraboloid
+from ...reference.bicycle import Bicycle
+from ...reference.dae import contact_parameters
+from ...reference.kernels import dynamics as kernel
+from ...reference.kinematics import LEAN, REAR_ANGLE, STEER, constants
+from ...reference.surface import Paraboloid
 
 Field = Callable[[np.ndarray], np.ndarray]
 

@@ -6,11 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference.circular import LEAN, STEER, CircularMotion, newton, rear_rate_condition
-from reference.families import motions
-from reports.paper.ledger import Check, Line, Source, Threshold, above, below, figure, source, words
-
+from ...reference.circular import LEAN, STEER, CircularMotion, newton, rear_rate_condition
+from ...reference.families import motions
 from .evidence import Evidence
+from .ledger import Check, Line, Source, Threshold, above, below, figure, source, words
 
 NAMES = ("P1", "P2", "P3", "P4")
 _ROUND_OFF = 1e-14  # of numbers of order ten

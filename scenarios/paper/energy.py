@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from reference.circular import LEAN, CircularMotion
-from reference.continuation import Point, roots_along
-from reference.curve import sample
-from reference.families import Family
-from reference.sections import sample_family
+from ...reference.circular import LEAN, CircularMotion
+from ...reference.continuation import Point, roots_along
+from ...reference.curve import sample
+from ...reference.families import Family
+from ...reference.sections import sample_family
 
 
 def motion_of_energy(family: Family, energy: float, near: CircularMotion) -> CircularMotion:

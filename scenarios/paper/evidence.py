@@ -8,17 +8,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from reference.bicycle import Bicycle
-from reference.circular import LARGEST_RESIDUAL, SIGMA, CircularMotion, Steady
-from reference.critical import CriticalPoint, reconnections
-from reference.curve import Samples
-from reference.families import FAMILIES, Family, motions, trace
-from reference.sections import SectionEnd, sample_family, stable_sections
-from reference.special import SpecialPoint, special_points
-from reference.surface import Paraboloid
-from reports.paper import printed
-from reports.paper.ledger import Check
-
+from ...reference.bicycle import Bicycle
+from ...reference.circular import LARGEST_RESIDUAL, SIGMA, CircularMotion, Steady
+from ...reference.critical import CriticalPoint, reconnections
+from ...reference.curve import Samples
+from ...reference.families import FAMILIES, Family, motions, trace
+from ...reference.sections import SectionEnd, sample_family, stable_sections
+from ...reference.special import SpecialPoint, special_points
+from ...reference.surface import Paraboloid
+from .ledger import Check
+from .printed import printed
 from .search import OTHER_GRID, Found, missing, search
 
 LONGEST_STEP = 0.05  # of the arc: some 100 to 300 points a family, no stable section known is shorter than three
@@ -40,7 +39,7 @@ class Evidence:
     Attributes
     ----------
     figures : mapping
-        The printed figures, see `reports.paper.printed`.
+        The printed figures, see `velodrome.scenarios.paper.printed.printed`.
     bicycle : Bicycle
     """
 

@@ -1,7 +1,7 @@
 """Circular motions up to infinite speed, where weight no longer counts.
 
-Of the eight rows of `reference.kernels.circle` two hold accelerations. They are affine in sigma, A + sigma B, with
-A from the weight and B from the motion; the others do not depend on it. With sigma = tan(angle) they are
+Of the eight rows of `velodrome.reference.kernels.circle` two hold accelerations. They are affine in sigma, A + sigma B,
+with A from the weight and B from the motion; the others do not depend on it. With sigma = tan(angle) they are
 
     cos(angle) A + sin(angle) B = 0,
 
@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference.bicycle import Bicycle
-from reference.circular import LEAN, REAR_SPEED, Steady
-from reference.kernels.curve import CHOSEN
-from reference.kernels.steady import SIGMA_UNIT
-from reference.surface import Paraboloid
+from ...reference.bicycle import Bicycle
+from ...reference.circular import LEAN, REAR_SPEED, Steady
+from ...reference.kernels.curve import CHOSEN
+from ...reference.kernels.steady import SIGMA_UNIT
+from ...reference.surface import Paraboloid
 
 _ANGLE = 6  # where sigma stands among the nine unknowns
 _MOST = 40  # Newton steps

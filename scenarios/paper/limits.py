@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference.circular import LEAN, STEER, Steady, newton, unknown_condition
+from ...reference.circular import LEAN, STEER, Steady, newton, unknown_condition
 
 _NEAREST = 2e-3  # rad from +-pi/2: nearer, forces are so large that their round-off reaches the other rows
 _MOST = 40

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from reference.bicycle import Bicycle
-from reference.dae import consistent_state, dynamics
-from reference.surface import Plane
-from reports.paper.ledger import Check
+from ...reference.bicycle import Bicycle
+from ...reference.dae import consistent_state, dynamics
+from ...reference.surface import Plane
+from .ledger import Check
 
 _SIGNS = {"theta": 1, "psi": -1, "phi": 1, "psif": 1, "betar": 1, "betaf": 1}
 # Published with thirteen decimals, the state too: half a unit of the last, times slopes of some 100.

@@ -6,13 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference.circular import LEAN, REAR_SPEED, STEER
-from reference.continuation import sign_changes
-from reference.families import FAMILIES, Family, front_rate_slope, trace
-from reference.special import SpecialPoint, special_points, straight_motion
-from reports.paper.ledger import Check, Line, above, below, count, figure, source, untestable, words
-
+from ...reference.circular import LEAN, REAR_SPEED, STEER
+from ...reference.continuation import sign_changes
+from ...reference.families import FAMILIES, Family, front_rate_slope, trace
+from ...reference.special import SpecialPoint, special_points, straight_motion
 from .evidence import LONGEST_STEP, OTHER_STEP, Evidence, families_command
+from .ledger import Check, Line, above, below, count, figure, source, untestable, words
 from .limits import limit
 from .model import model_check
 from .search import search

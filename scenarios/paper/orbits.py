@@ -6,15 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference.circular import CONTACT, Steady
-from reference.contact import observe
-from reference.families import FAMILIES, trace
-from reference.kinematics import FRONT_ANGLE, LEAN, PITCH, REAR_ANGLE, STEER, YAW
-from reference.simulate import simulate
-from reference.surface import Paraboloid
-from reports.paper.ledger import Check, Line, above, below, source, words
-
+from ...reference.circular import CONTACT, Steady
+from ...reference.contact import observe
+from ...reference.families import FAMILIES, trace
+from ...reference.kinematics import FRONT_ANGLE, LEAN, PITCH, REAR_ANGLE, STEER, YAW
+from ...reference.simulate import simulate
+from ...reference.surface import Paraboloid
 from .evidence import Evidence, families_command
+from .ledger import Check, Line, above, below, source, words
 from .search import mirrored
 
 _STEADY = (LEAN, PITCH, STEER)

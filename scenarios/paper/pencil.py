@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigvals
 
-from reference.bicycle import Bicycle
-from reference.circular import CircularMotion
-from reference.dae import dynamics, residual
-from reference.kernels.steady import STEP
-from reference.kinematics import COORDINATES, YAW
-from reference.surface import SurfaceOfRevolution
+from ...reference.bicycle import Bicycle
+from ...reference.circular import CircularMotion
+from ...reference.dae import dynamics, residual
+from ...reference.kernels.steady import STEP
+from ...reference.kinematics import COORDINATES, YAW
+from ...reference.surface import SurfaceOfRevolution
 
 _CYCLIC = (YAW, 7, 8)
 _STILL = [k for k in range(len(COORDINATES)) if k not in _CYCLIC]

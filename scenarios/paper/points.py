@@ -6,14 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference.circular import CircularMotion
-from reference.kinematics import rotations
-from reference.stability import Linearisation, linearise
-from reference.surface import Paraboloid
-from reports.paper.ledger import Check, Line, above, below, figure, source, untestable, words
-
+from ...reference.circular import CircularMotion
+from ...reference.kinematics import rotations
+from ...reference.stability import Linearisation, linearise
+from ...reference.surface import Paraboloid
 from .configurations import circular_command, named_motion, own_errors, solved_point
 from .evidence import Evidence
+from .ledger import Check, Line, above, below, figure, source, untestable, words
 
 _STATES = (("x", "D's x in the heading frame"), ("y", "D's y"), ("lean", "lean"), ("steer", "steer"))
 

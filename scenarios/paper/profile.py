@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from reference.bicycle import Bicycle
-from reference.curve import Samples
+from ...reference.bicycle import Bicycle
+from ...reference.curve import Samples
 
 SPEED = 4.0  # m/s: the scale of the figures' abscissa, arctan(R_f wf / 4)
 

@@ -6,12 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference.circular import Steady
-from reference.families import FAMILIES, rear_rate_slope, trace
-from reports.paper.ledger import Check, Line, above, below, source, words
-
+from ...reference.circular import Steady
+from ...reference.families import FAMILIES, rear_rate_slope, trace
 from .evidence import Evidence
 from .fast import FlatEnd, at_angle, expand, follow_flat_end, solve, with_angle
+from .ledger import Check, Line, above, below, source, words
 
 _NEAREST = 1e-7  # rad from a lean of pi/2: nearer, round-off over the distance is no longer small
 _FAR = 1e4  # rad/s: a hundred times where the families' curves are cut off

@@ -6,14 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference.curve import sample
-from reference.families import FAMILIES, trace
-from reference.stability import linearise
-from reference.surface import Paraboloid
-from reports.paper.ledger import Check, Line, above, below, count, equals, source, words
-
+from ...reference.curve import sample
+from ...reference.families import FAMILIES, trace
+from ...reference.stability import linearise
+from ...reference.surface import Paraboloid
 from .configurations import circular_command, named_motion
 from .evidence import Evidence, families_command
+from .ledger import Check, Line, above, below, count, equals, source, words
 from .pencil import generalised_eigenvalues, linearised_dae, number_of_finite, spurious
 from .structure import GAP_ROWS, derivatives, rank
 

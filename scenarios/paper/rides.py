@@ -7,19 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference.bicycle import Bicycle
-from reference.circular import CircularMotion
-from reference.contact import observe
-from reference.dae import consistent_state
-from reference.kinematics import REAR_ANGLE
-from reference.simulate import Motion, simulate, simulate_modified_euler
-from reference.stability import independent, linearise
-from reference.surface import Paraboloid
-from reports.paper.ledger import Check, Line, above, below, source, words
-
+from ...reference.bicycle import Bicycle
+from ...reference.circular import CircularMotion
+from ...reference.contact import observe
+from ...reference.dae import consistent_state
+from ...reference.kinematics import REAR_ANGLE
+from ...reference.simulate import Motion, simulate, simulate_modified_euler
+from ...reference.stability import independent, linearise
+from ...reference.surface import Paraboloid
 from .configurations import named_motion
 from .energy import motion_of_energy
 from .evidence import Evidence
+from .ledger import Check, Line, above, below, source, words
 
 _OUTPUT = 0.05  # s
 _LEAVES = 0.01  # of the circle's radius

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference.anchors import above_ground, start_on_plane
-from reference.circular import (
+from ...reference.anchors import above_ground, start_on_plane
+from ...reference.circular import (
     LEAN,
     PITCH,
     REAR_SPEED,
@@ -19,8 +19,8 @@ from reference.circular import (
     rear_rate_condition,
     unknown_condition,
 )
-from reference.continuation import follow, sign_changes
-from reference.kernels.steady import STANDING, UNKNOWNS
+from ...reference.continuation import follow, sign_changes
+from ...reference.kernels.steady import STANDING, UNKNOWNS
 
 _MOST = 25  # Newton steps
 _SAME = 1e-5  # two solutions of one start's condition; each is known to round-off

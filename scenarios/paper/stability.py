@@ -7,17 +7,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from reference.circular import SIGMA, CircularMotion
-from reference.critical import CriticalPoint, last_stable
-from reference.curve import sample
-from reference.families import FAMILIES
-from reference.sections import SectionEnd, stable_sections
-from reference.special import special_points
-from reference.stability import Linearisation, growth_rate, linearise
-from reference.surface import Paraboloid
-from reports.paper.ledger import Check, Line, Source, Threshold, above, below, equals, source, words
-
+from ...reference.circular import SIGMA, CircularMotion
+from ...reference.critical import CriticalPoint, last_stable
+from ...reference.curve import sample
+from ...reference.families import FAMILIES
+from ...reference.sections import SectionEnd, stable_sections
+from ...reference.special import special_points
+from ...reference.stability import Linearisation, growth_rate, linearise
+from ...reference.surface import Paraboloid
 from .evidence import OTHER_STEP, Evidence, families_command
+from .ledger import Check, Line, Source, Threshold, above, below, equals, source, words
 from .profile import abscissa
 from .rides import disturbed_decay
 

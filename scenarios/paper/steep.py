@@ -6,16 +6,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference.circular import LEAN, REAR_SPEED, SIGMA, STEER
-from reference.critical import reconnections
-from reference.curve import sample
-from reference.families import FAMILIES, trace
-from reference.kernels.steady import STANDING
-from reports.paper.ledger import Check, Line, Source, above, below, count_by_cut, equals, source, words
-
+from ...reference.circular import LEAN, REAR_SPEED, SIGMA, STEER
+from ...reference.critical import reconnections
+from ...reference.curve import sample
+from ...reference.families import FAMILIES, trace
+from ...reference.kernels.steady import STANDING
 from .bowl import profiles
 from .evidence import Evidence, families_command
 from .fast import carry_pivot, pivot_at, squared_rates, with_angle
+from .ledger import Check, Line, Source, above, below, count_by_cut, equals, source, words
 from .limits import Limit, limit
 from .search import Found, coordinates, distance, search
 

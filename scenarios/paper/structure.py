@@ -7,17 +7,16 @@ from dataclasses import fields
 
 import numpy as np
 
-from reference.bicycle import Bicycle
-from reference.circular import Steady
-from reference.dae import consistent_state, dynamics, mass_matrix, residual
-from reference.families import FAMILIES
-from reference.kernels.steady import STEP
-from reference.kinematics import COORDINATES, YAW, angular_velocities, body_velocities, rotations
-from reference.surface import Paraboloid
-from reports.paper.ledger import Check, Line, below, count, equals, source, words
-
+from ...reference.bicycle import Bicycle
+from ...reference.circular import Steady
+from ...reference.dae import consistent_state, dynamics, mass_matrix, residual
+from ...reference.families import FAMILIES
+from ...reference.kernels.steady import STEP
+from ...reference.kinematics import COORDINATES, YAW, angular_velocities, body_velocities, rotations
+from ...reference.surface import Paraboloid
 from .brackets import growth
 from .evidence import Evidence
+from .ledger import Check, Line, below, count, equals, source, words
 
 CONTACT_ROWS, GAP_ROWS, ROLLING_ROWS = slice(9, 15), slice(15, 17), slice(17, 21)
 _BODIES, _HINGES = 4, 3

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from reports.paper.ledger import Line, untestable
-
 from .evidence import Evidence
+from .ledger import Line, untestable
 
 
 def unseen_lines(evidence: Evidence) -> Iterator[Line]:

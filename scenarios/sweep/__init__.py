@@ -1,1 +1,22 @@
 """Many runs: a sweep file, its tasks, worker processes or a Dask cluster, one data set."""
+
+from .cluster import on_cluster
+from .live import SweepView
+from .plan import plan_sweep
+from .rows import STATUSES
+from .run import Work, locally, run_sweep
+from .summary import resume_command, show_summary, status_of, summary
+
+__all__ = [
+    "STATUSES",
+    "SweepView",
+    "Work",
+    "locally",
+    "on_cluster",
+    "plan_sweep",
+    "resume_command",
+    "run_sweep",
+    "show_summary",
+    "status_of",
+    "summary",
+]

@@ -14,9 +14,8 @@ from concurrent.futures import CancelledError
 from functools import cache
 from typing import Any
 
-from scenarios.error import ScenarioError
-from scenarios.run_folder import library_versions
-
+from ..error import ScenarioError
+from ..run import library_versions
 from .plan import Task
 from .pool import Done, Pool, WorkersBroken
 from .run import Work

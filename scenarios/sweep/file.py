@@ -8,10 +8,9 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from engines.engine import REFERENCE
-from scenarios.error import ScenarioError
-from scenarios.scenario import Scenario, load_scenario, read_file, validate
-from scenarios.table import Table, one_line, read_toml, shown
+from ...engines.engine import REFERENCE
+from ..error import ScenarioError
+from ..scenario import Scenario, Table, load_scenario, one_line, read_file, read_toml, shown, validate
 
 _Range = Annotated[tuple[float, float], Field(strict=False)]  # TOML has arrays only
 _Values = Annotated[tuple[Any, ...], Field(strict=False, min_length=1)]

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from scenarios.error import ScenarioError
+from ..error import ScenarioError
 
 _BATCH, _WAIT = 200, 0.5  # rows, seconds: what a power failure may cost; a killed process costs none
 

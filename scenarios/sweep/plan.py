@@ -11,15 +11,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from engines.engine import REFERENCE, UnsuitableProblem, load_engine
-from scenarios.error import ScenarioError
-from scenarios.installed import installed
-from scenarios.run_folder import library_versions
-from scenarios.runner import configure
-from scenarios.scenario import Scenario
-from scenarios.start import make_start
-from scenarios.table import UnknownName, kinds, one_line, placed
-
+from ...engines.engine import REFERENCE, UnsuitableProblem, load_engine
+from ..error import ScenarioError
+from ..run import configure, installed, library_versions
+from ..scenario import Scenario, UnknownName, kinds, make_start, one_line, placed
 from .file import SweepFile, read_sweep
 from .points import count, points
 

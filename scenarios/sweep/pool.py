@@ -230,7 +230,12 @@ class Pool:
 
     def _started(self) -> _Worker:
         process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "scenarios.sweep.worker"],  # -P: no module of the folder it is run in
+            [
+                sys.executable,
+                "-P",
+                "-m",
+                "velodrome.scenarios.sweep.worker",
+            ],  # -P: no module of the folder it is run in
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

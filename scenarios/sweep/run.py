@@ -9,8 +9,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from scenarios.error import ScenarioError
-
+from ..error import ScenarioError
 from .journal import ForeignLine, Journal, Line, finished
 from .plan import Plan, Task
 from .pool import Done, Pool, WorkersBroken

@@ -13,11 +13,10 @@ from urllib.parse import quote
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from engines.files import whole
-from scenarios.error import ScenarioError
-from scenarios.files import make_folder, write_json
-from scenarios.stored import read_json
-
+from ...engines.files import whole
+from ..error import ScenarioError
+from ..files import make_folder, write_json
+from ..run import read_json
 from .journal import finished, line_at
 from .plan import Plan, canonical
 from .rows import TIMING, record, schema

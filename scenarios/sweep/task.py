@@ -12,15 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from engines.admission import ride
-from engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, why_failed
-from engines.guard import call_engine
-from scenarios.error import ScenarioError
-from scenarios.runner import claimed_noise, configure, measure_one
-from scenarios.scenario import OF_THE_MOTION, Scenario, validate
-from scenarios.start import Start, make_start
-from scenarios.table import placed
-
+from ...engines.admission import ride
+from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, why_failed
+from ...engines.guard import call_engine
+from ..error import ScenarioError
+from ..run import claimed_noise, configure, measure_one
+from ..scenario import OF_THE_MOTION, Scenario, Start, make_start, placed, validate
 from .plan import canonical, pruned
 from .rows import METRICS, REFUSED, flat, one_line
 

@@ -1,4 +1,4 @@
-"""A worker of a sweep: ``python -m scenarios.sweep.worker``, spoken to in lines of JSON.
+"""A worker of a sweep: ``python -m velodrome.scenarios.sweep.worker``, spoken to in lines of JSON.
 
 The process that is started loads and compiles everything once and then only keeps a child, a fork of itself
 that does the tasks. Whatever kills the child costs one task: the next child is there in milliseconds.
@@ -135,8 +135,7 @@ def _limit_memory(megabytes: float | None) -> None:
 
 def _warm() -> None:
     """Load what every task needs and compile the reference, or load what is compiled."""
-    from scenarios.scenario import load_scenario
-
+    from ..scenario import load_scenario
     from .task import Tasks
 
     _, scenario = load_scenario("q2", {"simulation.duration": 0.01})

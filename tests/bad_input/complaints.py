@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from scenarios.error import ScenarioError
+from velodrome.scenarios.error import ScenarioError
 
 PATIENCE = 5.0  # CPU time that an answer may take [s]
 # A path of 200 letters, the names of all parameters of a bicycle, and some words.

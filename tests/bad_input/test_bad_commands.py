@@ -14,7 +14,7 @@ from complaints import LONGEST, PATIENCE, is_one_line
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenarios import cli
+from velodrome.scenarios import cli
 
 NUMBERS = [
     "nan",

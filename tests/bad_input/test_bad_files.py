@@ -18,13 +18,14 @@ from complaints import is_one_line, refusing
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engines.engine import Trajectory
-from engines.storage import METADATA_KEY, read_trajectory
-from reports.drift import judge
-from scenarios import gate, view
-from scenarios.error import ScenarioError
-from scenarios.runner import plan_run, run
-from scenarios.scenario import load_scenario
+from velodrome.engines.engine import Trajectory
+from velodrome.engines.storage import METADATA_KEY, read_trajectory
+from velodrome.scenarios.error import ScenarioError
+from velodrome.scenarios.gate import checks as gate
+from velodrome.scenarios.gate.verdict import judge
+from velodrome.scenarios.run.runner import plan_run, run
+from velodrome.scenarios.scenario.schema import load_scenario
+from velodrome.scenarios.view import viewing as view
 
 NATIVE = "mujoco-native"
 VALUES: list[Any] = [

@@ -12,9 +12,9 @@ from complaints import refusing
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenarios.error import ScenarioError
-from scenarios.runner import plan_run
-from scenarios.scenario import LIBRARY, load_scenario
+from velodrome.scenarios.error import ScenarioError
+from velodrome.scenarios.run.runner import plan_run
+from velodrome.scenarios.scenario.schema import LIBRARY, load_scenario
 
 TEXTS = [(LIBRARY / f"{name}.toml").read_text(encoding="utf-8") for name in ("q2-plus", "sphere", "iftomm-1")]
 DEEP = 3000  # beyond Python's limit of recursion

@@ -11,23 +11,23 @@ from complaints import refusing
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engines.engine import engine_names, load_engine
-from reference.bicycle import Bicycle
-from reference.bowls import Cone, Sphere, Torus
-from reference.circular import LARGEST_RESIDUAL, CircularMotion
-from reference.contact import observe
-from reference.families import FAMILIES, find_motion, trace_all
-from reference.kernels.steady import STANDING
-from reference.kinematics import YAW
-from reference.profile import PolynomialProfile, SplineProfile
-from reference.simulate import simulate
-from reference.stability import growth_rate, linearise
-from reference.surface import Paraboloid, Plane, Surface, evaluate, has_tip
-from scenarios.error import ScenarioError
-from scenarios.runner import plan_run
-from scenarios.scenario import validate
-from scenarios.start import Start, make_start
-from scenarios.surfaces import FLATTEST, bowl
+from velodrome.engines.engine import engine_names, load_engine
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.bowls import Cone, Sphere, Torus
+from velodrome.reference.circular import LARGEST_RESIDUAL, CircularMotion
+from velodrome.reference.contact import observe
+from velodrome.reference.families import FAMILIES, find_motion, trace_all
+from velodrome.reference.kernels.steady import STANDING
+from velodrome.reference.kinematics import YAW
+from velodrome.reference.profile import PolynomialProfile, SplineProfile
+from velodrome.reference.simulate import simulate
+from velodrome.reference.stability import growth_rate, linearise
+from velodrome.reference.surface import Paraboloid, Plane, Surface, evaluate, has_tip
+from velodrome.scenarios.error import ScenarioError
+from velodrome.scenarios.run.runner import plan_run
+from velodrome.scenarios.scenario.schema import validate
+from velodrome.scenarios.scenario.start import Start, make_start
+from velodrome.scenarios.scenario.surfaces import FLATTEST, bowl
 
 PLANE = {"kind": "plane"}
 UPRIGHT = {"kind": "upright", "speed": 5.0}

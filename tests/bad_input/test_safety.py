@@ -18,16 +18,16 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
-from engines import engine as registry
-from reports.drift import Verdict
-from reports.precision_figure import precision_figure
-from reports.summary import summary
-from reports.verdicts import junit_xml, markdown_page
-from scenarios import view
-from scenarios.page_server import Content
-from scenarios.run_folder import new_folder
-from scenarios.runner import plan_run, run
-from scenarios.scenario import LIBRARY, load_scenario
+from velodrome.engines import engine as registry
+from velodrome.reports.drawing.summary import summary
+from velodrome.reports.figures.precision import precision_figure
+from velodrome.scenarios.gate.ci_files import junit_xml, markdown_page
+from velodrome.scenarios.gate.verdict import Verdict
+from velodrome.scenarios.run.folder import new_folder
+from velodrome.scenarios.run.runner import plan_run, run
+from velodrome.scenarios.scenario.schema import LIBRARY, load_scenario
+from velodrome.scenarios.view import viewing as view
+from velodrome.scenarios.view.server import Content
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("reference", "engines", "reports", "scenarios")
@@ -88,7 +88,7 @@ def test_a_scenarios_name_stays_inside_the_output_folder(stem: str, tmp_path: Pa
     "name", ["../x", "a/b", "/tmp/x", "..", ".", "", "a\\b", "a\nb", "a b", "-x", ".x", "é", "x" * 65]
 )
 def test_an_engines_name_leads_no_file_elsewhere(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    bad = EntryPoint(name=name, value="engines.lagrange:ENGINE", group=registry.ENTRY_POINT_GROUP)
+    bad = EntryPoint(name=name, value="velodrome.engines.lagrange:ENGINE", group=registry.ENTRY_POINT_GROUP)
     here = registry.entry_points(group=registry.ENTRY_POINT_GROUP)
     monkeypatch.setattr(registry, "entry_points", lambda group: [bad, *here])
     assert name not in registry.engine_names()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from reference.surface import surface_function
+from velodrome.reference.surface import surface_function
 
 
 @surface_function

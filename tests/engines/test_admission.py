@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engines import engine as registry
-from engines.admission import ride
-from engines.engine import SHAPES, EngineError, Problem, Settings, Trajectory, load_engine
-from engines.lagrange import ENGINE, LagrangeEngine
-from reference.bicycle import Bicycle
-from reference.families import find_motion
-from reference.surface import Paraboloid
+from velodrome.engines import engine as registry
+from velodrome.engines.admission import ride
+from velodrome.engines.engine import SHAPES, EngineError, Problem, Settings, Trajectory, load_engine
+from velodrome.engines.lagrange import ENGINE, LagrangeEngine
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.families import find_motion
+from velodrome.reference.surface import Paraboloid
 
 
 @cache
@@ -165,9 +165,9 @@ def test_a_ride_ends_before_its_first_state_that_is_not_finite() -> None:
     ("value", "words"),
     [
         ("no_such_package:ENGINE", "cannot be loaded: ModuleNotFoundError"),
-        ("engines.lagrange:NOTHING", "cannot be loaded: AttributeError"),
-        ("engines.lagrange:ORDER", "is no engine: it has no name"),
-        ("engines.lagrange:ENGINE", "calls itself 'reference'; both names must be the same"),
+        ("velodrome.engines.lagrange:NOTHING", "cannot be loaded: AttributeError"),
+        ("velodrome.engines.lagrange:ORDER", "is no engine: it has no name"),
+        ("velodrome.engines.lagrange:ENGINE", "calls itself 'reference'; both names must be the same"),
     ],
 )
 def test_what_is_announced_and_no_engine_is_refused(value: str, words: str, monkeypatch: pytest.MonkeyPatch) -> None:

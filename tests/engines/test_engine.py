@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from engines import engine as registry
-from engines import lagrange
-from engines.engine import REFERENCE, Problem, Trajectory, UnsuitableProblem, engine_names, load_engine
-from reference.bicycle import Bicycle
-from reference.families import find_motion
-from reference.surface import Paraboloid, Plane, SurfaceOfRevolution
+from velodrome.engines import engine as registry
+from velodrome.engines import lagrange
+from velodrome.engines.engine import REFERENCE, Problem, Trajectory, UnsuitableProblem, engine_names, load_engine
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.families import find_motion
+from velodrome.reference.surface import Paraboloid, Plane, SurfaceOfRevolution
 
 NAMES = engine_names()
 OPTIONAL = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
@@ -62,7 +62,7 @@ def test_an_unknown_engine_is_refused_with_those_that_there_are() -> None:
 
 def test_an_engine_of_another_package_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lagrange, "OWN", type("Own", (lagrange.LagrangeEngine,), {"name": "aaa"})(), raising=False)
-    own = EntryPoint("aaa", "engines.lagrange:OWN", registry.ENTRY_POINT_GROUP)
+    own = EntryPoint("aaa", "velodrome.engines.lagrange:OWN", registry.ENTRY_POINT_GROUP)
     here = registry.entry_points(group=registry.ENTRY_POINT_GROUP)
     monkeypatch.setattr(registry, "entry_points", lambda group: [own, *here])
     assert engine_names() == [REFERENCE, "aaa", *NAMES[1:]]
@@ -74,7 +74,7 @@ def announced_by(package: str, folder: Path) -> Distribution:
     info = folder / f"{package}-1.0.dist-info"
     info.mkdir(parents=True)
     (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[velodrome.engines]\naaa = engines.lagrange:OWN\n")
+    (info / "entry_points.txt").write_text("[velodrome.engines]\naaa = velodrome.engines.lagrange:OWN\n")
     return Distribution.at(info)
 
 

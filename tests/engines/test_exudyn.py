@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from engines.engine import EngineError, Problem, Trajectory, load_engine
-from reference.bicycle import Bicycle
-from reference.dae import consistent_state
-from reference.rim import rim_search
-from reference.simulate import Motion, simulate
-from reference.surface import Paraboloid, Plane, Surface, SurfaceFunction, surface_function
+from velodrome.engines.engine import EngineError, Problem, Trajectory, load_engine
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.dae import consistent_state
+from velodrome.reference.rim import rim_search
+from velodrome.reference.simulate import Motion, simulate
+from velodrome.reference.surface import Paraboloid, Plane, Surface, SurfaceFunction, surface_function
 
 ENGINE = load_engine("exudyn")
 RATE = 18.0  # rear wheel [rad/s]: the fastest rate of the motions below
@@ -124,7 +124,7 @@ def test_energy_error_falls_with_the_square_of_the_step(duration):
 
 
 def test_contact_points_are_those_of_the_reference():
-    from reference.contact import observe
+    from velodrome.reference.contact import observe
 
     task, result = bowl(SHORT), bowl_run(SHORT, 1e-3)
     seen = observe(task.bicycle, task.surface, result.q, result.qd)
@@ -179,7 +179,7 @@ def test_any_bicycle_on_any_surface():
 
 def test_kernel_rows_are_derivatives():
     """Normal row = gradient of the gap; all rows = velocity of the rim's material point in the contact frame."""
-    from engines.exudyn import kernel
+    from velodrome.engines.exudyn import kernel
 
     function, parameters = _waves.real, Waves.parameters
     looking = rim_search(Waves(), [0.3])
@@ -300,6 +300,6 @@ def test_interrupt_gets_out():
 
 
 def test_library_is_imported_only_to_run():
-    load = "import sys; from engines.engine import load_engine; load_engine('exudyn').version"
+    load = "import sys; from velodrome.engines.engine import load_engine; load_engine('exudyn').version"
     check = f"{load}; assert 'exudyn' not in sys.modules"
     subprocess.run([sys.executable, "-c", check], check=True)

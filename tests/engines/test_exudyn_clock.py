@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 from exudyn.itemInterface import MassPoint, NodePoint, SensorBody
 
-from engines.admission import ride
-from engines.engine import Problem, Trajectory
-from engines.exudyn import kernel
-from engines.exudyn.engine import BUILTIN, ENGINE, PLANE_NORMAL, ExudynEngine
-from engines.exudyn.method import generalized_alpha
-from engines.exudyn.results import weights
-from engines.exudyn.settings import SolverSettings
-from engines.exudyn.solve import Integration, integrate, silent
-from reference.bicycle import Bicycle
-from reference.contact import observe
-from reference.dae import consistent_state
-from reference.rim import rim_search
-from reference.simulate import simulate
-from reference.surface import Paraboloid, Plane, Surface, SurfaceFunction, surface_function
+from velodrome.engines.admission import ride
+from velodrome.engines.engine import Problem, Trajectory
+from velodrome.engines.exudyn import kernel
+from velodrome.engines.exudyn.engine import BUILTIN, ENGINE, PLANE_NORMAL, ExudynEngine
+from velodrome.engines.exudyn.method import generalized_alpha
+from velodrome.engines.exudyn.results import weights
+from velodrome.engines.exudyn.settings import SolverSettings
+from velodrome.engines.exudyn.solve import Integration, integrate, silent
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.contact import observe
+from velodrome.reference.dae import consistent_state
+from velodrome.reference.rim import rim_search
+from velodrome.reference.simulate import simulate
+from velodrome.reference.surface import Paraboloid, Plane, Surface, SurfaceFunction, surface_function
 
 ENGINES = [ENGINE, PLANE_NORMAL, BUILTIN]
 ROUND_OFF = 2.0**-52
@@ -67,7 +67,7 @@ def test_every_sample_of_a_long_ride_is_where_its_time_says():
 
 
 def test_the_library_s_own_sensors_leave_out_a_sample():
-    """As long as this passes, `engines.exudyn.solve` has to tell the samples."""
+    """As long as this passes, `velodrome.engines.exudyn.solve` has to tell the samples."""
     assert len(falling_point(STEP)) == STEPS, f"Exudyn {exu.__version__} has mended this"
 
 

@@ -10,13 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from engines.engine import Problem
-from engines.exudyn.engine import BUILTIN
-from engines.exudyn.solve import silent
-from reference.bicycle import Bicycle
-from reference.dae import consistent_state
-from reference.simulate import simulate
-from reference.surface import Plane
+from velodrome.engines.engine import Problem
+from velodrome.engines.exudyn.engine import BUILTIN
+from velodrome.engines.exudyn.solve import silent
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.dae import consistent_state
+from velodrome.reference.simulate import simulate
+from velodrome.reference.surface import Plane
 
 SCRIPT = SimpleNamespace(
     **runpy.run_path(str(Path(__file__).parents[2] / "examples" / "exudyn_contact_forces.py"), run_name="example")

@@ -13,11 +13,11 @@ import pytest
 from exudyn.itemInterface import SensorBody
 from exudyn.rigidBodyUtilities import InertiaCylinder
 
-from engines.exudyn.joint import CreateRollingJointOnSurface
-from engines.exudyn.sensor import CreateRollingJointSensor
-from engines.exudyn.solve import silent
-from reference.bowls import Sphere
-from reference.surface import Paraboloid, Plane, evaluate
+from velodrome.engines.exudyn.joint import CreateRollingJointOnSurface
+from velodrome.engines.exudyn.sensor import CreateRollingJointSensor
+from velodrome.engines.exudyn.solve import silent
+from velodrome.reference.bowls import Sphere
+from velodrome.reference.surface import Paraboloid, Plane, evaluate
 
 EXAMPLE = SimpleNamespace(
     **runpy.run_path(str(Path(__file__).parents[2] / "examples" / "rolling_disc_in_bowl.py"), run_name="example")

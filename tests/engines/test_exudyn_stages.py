@@ -9,20 +9,20 @@ import exudyn as exu
 import numpy as np
 import pytest
 
-from engines.convergence import extrapolate
-from engines.engine import Problem, Trajectory
-from engines.exudyn.engine import ENGINE
-from engines.exudyn.model import Model, build_model, read_motion
-from engines.exudyn.solve import Integration, integrate, silent
-from engines.exudyn.wheels import constrain
-from engines.steady import steady_trajectory
-from reference.bicycle import Bicycle
-from reference.circular import CircularMotion
-from reference.dae import consistent_state, dynamics
-from reference.families import find_motion
-from reference.kinematics import angular_velocities, body_positions, body_velocities, rotations
-from reference.simulate import Motion, simulate
-from reference.surface import Paraboloid
+from velodrome.engines.engine import Problem, Trajectory
+from velodrome.engines.exudyn.engine import ENGINE
+from velodrome.engines.exudyn.model import Model, build_model, read_motion
+from velodrome.engines.exudyn.solve import Integration, integrate, silent
+from velodrome.engines.exudyn.wheels import constrain
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.circular import CircularMotion
+from velodrome.reference.dae import consistent_state, dynamics
+from velodrome.reference.families import find_motion
+from velodrome.reference.kinematics import angular_velocities, body_positions, body_velocities, rotations
+from velodrome.reference.simulate import Motion, simulate
+from velodrome.reference.surface import Paraboloid
+from velodrome.reports.measure.convergence import extrapolate
+from velodrome.reports.measure.steady import steady_trajectory
 
 BICYCLE, BOWL = Bicycle(), Paraboloid(0.005)
 RATE = 18.0  # rear wheel of Q2 [rad/s], its fastest rate

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from engines.convergence import extrapolate
-from engines.engine import Problem, Trajectory
-from engines.exudyn.engine import BUILTIN, ENGINE, PLANE_NORMAL, ExudynEngine
-from reference.bicycle import Bicycle
-from reference.dae import consistent_state
-from reference.simulate import Motion, simulate
-from reference.surface import Paraboloid, Plane, Surface
+from velodrome.engines.engine import Problem, Trajectory
+from velodrome.engines.exudyn.engine import BUILTIN, ENGINE, PLANE_NORMAL, ExudynEngine
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.dae import consistent_state
+from velodrome.reference.simulate import Motion, simulate
+from velodrome.reference.surface import Paraboloid, Plane, Surface
+from velodrome.reports.measure.convergence import extrapolate
 
 RATE = 18.0  # rear wheel [rad/s], the fastest rate
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engines import guard
-from engines.engine import EngineError, Problem, load_engine, why_failed
-from engines.guard import GuardedEngine, call_engine, where_raised
-from reference.bicycle import Bicycle
-from reference.surface import Plane
+from velodrome.engines import guard
+from velodrome.engines.engine import EngineError, Problem, load_engine, why_failed
+from velodrome.engines.guard import GuardedEngine, call_engine, where_raised
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.surface import Plane
 
 PROBLEM = Problem(Bicycle(), Plane(), np.zeros(9), np.zeros(9), np.zeros(1))
 

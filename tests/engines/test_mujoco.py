@@ -14,20 +14,20 @@ from pydantic import ValidationError
 from ripples import Ripples
 from scipy.optimize import root
 
-from engines.engine import EngineError, Problem, Trajectory
-from engines.mujoco.creep import contact_acceleration
-from engines.mujoco.native import ENGINE
-from engines.mujoco.planes import build
-from engines.mujoco.ride import Rig
-from engines.mujoco.settings import IMPEDANCES
-from engines.mujoco.state import HINGES, from_mujoco, spin_matrix, to_mujoco
-from engines.mujoco.study import slip_power
-from reference.bicycle import Bicycle
-from reference.contact import observe
-from reference.dae import consistent_state, dynamics
-from reference.kernels import dynamics as kernel
-from reference.kinematics import body_positions, constants, quaternions, rotations
-from reference.surface import Paraboloid, Plane, Surface
+from benchmarks.mujoco_settings.creep import contact_acceleration
+from benchmarks.mujoco_settings.study import slip_power
+from velodrome.engines.engine import EngineError, Problem, Trajectory
+from velodrome.engines.mujoco.native import ENGINE
+from velodrome.engines.mujoco.planes import build
+from velodrome.engines.mujoco.ride import Rig
+from velodrome.engines.mujoco.settings import IMPEDANCES
+from velodrome.engines.mujoco.state import HINGES, from_mujoco, spin_matrix, to_mujoco
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.contact import observe
+from velodrome.reference.dae import consistent_state, dynamics
+from velodrome.reference.kernels import dynamics as kernel
+from velodrome.reference.kinematics import body_positions, constants, quaternions, rotations
+from velodrome.reference.surface import Paraboloid, Plane, Surface
 
 BOWL = Paraboloid(1 / 200)
 # Q2's spectrum: the fastest mode decays at 12.3 1/s, the weave turns at 6.7 rad/s; the wheels spin at 18 rad/s.
@@ -397,7 +397,8 @@ def test_progress_and_interrupt(q2):
 
 
 def test_listing_does_not_load_mujoco():
-    code = "import sys; from engines.mujoco.native import ENGINE; ENGINE.version; sys.exit('mujoco' in sys.modules)"
+    code = "from velodrome.engines.mujoco.native import ENGINE; ENGINE.version; "
+    code += "import sys; sys.exit('mujoco' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from mujoco.introspect import structs
 
-from engines.engine import EngineError
-from engines.mujoco import layout
-from engines.mujoco.knife_edge import knife_edges, rolling_forces, standing
-from engines.mujoco.library import collision_slot
-from engines.mujoco.rolling_disc import TOUCHING, disc_mjcf, steady_state
-from reference.surface import Paraboloid, Plane
+from velodrome.engines.engine import EngineError
+from velodrome.engines.mujoco import layout
+from velodrome.engines.mujoco.knife_edge import knife_edges, rolling_forces, standing
+from velodrome.engines.mujoco.library import collision_slot
+from velodrome.engines.mujoco.rolling_disc import TOUCHING, disc_mjcf, steady_state
+from velodrome.reference.surface import Paraboloid, Plane
 
 
 def disc(xml: str = disc_mjcf(0.002)) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -184,7 +184,8 @@ def test_another_function_gives_an_error(unknown_layout, monkeypatch):
 
 def test_listing_the_ladder_does_not_load_mujoco():
     code = (
-        "import sys; from engines.mujoco import default, native, exact_contact, multipliers as m; m.ENGINE.version; "
-        "sys.exit('mujoco' in sys.modules or 'numba' in sys.modules and 'engines.mujoco.compiled' in sys.modules)"
+        "from velodrome.engines.mujoco import default, native, exact_contact, multipliers as m; m.ENGINE.version; "
+        "import sys; "
+        "sys.exit(any(name in sys.modules for name in ('mujoco', 'velodrome.engines.mujoco.compiled')))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

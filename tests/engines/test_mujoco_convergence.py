@@ -10,23 +10,23 @@ import mujoco
 import numpy as np
 import pytest
 
-from engines.engine import EngineError, Problem, Trajectory
-from engines.lagrange import ENGINE as REFERENCE
-from engines.mujoco import default, edges, exact_contact, multipliers, native
-from engines.mujoco.convergence import watched
-from engines.mujoco.knife_edge import knife_edges, standing, stiffen
-from engines.mujoco.ride import start
-from engines.mujoco.settings import (
+from velodrome.engines.engine import EngineError, Problem, Trajectory
+from velodrome.engines.lagrange import ENGINE as REFERENCE
+from velodrome.engines.mujoco import default, edges, exact_contact, multipliers, native
+from velodrome.engines.mujoco.convergence import watched
+from velodrome.engines.mujoco.knife_edge import knife_edges, standing, stiffen
+from velodrome.engines.mujoco.ride import start
+from velodrome.engines.mujoco.settings import (
     WRONG,
     ContactSettings,
     DefaultSettings,
     ExactContactSettings,
     NativeSettings,
 )
-from reference.bicycle import Bicycle
-from reference.dae import consistent_state
-from reference.families import find_motion
-from reference.surface import Paraboloid, Plane
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.dae import consistent_state
+from velodrome.reference.families import find_motion
+from velodrome.reference.surface import Paraboloid, Plane
 
 # Straight ahead with a small roll rate: (speed [m/s], lean rate [rad/s]). There a wheel's friction is next to nothing,
 # and from where the solver stands sliding and sticking are a hair apart.

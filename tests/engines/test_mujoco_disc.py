@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from engines.mujoco.rolling_disc import ACROSS, AXIAL, GRAVITY, MASS, RADIUS, main, roll, steady_state
-from reference.surface import Paraboloid, Plane
+from velodrome.engines.mujoco.rolling_disc import ACROSS, AXIAL, GRAVITY, MASS, RADIUS, main, roll, steady_state
+from velodrome.reference.surface import Paraboloid, Plane
 
 
 def test_steady_state_balances_its_moments():

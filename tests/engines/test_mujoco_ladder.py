@@ -12,23 +12,23 @@ import pytest
 from pydantic import ValidationError
 from ripples import Ripples
 
-from engines.engine import EngineError, Problem, Trajectory
-from engines.friction import cone_is_left, required_friction
-from engines.identify import identify
-from engines.lagrange import ENGINE as REFERENCE
-from engines.mujoco import default, exact_contact, multipliers, native
-from engines.mujoco.edges import build_contacts
-from engines.mujoco.ride import start
-from engines.mujoco.settings import ExactContactSettings, MultiplierSettings
-from engines.mujoco.state import to_mujoco
-from engines.mujoco.study import LADDER, drift_study, plain_step_cost
-from reference.bicycle import Bicycle
-from reference.dae import consistent_state
-from reference.families import find_motion
-from reference.kernels.dynamics import energies
-from reference.kinematics import constants
-from reference.stability import growth_rate, linearise
-from reference.surface import Paraboloid, Plane, Surface
+from benchmarks.mujoco_settings.study import LADDER, drift_study, plain_step_cost
+from velodrome.engines.engine import EngineError, Problem, Trajectory
+from velodrome.engines.lagrange import ENGINE as REFERENCE
+from velodrome.engines.mujoco import default, exact_contact, multipliers, native
+from velodrome.engines.mujoco.edges import build_contacts
+from velodrome.engines.mujoco.ride import start
+from velodrome.engines.mujoco.settings import ExactContactSettings, MultiplierSettings
+from velodrome.engines.mujoco.state import to_mujoco
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.dae import consistent_state
+from velodrome.reference.families import find_motion
+from velodrome.reference.kernels.dynamics import energies
+from velodrome.reference.kinematics import constants
+from velodrome.reference.stability import growth_rate, linearise
+from velodrome.reference.surface import Paraboloid, Plane, Surface
+from velodrome.reports.measure.friction import cone_is_left, required_friction
+from velodrome.reports.measure.identify import identify
 
 ROUND_OFF = 2.0**-52
 # Circular motions: (alpha, rear rate, family, near). At 1/200 stable, at 1/20 and 1/5 unstable.

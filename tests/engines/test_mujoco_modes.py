@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engines.engine import Problem
-from engines.identify import Identified, identify
-from engines.mujoco import default, exact_contact, multipliers, native
-from engines.mujoco.engine import MujocoEngine
-from reference.bicycle import Bicycle
-from reference.dae import consistent_state
-from reference.families import find_motion
-from reference.stability import Linearisation, linearise
-from reference.surface import Paraboloid, Plane
-from reports.precision import match
+from velodrome.engines.engine import Problem
+from velodrome.engines.mujoco import default, exact_contact, multipliers, native
+from velodrome.engines.mujoco.engine import MujocoEngine
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.dae import consistent_state
+from velodrome.reference.families import find_motion
+from velodrome.reference.stability import Linearisation, linearise
+from velodrome.reference.surface import Paraboloid, Plane
+from velodrome.reports.measure.identify import Identified, identify
+from velodrome.reports.measure.precision import match
 
 # Meijaard et al. 2007, Table 2, at 4.6 m/s, with more digits from the linearised equations.
 WEAVE = -0.37796622642237 + 3.87284190914j

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from engines.engine import Trajectory
-from engines.storage import METADATA_KEY, columns, read_trajectory, write_trajectory
+from velodrome.engines.engine import Trajectory
+from velodrome.engines.storage import METADATA_KEY, columns, read_trajectory, write_trajectory
 
 OPTIONAL = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
 SHAPES = {

@@ -17,15 +17,15 @@ from typing import Any
 import pytest
 import typer
 
-from engines import engine as registry
-from engines.engine import engine_names, load_engine
-from reference.surface import is_level
-from reports.drift import RIDE_QUANTITIES, SHOWN
-from scenarios import gate
-from scenarios.cli import app
-from scenarios.runner import configure, plan_run, run
-from scenarios.scenario import load_scenario
-from scenarios.start import make_start
+from velodrome.engines import engine as registry
+from velodrome.engines.engine import engine_names, load_engine
+from velodrome.reference.surface import is_level
+from velodrome.scenarios.cli import app
+from velodrome.scenarios.gate import checks as gate
+from velodrome.scenarios.gate.verdict import RIDE_QUANTITIES, SHOWN
+from velodrome.scenarios.run.runner import configure, plan_run, run
+from velodrome.scenarios.scenario.schema import load_scenario
+from velodrome.scenarios.scenario.start import make_start
 
 SUITE = Path(__file__).parents[2]
 EXAMPLE = SUITE / "examples" / "velodrome-symbrim"
@@ -113,14 +113,14 @@ def test_the_guides_smallest_engine_runs_and_gives_only_what_it_has(own: str, tm
 
 def test_the_guides_smallest_engine_is_gated(own: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Its rides stand for all: orders and eigenvalues take the longest.
-    monkeypatch.setattr("scenarios.gate_sample._eigenvalues", lambda *_: {})
+    monkeypatch.setattr("velodrome.scenarios.gate.sample._eigenvalues", lambda *_: {})
 
     def check(**settings: float) -> list[Any]:
         found = gate.check(
             lambda *_: None, ["plane-circle"], [own], tmp_path, lambda n, v: configure(n, {**v, **settings})
         )
         if not (tmp_path / "plane-circle.json").exists():
-            gate.update(found[1], found[0], "first", tmp_path)
+            gate.update_baselines(found[1], found[0], "first", tmp_path)
         return [verdict for _, verdict in found[0]]
 
     assert [verdict.status for verdict in check()] == ["missing"]
@@ -184,7 +184,8 @@ def test_two_derivations_of_the_bicycle_agree(installed: tuple[Path, str]) -> No
         # Both motions are stable: an error of the speed by a step leads astray in proportion to the time left.
         speed, duration = float(abs(start.problem.qd[:2]).max()), float(start.problem.times[-1])
         assert measured["position_error"]["max"] < noise * (1 + speed) * duration
-        # Forces follow accelerations, as sensitive as the square of the fastest rate; see `reports.limits`.
+        # Forces follow accelerations, as sensitive as the square of the fastest rate; see
+        # `velodrome.reports.measure.limits`.
         assert measured["contact_force_error"] < noise * rate**2 * start.size / start.problem.bicycle.gravity
 
 

@@ -5,12 +5,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from reference.atlas import Atlas, Boundary, atlas, spacing
-from reference.bicycle import Bicycle
-from reference.families import FAMILIES, find_motion, trace
-from reference.sections import stable_sections
-from reference.stability import growth_rate, linearise
-from reference.surface import Paraboloid
+from velodrome.reference.atlas import Atlas, Boundary, atlas, spacing
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.families import FAMILIES, find_motion, trace
+from velodrome.reference.sections import stable_sections
+from velodrome.reference.stability import growth_rate, linearise
+from velodrome.reference.surface import Paraboloid
 
 BICYCLE = Bicycle()
 ALPHAS = (0.0, 0.005, 0.009, 0.02, 0.0333, 0.05, 0.3, 0.44, 0.5)

@@ -4,9 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reference.bicycle import BODIES, Bicycle
-from reference.kinematics import constants
 from tests.literature import published
+from velodrome.reference.bicycle import BODIES, Bicycle
+from velodrome.reference.kinematics import constants
 
 TABLE = published("meijaard2007")["parameters"]
 

@@ -10,17 +10,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference.bicycle import Bicycle
-from reference.bowls import Cone, Sphere, Torus
-from reference.circular import CircularMotion
-from reference.contact import observe
-from reference.dae import consistent_state
-from reference.families import FAMILIES, find_motion, trace
-from reference.kinematics import LEAN, REAR_ANGLE, STEER, YAW
-from reference.profile import PolynomialProfile, Profile, SplineProfile, profile_function
-from reference.simulate import simulate
-from reference.stability import free_eigenvalues, linearise
-from reference.surface import Paraboloid, Plane, Surface, SurfaceOfRevolution, evaluate, is_level
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.bowls import Cone, Sphere, Torus
+from velodrome.reference.circular import CircularMotion
+from velodrome.reference.contact import observe
+from velodrome.reference.dae import consistent_state
+from velodrome.reference.families import FAMILIES, find_motion, trace
+from velodrome.reference.kinematics import LEAN, REAR_ANGLE, STEER, YAW
+from velodrome.reference.profile import PolynomialProfile, Profile, SplineProfile, profile_function
+from velodrome.reference.simulate import simulate
+from velodrome.reference.stability import free_eigenvalues, linearise
+from velodrome.reference.surface import Paraboloid, Plane, Surface, SurfaceOfRevolution, evaluate, is_level
 
 BICYCLE = Bicycle()
 STEP = 1e-30

@@ -3,18 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reference.anchors import anchor, start_on_plane
-from reference.bicycle import Bicycle
-from reference.circular import (
-    Steady,
-    nearest_condition,
-    newton,
-)
-from reference.continuation import follow
-from reference.dae import dynamics, residual
-from reference.families import find_motion, motions
-from reference.surface import Paraboloid
 from tests.literature import published, rounds_to
+from velodrome.reference.anchors import anchor, start_on_plane
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.circular import Steady, nearest_condition, newton
+from velodrome.reference.continuation import follow
+from velodrome.reference.dae import dynamics, residual
+from velodrome.reference.families import find_motion, motions
+from velodrome.reference.surface import Paraboloid
 
 BICYCLE = Bicycle()
 PRINTED = published("xiong2020")

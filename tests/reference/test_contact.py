@@ -4,12 +4,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from reference.bicycle import Bicycle
-from reference.contact import observe
-from reference.dae import consistent_state, contact_parameters, residual
-from reference.kernels import dynamics as kernel
-from reference.kinematics import constants, rotations
-from reference.surface import Paraboloid, Plane, evaluate
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.contact import observe
+from velodrome.reference.dae import consistent_state, contact_parameters, residual
+from velodrome.reference.kernels import dynamics as kernel
+from velodrome.reference.kinematics import constants, rotations
+from velodrome.reference.surface import Paraboloid, Plane, evaluate
 
 BICYCLE = Bicycle()
 states = st.tuples(st.floats(-0.9, 0.9), st.floats(-1.2, 1.2), st.floats(-1, 1), st.floats(-1, 1))

@@ -2,11 +2,11 @@
 
 import pytest
 
-from reference.bicycle import Bicycle
-from reference.critical import CriticalPoint, last_stable, reconnections
-from reference.families import find_motion, trace
-from reference.sections import stable_sections
-from reference.surface import Paraboloid
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.critical import CriticalPoint, last_stable, reconnections
+from velodrome.reference.families import find_motion, trace
+from velodrome.reference.sections import stable_sections
+from velodrome.reference.surface import Paraboloid
 
 BICYCLE = Bicycle()
 

@@ -7,22 +7,22 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from reference.bicycle import Bicycle
-from reference.circular import REAR_SPEED
-from reference.contact import observe
-from reference.continuation import follow
-from reference.curve import sample
-from reference.families import FAMILIES, Family, trace
-from reference.kernels import dynamics as full
-from reference.kernels.circle import STEP
-from reference.kernels.curve import CHOSEN
-from reference.kernels.pose import aligned
-from reference.kernels.reduced import FRONT, REAR, reduced_jacobian
-from reference.kinematics import constants
-from reference.sections import sample_family
-from reference.stability import linearise
-from reference.surface import Paraboloid
 from tests.reference.test_lean import BICYCLES, ROUND_OFF, SURFACES, conditioning, riding, states
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.circular import REAR_SPEED
+from velodrome.reference.contact import observe
+from velodrome.reference.continuation import follow
+from velodrome.reference.curve import sample
+from velodrome.reference.families import FAMILIES, Family, trace
+from velodrome.reference.kernels import dynamics as full
+from velodrome.reference.kernels.circle import STEP
+from velodrome.reference.kernels.curve import CHOSEN
+from velodrome.reference.kernels.pose import aligned
+from velodrome.reference.kernels.reduced import FRONT, REAR, reduced_jacobian
+from velodrome.reference.kinematics import constants
+from velodrome.reference.sections import sample_family
+from velodrome.reference.stability import linearise
+from velodrome.reference.surface import Paraboloid
 
 BICYCLE = Bicycle()
 CURVES = [(0.0, 1), (0.0, 2), (0.005, 2), (0.005, 4), (0.2, 3), (0.5, 2), (1.0, 1)]

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference.bicycle import BODIES, Bicycle
-from reference.contact import observe
-from reference.dae import consistent_state, dynamics, mass_matrix, residual
-from reference.kernels import dynamics as kernel
-from reference.kinematics import constants
-from reference.surface import Paraboloid, Plane
 from tests.literature import published
+from velodrome.reference.bicycle import BODIES, Bicycle
+from velodrome.reference.contact import observe
+from velodrome.reference.dae import consistent_state, dynamics, mass_matrix, residual
+from velodrome.reference.kernels import dynamics as kernel
+from velodrome.reference.kinematics import constants
+from velodrome.reference.surface import Paraboloid, Plane
 
 BICYCLE = Bicycle()
 angle = st.floats(-1.3, 1.3)

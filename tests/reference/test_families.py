@@ -5,17 +5,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from reference.anchors import anchor, static_equilibria
-from reference.bicycle import Bicycle
-from reference.circular import LEAN, REAR_SPEED, SIGMA, STEER, Steady
-from reference.continuation import FARTHEST, LARGEST_LEAN, LARGEST_SIGMA, crossings, root_between
-from reference.families import FAMILIES, Family, find_motion, front_rate_slope, motions, trace, trace_all
-from reference.modes import modes
-from reference.profile import SplineProfile
-from reference.sections import growth_along, sample_family, stable_sections
-from reference.special import SpecialPoint, special_points
-from reference.surface import Paraboloid
 from tests.literature import published, rounds_to
+from velodrome.reference.anchors import anchor, static_equilibria
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.circular import LEAN, REAR_SPEED, SIGMA, STEER, Steady
+from velodrome.reference.continuation import FARTHEST, LARGEST_LEAN, LARGEST_SIGMA, crossings, root_between
+from velodrome.reference.families import FAMILIES, Family, find_motion, front_rate_slope, motions, trace, trace_all
+from velodrome.reference.modes import modes
+from velodrome.reference.profile import SplineProfile
+from velodrome.reference.sections import growth_along, sample_family, stable_sections
+from velodrome.reference.special import SpecialPoint, special_points
+from velodrome.reference.surface import Paraboloid
 
 BICYCLE = Bicycle()
 PRINTED = published("xiong2020")

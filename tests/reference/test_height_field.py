@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference.bicycle import Bicycle
-from reference.contact import observe
-from reference.dae import consistent_state
-from reference.height_field import HeightField
-from reference.simulate import simulate
-from reference.surface import SurfaceOfRevolution, evaluate, is_level
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.contact import observe
+from velodrome.reference.dae import consistent_state
+from velodrome.reference.height_field import HeightField
+from velodrome.reference.simulate import simulate
+from velodrome.reference.surface import SurfaceOfRevolution, evaluate, is_level
 
 BICYCLE = Bicycle()
 

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference.bicycle import BODIES, Bicycle
-from reference.kernels.kinematics import frames
-from reference.kinematics import (
+from velodrome.reference.bicycle import BODIES, Bicycle
+from velodrome.reference.kernels.kinematics import frames
+from velodrome.reference.kinematics import (
     angular_velocities,
     body_positions,
     body_velocities,

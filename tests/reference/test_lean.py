@@ -9,15 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from reference.bicycle import Bicycle
-from reference.contact import observe
-from reference.dae import consistent_state, contact_parameters, dynamics, mass_matrix
-from reference.kernels import dynamics as kernel
-from reference.kernels import lean
-from reference.kernels.pose import aligned
-from reference.kernels.projection import project
-from reference.kinematics import constants
-from reference.surface import Paraboloid, Plane, Surface, evaluate, surface_function
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.contact import observe
+from velodrome.reference.dae import consistent_state, contact_parameters, dynamics, mass_matrix
+from velodrome.reference.kernels import dynamics as kernel
+from velodrome.reference.kernels import lean
+from velodrome.reference.kernels.pose import aligned
+from velodrome.reference.kernels.projection import project
+from velodrome.reference.kinematics import constants
+from velodrome.reference.surface import Paraboloid, Plane, Surface, evaluate, surface_function
 
 BENCHMARK = Bicycle()
 BICYCLES = {

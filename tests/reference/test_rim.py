@@ -10,21 +10,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from reference.bicycle import Bicycle
-from reference.bowls import Cone, Sphere, Torus
-from reference.contact import observe
-from reference.dae import consistent_state, contact_parameters
-from reference.families import find_motion, trace
-from reference.height_field import HeightField
-from reference.kernels import rim as kernel
-from reference.kernels.contact import equations, first_guess, search
-from reference.kernels.dynamics import wheels
-from reference.kinematics import WHEELS, constants
-from reference.profile import PolynomialProfile, SplineProfile
-from reference.rim import find_second_touch, require_clear_rims, rim_clearances, rim_search
-from reference.simulate import simulate, simulate_modified_euler
-from reference.special import special_points
-from reference.surface import Paraboloid, Surface, SurfaceFunction, evaluate
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.bowls import Cone, Sphere, Torus
+from velodrome.reference.contact import observe
+from velodrome.reference.dae import consistent_state, contact_parameters
+from velodrome.reference.families import find_motion, trace
+from velodrome.reference.height_field import HeightField
+from velodrome.reference.kernels import rim as kernel
+from velodrome.reference.kernels.contact import equations, first_guess, search
+from velodrome.reference.kernels.dynamics import wheels
+from velodrome.reference.kinematics import WHEELS, constants
+from velodrome.reference.profile import PolynomialProfile, SplineProfile
+from velodrome.reference.rim import find_second_touch, require_clear_rims, rim_clearances, rim_search
+from velodrome.reference.simulate import simulate, simulate_modified_euler
+from velodrome.reference.special import special_points
+from velodrome.reference.surface import Paraboloid, Surface, SurfaceFunction, evaluate
 
 BICYCLE = Bicycle()
 CASES = Path(__file__).parents[1] / "cases"

@@ -5,19 +5,19 @@ from functools import cache
 import numpy as np
 import pytest
 
-from reference.anchors import anchor
-from reference.bicycle import Bicycle
-from reference.circular import REAR_SPEED, SIGMA, YAW_SPEED, turned
-from reference.continuation import Point, roots_along, sign_changes
-from reference.curve import sample
-from reference.families import Family, trace
-from reference.kernels.steady import STANDING, direction
-from reference.modes import modes
-from reference.sections import sample_family, stable_sections
-from reference.special import special_points
-from reference.stability import are_zero, eigenvalue_order, sorted_eigenvalues
-from reference.surface import Paraboloid
 from tests.shaken import shake
+from velodrome.reference.anchors import anchor
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.circular import REAR_SPEED, SIGMA, YAW_SPEED, turned
+from velodrome.reference.continuation import Point, roots_along, sign_changes
+from velodrome.reference.curve import sample
+from velodrome.reference.families import Family, trace
+from velodrome.reference.kernels.steady import STANDING, direction
+from velodrome.reference.modes import modes
+from velodrome.reference.sections import sample_family, stable_sections
+from velodrome.reference.special import special_points
+from velodrome.reference.stability import are_zero, eigenvalue_order, sorted_eigenvalues
+from velodrome.reference.surface import Paraboloid
 
 BICYCLE = Bicycle()
 ROUND_OFF = np.finfo(float).eps

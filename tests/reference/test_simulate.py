@@ -1,14 +1,14 @@
 import numpy as np
 import pytest
 
-from reference.bicycle import Bicycle
-from reference.contact import observe
-from reference.dae import consistent_state
-from reference.families import find_motion
-from reference.kinematics import LEAN, YAW
-from reference.simulate import Motion, simulate, simulate_modified_euler, steps_per_output
-from reference.stability import linearise
-from reference.surface import Paraboloid, Plane
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.contact import observe
+from velodrome.reference.dae import consistent_state
+from velodrome.reference.families import find_motion
+from velodrome.reference.kinematics import LEAN, YAW
+from velodrome.reference.simulate import Motion, simulate, simulate_modified_euler, steps_per_output
+from velodrome.reference.stability import linearise
+from velodrome.reference.surface import Paraboloid, Plane
 
 BICYCLE = Bicycle()
 BOWL = Paraboloid(0.005)

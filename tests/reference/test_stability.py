@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, fsolve
 
-from reference.bicycle import Bicycle
-from reference.dae import consistent_state, dynamics
-from reference.families import find_motion
-from reference.kinematics import LEAN, REAR_ANGLE, STEER
-from reference.stability import Linearisation, growth_rate, linearise
-from reference.surface import Paraboloid, Plane
 from tests.literature import published, rounds_to
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.dae import consistent_state, dynamics
+from velodrome.reference.families import find_motion
+from velodrome.reference.kinematics import LEAN, REAR_ANGLE, STEER
+from velodrome.reference.stability import Linearisation, growth_rate, linearise
+from velodrome.reference.surface import Paraboloid, Plane
 
 BICYCLE = Bicycle()
 MEIJAARD = published("meijaard2007")

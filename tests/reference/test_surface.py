@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference.bicycle import Bicycle
-from reference.contact import observe
-from reference.dae import consistent_state
-from reference.simulate import simulate
-from reference.surface import Paraboloid, Plane, Surface, SurfaceFunction, evaluate, surface_function
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.contact import observe
+from velodrome.reference.dae import consistent_state
+from velodrome.reference.simulate import simulate
+from velodrome.reference.surface import Paraboloid, Plane, Surface, SurfaceFunction, evaluate, surface_function
 
 coordinate = st.floats(-50, 50)
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from engines.engine import Engine, Problem, Progress, Settings, Trajectory
-from reference.kinematics import REAR_ANGLE
+from velodrome.engines.engine import Engine, Problem, Progress, Settings, Trajectory
+from velodrome.reference.kinematics import REAR_ANGLE
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from scenarios import cli
+from velodrome.scenarios import cli
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,14 @@ from typing import Any
 import pytest
 from altered import Altered
 
-from engines.engine import Engine, Problem, Progress, Settings, Trajectory
-from reports.drift import Verdict
-from scenarios import gate, gate_sample
-from scenarios.gate_exact import Exact, find_exact
-from scenarios.runner import configure
-from scenarios.scenario import Scenario
-from scenarios.start import Start, make_start
+from velodrome.engines.engine import Engine, Problem, Progress, Settings, Trajectory
+from velodrome.scenarios.gate import checks as gate
+from velodrome.scenarios.gate import sample as gate_sample
+from velodrome.scenarios.gate.exact import Exact, find_exact
+from velodrome.scenarios.gate.verdict import Verdict
+from velodrome.scenarios.run.runner import configure
+from velodrome.scenarios.scenario.schema import Scenario
+from velodrome.scenarios.scenario.start import Start, make_start
 
 Chosen = Callable[[str, Mapping[str, Any]], tuple[Engine, Settings]]
 Simulate = Callable[[Engine, Problem, Any, Progress], Trajectory]

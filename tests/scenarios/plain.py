@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from engines.engine import Problem, Progress, Settings, Trajectory
-from reference.bicycle import Bicycle
-from reference.dae import contact_parameters
-from reference.kernels import dynamics
-from reference.kinematics import body_positions, body_quaternions, constants
-from reference.simulate import steps_per_output
+from velodrome.engines.engine import Problem, Progress, Settings, Trajectory
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.dae import contact_parameters
+from velodrome.reference.kernels import dynamics
+from velodrome.reference.kinematics import body_positions, body_quaternions, constants
+from velodrome.reference.simulate import steps_per_output
 
 Correct = Callable[[Bicycle, np.ndarray, np.ndarray, np.ndarray], None]
 

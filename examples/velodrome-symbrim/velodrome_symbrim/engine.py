@@ -10,10 +10,10 @@ import numpy as np
 from pydantic import Field
 from scipy.integrate import DOP853
 
-from engines.engine import EngineError, Problem, Progress, Settings, Trajectory, UnsuitableProblem
-from reference.contact import observe
-from reference.kinematics import body_positions, quaternions, rotations
-from reference.surface import is_level
+from velodrome.engines.engine import EngineError, Problem, Progress, Settings, Trajectory, UnsuitableProblem
+from velodrome.reference.contact import observe
+from velodrome.reference.kinematics import body_positions, quaternions, rotations
+from velodrome.reference.surface import is_level
 
 from .coordinates import AXES, from_symbrim, to_symbrim
 from .equations import Equations
@@ -55,7 +55,7 @@ class SymbrimEngine:
         return settings.tolerance
 
     def simulate(self, problem: Problem, settings: SymbrimSettings, progress: Progress) -> Trajectory:
-        """Run a problem; see `engines.engine.Engine`."""
+        """Run a problem; see `velodrome.engines.engine.Engine`."""
         equations = Equations(problem.bicycle)  # derived before the clock starts
         begin = time.process_time()
         x, steps, ended = _integrate(equations, problem, settings.tolerance, progress)

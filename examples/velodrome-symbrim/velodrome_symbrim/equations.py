@@ -28,7 +28,7 @@ import symbrim as sb
 from sympy import Matrix, Symbol, lambdify
 from sympy.physics.mechanics import KanesMethod, Point, System, kinetic_energy, linear_momentum
 
-from reference.bicycle import Bicycle
+from velodrome.reference.bicycle import Bicycle
 
 # The suite's own checks run where symbrim is not installed.
 # pyright: reportMissingImports=false

@@ -12,8 +12,8 @@ from typing import Any, Literal
 import pytest
 from sweeping import UPRIGHT
 
-from engines.engine import Problem, Progress, Settings, Trajectory
-from engines.lagrange import ENGINE as INNER
+from velodrome.engines.engine import Problem, Progress, Settings, Trajectory
+from velodrome.engines.lagrange import ENGINE as INNER
 
 NAME = "planted"
 # A sweep file with every fault, on a short ride.

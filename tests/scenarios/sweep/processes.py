@@ -11,7 +11,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from scenarios.sweep.store import JOURNAL
+from velodrome.scenarios.sweep.store import JOURNAL
 
 _COMMAND = """
 import sys

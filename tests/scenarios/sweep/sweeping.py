@@ -8,12 +8,12 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
-from scenarios.sweep.plan import Plan, Task, plan_sweep
-from scenarios.sweep.pool import Done
-from scenarios.sweep.run import Outcome, Work, locally, run_sweep
-from scenarios.sweep.store import RESULTS
-from scenarios.sweep.task import Tasks
-from scenarios.sweep.worker import Setup
+from velodrome.scenarios.sweep.plan import Plan, Task, plan_sweep
+from velodrome.scenarios.sweep.pool import Done
+from velodrome.scenarios.sweep.run import Outcome, Work, locally, run_sweep
+from velodrome.scenarios.sweep.store import RESULTS
+from velodrome.scenarios.sweep.task import Tasks
+from velodrome.scenarios.sweep.worker import Setup
 
 # Upright starts are computed in a millisecond.
 UPRIGHT = """

@@ -14,12 +14,12 @@ from processes import killed
 from sweeping import UPRIGHT, data_set, here, planned, swept
 from test_kills import MANY, indices
 
-from scenarios.error import ScenarioError
-from scenarios.sweep.plan import Task
-from scenarios.sweep.pool import Done
-from scenarios.sweep.run import Work
-from scenarios.sweep.summary import status_of
-from scenarios.sweep.worker import Setup
+from velodrome.scenarios.error import ScenarioError
+from velodrome.scenarios.sweep.plan import Task
+from velodrome.scenarios.sweep.pool import Done
+from velodrome.scenarios.sweep.run import Work
+from velodrome.scenarios.sweep.summary import status_of
+from velodrome.scenarios.sweep.worker import Setup
 
 distributed: Any = pytest.importorskip("distributed")
 pytestmark = pytest.mark.slow
@@ -38,7 +38,7 @@ def two_workers() -> Any:
 
 
 def on_cluster(address: str) -> Work:
-    from scenarios.sweep.cluster import on_cluster
+    from velodrome.scenarios.sweep.cluster import on_cluster
 
     return on_cluster(address)
 
@@ -101,7 +101,7 @@ def test_faults_on_a_cluster_are_the_rows_they_are_here(tmp_path: Path, monkeypa
 
 
 def test_no_scheduler_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    from scenarios.sweep import cluster
+    from velodrome.scenarios.sweep import cluster
 
     monkeypatch.setattr(cluster, "_PATIENCE", 1)
     with pytest.raises(ScenarioError, match="no Dask scheduler answers"):

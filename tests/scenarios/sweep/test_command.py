@@ -11,10 +11,10 @@ import pytest
 from rich.console import Console
 from sweeping import UPRIGHT, here, planned, written
 
-from scenarios.error import ScenarioError
-from scenarios.sweep import command
-from scenarios.sweep.live import SweepView
-from scenarios.sweep.pool import Done
+from velodrome.scenarios.commands import run_sweep as command
+from velodrome.scenarios.error import ScenarioError
+from velodrome.scenarios.sweep.live import SweepView
+from velodrome.scenarios.sweep.pool import Done
 
 THREE = UPRIGHT + "perturbation.lean_rate = [0.0, 0.1, 0.2]\n"
 

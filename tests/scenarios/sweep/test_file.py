@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from sweeping import UPRIGHT, planned, written
 
-from scenarios.error import ScenarioError
-from scenarios.sweep.file import read_sweep
-from scenarios.sweep.plan import plan_sweep
-from scenarios.sweep.points import points
-from scenarios.table import placed
+from velodrome.scenarios.error import ScenarioError
+from velodrome.scenarios.scenario.table import placed
+from velodrome.scenarios.sweep.file import read_sweep
+from velodrome.scenarios.sweep.plan import plan_sweep
+from velodrome.scenarios.sweep.points import points
 
 
 def changes(folder: Path, text: str) -> list[dict]:

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.error import ScenarioError
-from scenarios.sweep.journal import ForeignLine, Journal, Line, finished, parsed
+from velodrome.scenarios.error import ScenarioError
+from velodrome.scenarios.sweep.journal import ForeignLine, Journal, Line, finished, parsed
 
 ROWS = [
     Line("0123abcd", "0000003-aa", 3, {"status": "done", "x": 0.1 + 0.2}, {}),

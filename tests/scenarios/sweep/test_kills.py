@@ -14,7 +14,7 @@ import pytest
 from processes import gone, killed, lines, started, workers_of
 from sweeping import UPRIGHT, data_set, here, planned, swept, written
 
-from scenarios.sweep.store import JOURNAL, MANIFEST
+from velodrome.scenarios.sweep.store import JOURNAL, MANIFEST
 
 KILLS = 20
 MANY = (

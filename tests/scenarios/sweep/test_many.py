@@ -10,9 +10,9 @@ import pyarrow.parquet as pq
 import pytest
 from sweeping import UPRIGHT, planned, rows, swept
 
-from scenarios.sweep.plan import plan_sweep
-from scenarios.sweep.rows import COMPUTED
-from scenarios.sweep.store import RESULTS, TIMINGS
+from velodrome.scenarios.sweep.plan import plan_sweep
+from velodrome.scenarios.sweep.rows import COMPUTED
+from velodrome.scenarios.sweep.store import RESULTS, TIMINGS
 
 EXAMPLES = Path(__file__).parents[3] / "examples" / "sweeps"
 LONGEST_OVERHEAD = 5e-3  # s a run, beyond the engine's own time

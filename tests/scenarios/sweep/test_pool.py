@@ -13,10 +13,10 @@ import pytest
 from processes import alive
 from sweeping import UPRIGHT, data_set, here, planned, rows, swept
 
-from scenarios.sweep import pool
-from scenarios.sweep.pool import Pool, WorkersBroken
-from scenarios.sweep.summary import status_of
-from scenarios.sweep.worker import Setup
+from velodrome.scenarios.sweep import pool
+from velodrome.scenarios.sweep.pool import Pool, WorkersBroken
+from velodrome.scenarios.sweep.summary import status_of
+from velodrome.scenarios.sweep.worker import Setup
 
 RAISE = 'raise RuntimeError("out of\\norder")'
 

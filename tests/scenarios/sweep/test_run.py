@@ -14,20 +14,20 @@ import pyarrow.parquet as pq
 import pytest
 from sweeping import UPRIGHT, data_set, here, planned, rows, swept
 
-from engines.admission import ride
-from reference.bicycle import Bicycle
-from scenarios.error import ScenarioError
-from scenarios.runner import claimed_noise, measure_one, plan_run
-from scenarios.scenario import load_scenario
-from scenarios.sweep import rows as columns
-from scenarios.sweep.journal import finished
-from scenarios.sweep.plan import Task, plan_sweep
-from scenarios.sweep.pool import Done
-from scenarios.sweep.run import Work, run_sweep
-from scenarios.sweep.store import JOURNAL, MANIFEST, RESULTS, TIMINGS
-from scenarios.sweep.summary import status_of, summary
-from scenarios.sweep.task import Tasks
-from scenarios.sweep.worker import Setup
+from velodrome.engines.admission import ride
+from velodrome.reference.bicycle import Bicycle
+from velodrome.scenarios.error import ScenarioError
+from velodrome.scenarios.run.runner import claimed_noise, measure_one, plan_run
+from velodrome.scenarios.scenario.schema import load_scenario
+from velodrome.scenarios.sweep import rows as columns
+from velodrome.scenarios.sweep.journal import finished
+from velodrome.scenarios.sweep.plan import Task, plan_sweep
+from velodrome.scenarios.sweep.pool import Done
+from velodrome.scenarios.sweep.run import Work, run_sweep
+from velodrome.scenarios.sweep.store import JOURNAL, MANIFEST, RESULTS, TIMINGS
+from velodrome.scenarios.sweep.summary import status_of, summary
+from velodrome.scenarios.sweep.task import Tasks
+from velodrome.scenarios.sweep.worker import Setup
 
 CASES = Path(__file__).parents[2] / "cases"
 LEANING = UPRIGHT + "perturbation.lean_rate = [0.0, 0.1, 0.2, 0.3]\n"

@@ -1,0 +1,62 @@
+"""One colour per engine, the same in every recording and figure."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterable
+
+from ...engines.engine import REFERENCE
+
+Colour = tuple[int, int, int]
+
+REFERENCE_COLOUR: Colour = (232, 234, 238)
+
+# Ten hues of like lightness that stay apart on a dark ground, orange and blue first for the
+# common colour-blindnesses.
+PALETTE: tuple[Colour, ...] = (
+    (255, 140, 50),
+    (70, 160, 255),
+    (64, 201, 140),
+    (240, 96, 146),
+    (214, 160, 128),
+    (178, 135, 255),
+    (245, 205, 71),
+    (72, 211, 219),
+    (168, 214, 76),
+    (224, 112, 224),
+)
+
+
+_SALT = "816:"  # of those tried the first by which the suite's own engines get different slots
+
+
+def colours(names: Iterable[str]) -> dict[str, Colour]:
+    """Assign a colour to each engine name.
+
+    The reference is near white. Every other name takes the slot of its checksum, or the next free one,
+    so that an engine keeps its colour whichever others run beside it, unless two names collide.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Engine names; their order settles who yields in a collision.
+
+    Returns
+    -------
+    dict of str to tuple of int
+        Red, green, blue, 0 to 255.
+    """
+    assigned: dict[str, Colour] = {}
+    taken: set[int] = set()
+    for name in names:
+        if name == REFERENCE:
+            assigned[name] = REFERENCE_COLOUR
+            continue
+        if len(taken) == len(PALETTE):
+            taken.clear()  # more engines than hues: start a second round
+        slot = zlib.crc32(f"{_SALT}{name}".encode()) % len(PALETTE)
+        while slot in taken:
+            slot = (slot + 1) % len(PALETTE)
+        taken.add(slot)
+        assigned[name] = PALETTE[slot]
+    return assigned

@@ -1,0 +1,153 @@
+"""The run in words and one table, computed from the metrics: Markdown for the recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ...engines.engine import REFERENCE
+from ..measure import describe
+from .markdown import escaped
+
+# (title, unit, metric, part of a metric that has parts).
+COLUMNS: tuple[tuple[str, str, str, str | None], ...] = (
+    ("position error", "m", "position_error", "max"),
+    ("rotation error", "rad", "orientation_error", "max"),
+    ("rate error", "1", "rate_error", None),
+    ("force error", "1", "contact_force_error", None),
+    ("radius drift", "m/s", "radius_drift_rate", None),
+    ("energy drift", "1", "energy_drift", None),
+    ("largest slip", "m/s", "max_slip", None),
+    ("CPU time", "s", "cpu_time", None),
+)
+
+
+def cell(metrics: Mapping[str, Any], metric: str, part: str | None) -> str:
+    """Format a metric for a table: two digits, a dash where there is none."""
+    value = metrics.get(metric)
+    if isinstance(value, Mapping):
+        value = value.get(part)
+    return "–" if value is None else f"{value:.2g}"
+
+
+def remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]:
+    """Say what a reader must know before trusting an engine's row."""
+    lines = []
+    if metrics["fell_at"] is not None:
+        lines.append(f"{name} fell at {metrics['fell_at']:.2f} s; its figures are those up to there")
+    if metrics["friction_left_at"] is not None:
+        needed, there = metrics["required_friction"], metrics["friction"]
+        most = "the ground to pull" if needed is None else f"a coefficient of friction of up to {needed:.3g}"
+        lines.append(
+            f"{name}: rolling needs {most}, its contacts have {there:.3g}: too little from "
+            f"{metrics['friction_left_at']:.2f} s on"
+        )
+    if metrics["min_normal_force"] is not None and metrics["min_normal_force"] < 0:
+        pull = -metrics["min_normal_force"]
+        lines.append(f"{name}: the ground pulls a wheel, by up to {pull:.3g} N; no contact could")
+    if metrics["ended"] is not None:
+        lines.append(f"{name} ended early: {metrics['ended']}")
+    if _equals_reference(metrics):
+        lines.append(f"{name}: its ride equals the reference's to the last bit, so nothing was compared")
+    # Folders of earlier versions do not have it.
+    if metrics.get("unconverged_steps"):
+        residual = metrics.get("largest_residual")
+        left = "" if residual is None else f", with a relative residual of up to {residual:.2g}"
+        lines.append(
+            f"{name}: its iterations did not converge in {metrics['unconverged_steps']} of {metrics['steps']} steps"
+            f"{left}; its figures are not those of its equations"
+        )
+    if metrics["contact_force_error_at"] == 0:
+        later = metrics["settled_force_error"]
+        rest = "" if later is None else f"; once settled it is {later:.2g}"
+        lines.append(f"{name}: the force error is largest in the first sample{rest}")
+    # Folders of earlier versions do not have it.
+    lines += [f"{name}: {describe(report)}" for report in metrics.get("inconsistent_reports") or ()]
+    if metrics["not_finite"]:
+        lines.append(f"{name}: not finite in some samples: {', '.join(metrics['not_finite'])}")
+    if metrics["horizon"] is not None and metrics["horizon"] < duration:
+        lines.append(
+            f"{name}: beyond {metrics['horizon']:.2f} s the motion's own instability makes the error meaningless"
+        )
+    return lines
+
+
+def _equals_reference(metrics: Mapping[str, Any]) -> bool:
+    """Whether the path, the frame's orientation and the wheel's rate have no error at all over the whole ride."""
+    errors = [metrics.get("position_error"), metrics.get("orientation_error"), {"max": metrics.get("rear_rate_error")}]
+    whole = metrics["ended"] is None and metrics["fell_at"] is None
+    return whole and all(error is not None and error["max"] == 0 for error in errors)
+
+
+def summary(
+    title: str,
+    measured: Mapping[str, Mapping[str, Any]],
+    failures: Mapping[str, str],
+    verdicts: Sequence[Mapping[str, Any]],
+    growth_rate: float,
+    duration: float,
+    steady: bool = True,
+) -> str:
+    """Markdown summary of a run.
+
+    Parameters
+    ----------
+    title : str
+    measured : mapping
+        Metrics by engine name.
+    failures : mapping
+        Reason by the name of an engine that gave no trajectory.
+    verdicts : sequence of mapping
+        As `velodrome.scenarios.run.runner.judge` gives them.
+    growth_rate : float
+        Of the motion's own disturbances [1/s].
+    duration : float
+        Of the run [s].
+    steady : bool
+        See `stability`.
+
+    Returns
+    -------
+    str
+    """
+    lines = [f"# {escaped(title)}", "", stability(growth_rate, steady), ""]
+    # Engines as columns: they are fewer than quantities, and the recording's tab is narrow.
+    lines += ["| | " + " | ".join(escaped(name) for name in measured) + " |", "|---|" + "---:|" * len(measured)]
+    for name, unit, metric, part in COLUMNS:
+        cells = (cell(values, metric, part) for values in measured.values())
+        lines.append(f"| {name} [{unit}] | " + " | ".join(cells) + " |")
+    lines += [
+        "",
+        f"Errors are the largest over {duration:g} s, against `{REFERENCE}`; drifts are slopes of a line fit.",
+        "",
+    ]
+    for engine, values in measured.items():
+        lines += [f"- {escaped(line)}" for line in remarks(engine, values, duration)]
+    lines += [f"- {escaped(f'{engine} did not run: {reason}')}" for engine, reason in failures.items()]
+    lines += [f"- {escaped(verdict_line(verdict))}" for verdict in verdicts]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def verdict_line(verdict: Mapping[str, Any]) -> str:
+    """One line on one verdict."""
+    value = "not done" if verdict["value"] is None else f"{verdict['value']:.3g}"
+    word = "holds" if verdict["holds"] else "falls short"
+    return f"{verdict['engine']}: {verdict['quantity']} {value}, limit {verdict['limit']:.3g}: {word}"
+
+
+def stability(growth_rate: float, steady: bool = True) -> str:
+    """One sentence on a motion's disturbances.
+
+    Parameters
+    ----------
+    growth_rate : float
+        Of the motion [1/s]; of the same start on the level plane where it is not ``steady``.
+    steady : bool
+        Whether the ground lets it be: no motion is on ground without symmetry about the z axis.
+    """
+    if not steady:
+        fate = f"decay at {-growth_rate:.4g} 1/s" if growth_rate < 0 else f"grow like exp({growth_rate:.4g} t / s)"
+        return f"On this ground no motion is steady; on the level plane disturbances of this start would {fate}."
+    if growth_rate < 0:
+        return f"The motion is Lyapunov stable: its slowest disturbance decays at {-growth_rate:.4g} 1/s."
+    return f"The motion is unstable: disturbances grow like exp({growth_rate:.4g} t / s)."

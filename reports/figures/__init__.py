@@ -1,0 +1,23 @@
+"""Figures on paper: solution families, the atlas, work-precision."""
+
+from .atlas import growth_figure, stable_figure
+from .families import family_figure, solution_figure
+from .precision import precision_figure
+from .solution_curve import curves
+from .style import FAMILY_COLOURS, GREY, INK, WIDTH, new_figure, style, write_figure
+
+__all__ = [
+    "FAMILY_COLOURS",
+    "GREY",
+    "INK",
+    "WIDTH",
+    "curves",
+    "family_figure",
+    "growth_figure",
+    "new_figure",
+    "precision_figure",
+    "solution_figure",
+    "stable_figure",
+    "style",
+    "write_figure",
+]

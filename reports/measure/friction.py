@@ -1,0 +1,61 @@
+"""Normal forces of a ride, the friction that it needs, and whether a contact with a given coefficient has it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...engines.engine import Trajectory
+from ...reference.surface import Surface, unit_normals
+
+
+def normal_force(trajectory: Trajectory, surface: Surface) -> np.ndarray | None:
+    """Part of the contact forces along the surface's upward normal, shape (n, 2) [N]; None where they are not given."""
+    if trajectory.contact_force is None or trajectory.contact_point is None:
+        return None
+    point = trajectory.contact_point
+    return np.sum(trajectory.contact_force * unit_normals(surface, point[..., 0], point[..., 1]), axis=-1)
+
+
+def required_friction(trajectory: Trajectory, surface: Surface) -> np.ndarray:
+    """Least coefficient of friction for the contact forces of a trajectory, wheel by wheel.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        With contact points and forces; the reference's tell what rolling without slip needs.
+    surface : Surface
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Tangential over normal force; infinite where the ground would have to pull.
+
+    Raises
+    ------
+    ValueError
+        If it has no contact points or forces.
+    """
+    if trajectory.contact_point is None or trajectory.contact_force is None:
+        raise ValueError(f"{trajectory.engine} gives no contact forces")
+    point, force = trajectory.contact_point, trajectory.contact_force
+    normal = unit_normals(surface, point[..., 0], point[..., 1])
+    pressure = np.sum(force * normal, axis=-1)
+    sideways = np.linalg.norm(force - pressure[..., None] * normal, axis=-1)
+    # Where a wheel is in the air nothing is needed either.
+    ratio = np.divide(sideways, pressure, out=np.full(pressure.shape, np.inf), where=pressure > 0)
+    return np.where((pressure == 0) & (sideways == 0), 0.0, ratio)
+
+
+def cone_is_left(friction: float, rolling: Trajectory, surface: Surface) -> float | None:
+    """First time at which rolling needs more friction than there is [s]; None if it never does.
+
+    Parameters
+    ----------
+    friction : float
+        The contact's coefficient.
+    rolling : Trajectory
+        The reference's ride.
+    surface : Surface
+    """
+    beyond = np.flatnonzero((required_friction(rolling, surface) > friction).any(axis=1))
+    return float(rolling.time[beyond[0]]) if len(beyond) else None

@@ -1,0 +1,146 @@
+"""The reduced linear system about a motion as an engine itself has it, measured from its flow.
+
+Each of the seven independent variables of `velodrome.reference.stability` is disturbed both ways, and the derivatives
+M1, M2 of the state at times T/2 and 3 T/2 give the flow between them,
+
+    Phi = M2 M1^-1 = exp(J T)
+
+The time before lets an engine's own fast states, such as the depth of a soft contact, follow the bicycle's. J
+is taken at halved steps and extrapolated: what differs from the reference then is the model's, not the
+step's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import logm
+
+from ...engines.admission import ride
+from ...engines.engine import Engine, EngineError, Problem, Settings
+from ...reference.dae import consistent_state
+from ...reference.kinematics import PITCH, YAW
+from ...reference.stability import independent, sorted_eigenvalues
+from .convergence import extrapolate, observed_orders
+
+INTERVAL = 0.2  # short enough that the fastest oscillation known, 7 rad/s, turns by less than half a turn [s]
+# Of x, y, lean, steer and their rates, rear rate [m, rad, rad/s]. The stencil's error is of sixth order in
+# them (of fourth order it left 8e-5 of an eigenvalue at P3); an engine's noise is divided by them.
+DISTURBANCES = np.array([5e-3, 5e-3, 1e-3, 1e-3, 5e-3, 5e-3, 1e-2])
+_STENCIL = ((1, 45 / 60), (-1, -45 / 60), (2, -9 / 60), (-2, 9 / 60), (3, 1 / 60), (-3, -1 / 60))
+STENCIL_WEIGHT = sum(abs(weight) for _, weight in _STENCIL)
+LEVELS = 3
+
+
+@dataclass(frozen=True)
+class Identified:
+    """An engine's own reduced linear system.
+
+    Attributes
+    ----------
+    jacobian : ndarray, shape (7, 7)
+        Extrapolated to a step of zero.
+    uncertainty : float
+        Largest change of an entry by the last extrapolation [1/s and mixed units].
+    eigenvalues : ndarray, shape (7,), complex
+        In the order of `velodrome.reference.stability.eigenvalue_order` [1/s].
+    order : float
+        Order in the step that the entries show; NaN where they do not move.
+    """
+
+    jacobian: np.ndarray
+    uncertainty: float
+    eigenvalues: np.ndarray
+    order: float
+
+
+def identify(
+    engine: Engine,
+    settings: Settings,
+    problem: Problem,
+    progress: Callable[[float], None] = lambda _: None,
+    levels: int = LEVELS,
+) -> Identified:
+    """Measure an engine's reduced Jacobian about the state that a problem starts from.
+
+    Parameters
+    ----------
+    engine : Engine
+    settings : Settings
+        Those of the coarsest level; each further one halves the step.
+    problem : Problem
+        Its start is the motion: circular, or straight and upright. Its times are not used.
+    progress : callable
+        Called with the share of the work done, 0 to 1.
+    levels : int
+        At least 2.
+
+    Returns
+    -------
+    Identified
+
+    Raises
+    ------
+    EngineError
+        If the engine does not ride so long.
+    ValueError
+        If the disturbed states do not exist, or the engine refuses the settings.
+    """
+    interval = interval_of(settings)
+    jacobians = []
+    for level in range(levels):
+        refined = settings.refined(0.5**level)
+        # Halved steps cost twice as much.
+        before, share = (2**level - 1) / (2**levels - 1), 2**level / (2**levels - 1)
+        jacobians.append(
+            jacobian_at(engine, refined, problem, interval, lambda done, b=before, s=share: progress(b + s * done))
+        )
+    limit = extrapolate(jacobians)
+    orders = observed_orders(jacobians)
+    eigenvalues = sorted_eigenvalues(limit.value)
+    return Identified(limit.value, limit.uncertainty, eigenvalues, orders[-1] if orders else np.nan)
+
+
+def interval_of(settings: Settings) -> float:
+    """Interval T of the flow: about `INTERVAL`, an even number of the settings' steps [s]."""
+    step = getattr(settings, "step", None)
+    return INTERVAL if step is None else max(1, round(INTERVAL / step / 2)) * 2 * step
+
+
+def jacobian_at(
+    engine: Engine,
+    settings: Settings,
+    problem: Problem,
+    interval: float,
+    progress: Callable[[float], None] = lambda _: None,
+) -> np.ndarray:
+    """Reduced Jacobian (7, 7) of an engine at the settings' own step, from an interval of flow [s]; see `identify`."""
+    flow = np.zeros((2, 7, 7))
+    for j in range(7):
+        for i, (multiple, weight) in enumerate(_STENCIL):
+            size = multiple * DISTURBANCES[j]
+            flow[:, :, j] += weight / DISTURBANCES[j] * _ride(engine, settings, problem, interval, j, size)
+            progress((j * len(_STENCIL) + i + 1) / (7 * len(_STENCIL)))
+    over = flow[1] @ np.linalg.inv(flow[0])
+    return np.real(logm(over)) / interval
+
+
+def _ride(
+    engine: Engine, settings: Settings, problem: Problem, interval: float, variable: int, size: float
+) -> np.ndarray:
+    """Independent variables after half an interval and another whole one, shape (2, 7)."""
+    v = independent(problem.q, problem.qd)
+    v[variable] += size
+    yaw = float(problem.q[YAW])
+    position = np.cos(yaw) * v[0] - np.sin(yaw) * v[1], np.sin(yaw) * v[0] + np.cos(yaw) * v[1]
+    guess = float(problem.q[2]), float(problem.q[PITCH])
+    rates = float(v[4]), float(v[5]), float(v[6])
+    state = consistent_state(problem.bicycle, problem.surface, position, v[2], v[3], rates, yaw, guess)
+    disturbed = Problem(problem.bicycle, problem.surface, *state, 0.5 * interval * np.arange(4))
+    engine.check(disturbed, settings)
+    trajectory = ride(engine, disturbed, settings, lambda _: None)
+    if len(trajectory.time) < 4:
+        raise EngineError(f"{engine.name} did not ride through {1.5 * interval:g} s: {trajectory.ended}")
+    return independent(trajectory.q[[1, 3]], trajectory.qd[[1, 3]])

@@ -1,0 +1,254 @@
+"""What a trajectory is worth: errors against the reference, drift, slip, energy.
+
+Poses, contact points, gaps, slip and energies are those that follow from its coordinates and rates. What the engine
+reports of them is held against these, see `velodrome.reports.measure.consistency`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...engines.engine import Trajectory
+from ...reference.bicycle import Bicycle
+from ...reference.kinematics import REAR_ANGLE, YAW
+from ...reference.surface import Surface
+from .consistency import follow, largest_speed, mismatches
+from .fall import fell_at, until_fall
+from .friction import cone_is_left, normal_force, required_friction
+from .limits import ROUND_OFF
+
+SETTLED = 0.2  # from here on contacts that start unsettled have settled, of any model here [s]
+
+
+def metrics(
+    trajectory: Trajectory,
+    reference: Trajectory | None,
+    bicycle: Bicycle,
+    surface: Surface,
+    growth_rate: float,
+    size: float,
+    circular: bool,
+    *,
+    step_noise: float = ROUND_OFF,
+    followed: Trajectory | None = None,
+) -> dict[str, Any]:
+    """Measure a trajectory, up to its fall if it falls.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    reference : Trajectory or None
+        What it is held against, sampled at the same times (at least as long); None for the reference
+        itself.
+    bicycle : Bicycle
+    surface : Surface
+    growth_rate : float
+        Largest real part of the motion's eigenvalues that symmetry does not fix [1/s].
+    size : float
+        Radius of the circle, or the wheelbase for a straight motion [m].
+    circular : bool
+        Whether the motion circles the z axis, so that radius and phase mean something.
+    step_noise : float
+        Relative error that a step of the engine may add beyond its method.
+    followed : Trajectory, optional
+        The trajectory as `velodrome.reports.measure.consistency.follow` gives it, where that is at hand.
+
+    Returns
+    -------
+    dict
+        The quantities of ``metrics.json``, JSON values; None where an engine does not give what a
+        quantity needs, or the quantity has no meaning.
+    """
+    reported = trajectory
+    simulated = float(reported.time[-1] - reported.time[0])
+    trajectory = follow(reported, bicycle, surface) if followed is None else followed
+    fall = fell_at(trajectory, bicycle, surface)
+    trajectory = until_fall(trajectory, bicycle, surface)
+    reported = reported.first(len(trajectory.time))
+    reference = None if reference is None else until_fall(reference, bicycle, surface)
+    result = _errors(trajectory, reference)
+    result |= _drifts(trajectory, reference, circular)
+    result |= _energy(trajectory)
+    result |= _constraints(trajectory)
+    result["not_finite"] = reported.not_finite()
+    found = mismatches(reported, trajectory, reference, size, step_noise)
+    result["inconsistent_reports"] = [mismatch.as_json() for mismatch in found if not mismatch.holds]
+    result |= _friction(trajectory, trajectory if reference is None else reference, surface)
+    result |= {
+        "steps": trajectory.steps,
+        "unconverged_steps": trajectory.unconverged_steps,
+        "largest_residual": trajectory.largest_residual,
+        "cpu_time": trajectory.cpu_time,
+        "real_time_factor": simulated / trajectory.cpu_time if trajectory.cpu_time > 0 else None,
+        "min_normal_force": least_normal_force(trajectory, surface),
+        "fell_at": fall,
+        "ended": trajectory.ended,
+    }
+    result["horizon"] = None if reference is None else horizon(trajectory, reference, growth_rate, size)
+    return {name: _finite(value) for name, value in result.items()}
+
+
+def number(value: float) -> float | None:
+    """What JSON can carry of a number: None if it is none."""
+    return float(value) if np.isfinite(value) else None
+
+
+def _finite(value: Any) -> Any:
+    """Replace what JSON cannot carry: a number that is none becomes None."""
+    if isinstance(value, dict):
+        return {name: _finite(part) for name, part in value.items()}
+    if isinstance(value, list):
+        return [_finite(part) for part in value]
+    return number(value) if isinstance(value, float) else value
+
+
+def position_errors(trajectory: Trajectory, reference: Trajectory) -> np.ndarray:
+    """Distance of D from the reference's, sample by sample, shape (n,) [m]."""
+    n = _common(trajectory, reference)
+    return np.linalg.norm(trajectory.q[:n, :3] - reference.q[:n, :3], axis=1)
+
+
+def orientation_errors(trajectory: Trajectory, reference: Trajectory) -> np.ndarray:
+    """Angle between the rear frames, sample by sample, shape (n,) [rad]."""
+    n = _common(trajectory, reference)
+    a, b = trajectory.body_quaternion[:n, 0], reference.body_quaternion[:n, 0]
+    # 2 asin(|a - +-b| / 2) resolves small angles, which the arc cosine of a product does not.
+    chord = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
+    return 4 * np.arcsin(np.minimum(chord / 2, 1.0))
+
+
+def rate_error(trajectory: Trajectory, reference: Trajectory) -> float | None:
+    """Largest difference of any of the nine rates from the reference's, relative to the motion's sizes.
+
+    Rates of D are measured by the reference's largest speed, the others by its largest angular rate. None where the
+    reference stands still.
+    """
+    n = _common(trajectory, reference)
+    sizes = np.array([largest_speed(reference)] * 3 + [float(np.abs(reference.qd[:, YAW:]).max())] * 6)
+    moving = sizes > 0
+    difference = np.abs(trajectory.qd[:n] - reference.qd[:n])[:, moving]
+    return float((difference / sizes[moving]).max()) if moving.any() else None
+
+
+def _friction(trajectory: Trajectory, rolling: Trajectory, surface: Surface) -> dict[str, float | None]:
+    """Friction that rolling needs by the reference's forces, and from when on the engine has too little."""
+    result: dict[str, float | None] = dict.fromkeys(("required_friction", "friction", "friction_left_at"))
+    result["friction"] = trajectory.friction
+    if rolling.contact_force is not None and rolling.contact_point is not None:
+        result["required_friction"] = float(required_friction(rolling, surface).max())
+        if trajectory.friction is not None:
+            result["friction_left_at"] = cone_is_left(trajectory.friction, rolling, surface)
+    return result
+
+
+def least_normal_force(trajectory: Trajectory, surface: Surface) -> float | None:
+    """Least normal contact force [N]; negative where the ground would have to pull, as no contact can."""
+    normal = normal_force(trajectory, surface)
+    return None if normal is None else float(normal.min())
+
+
+def horizon(trajectory: Trajectory, reference: Trajectory, growth_rate: float, size: float) -> float | None:
+    """Time up to which the comparison means anything [s]; None where the motion amplifies no error.
+
+    An error grows like e0 exp(growth_rate t), e0 = C h^p. e0 is the largest that the samples allow while
+    the error is small against the motion, and the horizon is where the law reaches the motion's size.
+    """
+    if growth_rate <= 0:
+        return None
+    error = position_errors(trajectory, reference)
+    time = trajectory.time[: len(error)]
+    small = (error > 0) & (error < 1e-2 * size)
+    if not small.any():
+        # Meaningless from the start, or without any error at all.
+        return 0.0 if error.max() > 0 else None
+    seed = float(np.max(np.log(error[small]) - growth_rate * time[small]))
+    law = max(0.0, float(np.log(size) - seed) / growth_rate)
+    # Other causes may be faster than the law: an engine's own drift, a fall.
+    beyond = np.flatnonzero(error >= size)
+    return min(law, float(time[beyond[0]])) if len(beyond) else law
+
+
+def _common(trajectory: Trajectory, reference: Trajectory) -> int:
+    n = min(len(trajectory.time), len(reference.time))
+    if not np.array_equal(trajectory.time[:n], reference.time[:n]):
+        raise ValueError(f"{trajectory.engine} and {reference.engine} are not sampled at the same times")
+    return n
+
+
+def _extremes(values: np.ndarray) -> dict[str, float]:
+    return {"max": float(values.max()), "end": float(values[-1])}
+
+
+def _errors(trajectory: Trajectory, reference: Trajectory | None) -> dict[str, Any]:
+    names = ("position_error", "orientation_error", "rate_error", "rear_rate_error", "contact_force_error")
+    names += ("contact_force_error_at", "settled_force_error")
+    result: dict[str, Any] = dict.fromkeys(names)
+    if reference is None:
+        return result
+    n = _common(trajectory, reference)
+    rate = np.abs(trajectory.qd[:n, REAR_ANGLE] - reference.qd[:n, REAR_ANGLE])
+    result["position_error"] = _extremes(position_errors(trajectory, reference))
+    result["orientation_error"] = _extremes(orientation_errors(trajectory, reference))
+    result["rate_error"] = rate_error(trajectory, reference)
+    result["rear_rate_error"] = float(rate.max())
+    if trajectory.contact_force is not None and reference.contact_force is not None:
+        difference = np.linalg.norm(trajectory.contact_force[:n] - reference.contact_force[:n], axis=2)
+        # Relative to the largest force that the reference ever needs.
+        largest = np.linalg.norm(reference.contact_force[:n], axis=2).max()
+        result["contact_force_error"] = float(difference.max() / largest)
+        # Contacts that start unsettled are worst in the first sample, which says little of the ride.
+        if difference.max() > 0:
+            result["contact_force_error_at"] = float(trajectory.time[difference.max(axis=1).argmax()])
+        settled = trajectory.time[:n] >= SETTLED
+        if settled.any():
+            result["settled_force_error"] = float(difference[settled].max() / largest)
+    return result
+
+
+def _slope(time: np.ndarray, values: np.ndarray) -> float:
+    """Slope of the least-squares line [1/s]."""
+    centred = time - time.mean()
+    return float(centred @ (values - values.mean()) / (centred @ centred))
+
+
+def _drifts(trajectory: Trajectory, reference: Trajectory | None, circular: bool) -> dict[str, float | None]:
+    """Rates at which radius, phase and rear-wheel rate leave the reference's."""
+    names = ("radius_drift_rate", "phase_drift_rate", "rear_rate_drift_rate")
+    result: dict[str, float | None] = dict.fromkeys(names)
+    if reference is None or _common(trajectory, reference) < 2:
+        return result
+    n = _common(trajectory, reference)
+    time = trajectory.time[:n]
+    result["rear_rate_drift_rate"] = _slope(time, trajectory.qd[:n, REAR_ANGLE] - reference.qd[:n, REAR_ANGLE])
+    if circular:
+        here, there = trajectory.q[:n, :2], reference.q[:n, :2]
+        radius = np.hypot(here[:, 0], here[:, 1]) - np.hypot(there[:, 0], there[:, 1])
+        phase = np.arctan2(here[:, 1], here[:, 0]) - np.arctan2(there[:, 1], there[:, 0])
+        result["radius_drift_rate"] = _slope(time, radius)
+        result["phase_drift_rate"] = _slope(time, np.unwrap(phase))
+    return result
+
+
+def _energy(trajectory: Trajectory) -> dict[str, float | None]:
+    assert trajectory.kinetic_energy is not None
+    assert trajectory.potential_energy is not None
+    energy = trajectory.kinetic_energy + trajectory.potential_energy
+    size = abs(energy[0])
+    return {
+        "energy_drift": float(np.abs(energy - energy[0]).max() / size) if size > 0 else None,
+        "energy_drift_rate": _slope(trajectory.time, energy) if len(energy) > 1 else None,
+        "energy_variation": float(100 * np.ptp(energy) / size) if size > 0 else None,
+    }
+
+
+def _constraints(trajectory: Trajectory) -> dict[str, float]:
+    assert trajectory.gap is not None
+    assert trajectory.slip is not None
+    speed = np.linalg.norm(trajectory.slip, axis=2)
+    return {
+        "max_gap": float(np.abs(trajectory.gap).max()),
+        "max_slip": float(speed.max()),
+        "mean_slip": float(speed.mean()),
+    }

@@ -1,0 +1,149 @@
+"""How a recording opens: which views, where, looking from where."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from ...engines.engine import REFERENCE
+from ..drawing import CHANGE, CONSTRAINTS, ENERGY, ERROR, FORCES, LOG_ENERGY, RADIUS, STATES, Ground, Plot
+
+BACKGROUND = (17, 19, 24)
+NEWTONS_PER_METRE = 500.0
+_LEGEND_SHARE = 1.8  # of the height of another view: a legend of ten engines fits
+
+# Samples of each plot by its key, then by engine.
+Curves = Mapping[str, Mapping[str, np.ndarray]]
+
+
+def world(engine: str) -> str:
+    """Path of the entity under which everything of an engine in space is."""
+    return rr.new_entity_path(["world", engine])
+
+
+def _trails(engines: Sequence[str], seconds: float | None) -> dict[Any, rrb.VisibleTimeRanges]:
+    """Show the trails up to the cursor, all of them or the last seconds."""
+    start = (
+        rrb.TimeRangeBoundary.infinite() if seconds is None else rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds)
+    )
+    visible = rrb.VisibleTimeRanges(timeline="time", start=start, end=rrb.TimeRangeBoundary.cursor_relative())
+    return {f"{world(engine)}/trail/{part}": visible for engine in engines for part in ("rear", "front", "D")}
+
+
+def overview(engines: Sequence[str], ground: Ground) -> rrb.Spatial3DView:
+    """All engines on the whole ground; on a long strip the camera follows the first engine."""
+    if ground.disc:
+        # Twice the rim's height on top lets the eye see over the near rim down to the bottom.
+        bottom, rim = ground.vertices[:, 2].min(), ground.edge[:, 2].max()
+        depth, size, origin = rim - bottom, ground.radius, "/world"
+        target = np.array([-0.05 * size, -0.20 * size, bottom + 0.3 * depth])
+        position = np.array([-0.45 * size, -1.62 * size, bottom + 0.90 * size + 2 * depth])
+    else:
+        origin, target = f"{world(engines[0])}/chase", np.array([0.4, 0.0, 0.2])
+        position = np.array([-2.4, -4.0, 2.2])
+    eye = rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=position, look_target=target, eye_up=(0, 0, 1))
+    return rrb.Spatial3DView(
+        name=f"Overview (arrows: contact force, 1 m = {NEWTONS_PER_METRE:.0f} N)",
+        origin=origin,
+        contents=["+ /world/**"],
+        overrides=_trails(engines, None),
+        background=BACKGROUND,
+        line_grid=False,
+        eye_controls=eye,
+    )
+
+
+def chase(engine: str, engines: Sequence[str]) -> rrb.Spatial3DView:
+    """One engine from behind, turning with its yaw only, with the reference beside it."""
+    shown = [name for name in engines if name in (engine, REFERENCE)]
+    hidden = rrb.EntityBehavior(visible=False)  # the tab says the name
+    eye = rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital, position=(-2.1, -1.6, 1.0), look_target=(-0.2, 0.0, 0.15), eye_up=(0, 0, 1)
+    )
+    return rrb.Spatial3DView(
+        name=f"Chase {engine}",
+        origin=f"{world(engine)}/chase",
+        contents=["+ /world/ground/**", *(f"+ {world(name)}/**" for name in shown)],
+        overrides={**_trails(shown, 2.0), **{f"{world(name)}/chase/name": hidden for name in shown}},
+        background=BACKGROUND,
+        line_grid=False,
+        eye_controls=eye,
+    )
+
+
+def _axis(plot: Plot, curves: Mapping[str, np.ndarray]) -> rrb.ScalarAxis | None:
+    """A fixed range where the viewer's own would blow round-off up to the full height."""
+    low = min(float(values.min()) for values in curves.values())
+    high = max(float(values.max()) for values in curves.values())
+    if high - low >= plot.span:
+        return None
+    middle = 0.5 * (low + high)
+    return rrb.ScalarAxis(range=(middle - plot.span / 2, middle + plot.span / 2))
+
+
+def _plot_view(plot: Plot, curves: Mapping[str, np.ndarray], legend: bool) -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        name=plot.title,
+        origin=f"/plots/{plot.key}",
+        axis_x=rrb.TimeAxis(link="LinkToGlobal"),
+        axis_y=_axis(plot, curves),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftBottom, visible=legend),
+        background=rrb.archetypes.PlotBackground(color=BACKGROUND, show_grid=True),
+    )
+
+
+def _plot_tab(name: str, plots: Sequence[Plot], curves: Curves, columns: int) -> rrb.Container | None:
+    """The views of the plots that have a curve; None if none has.
+
+    One legend a tab, in the first view with the most curves: it covers part of the curves, and in a column of
+    views that one is the highest.
+    """
+    shown = [plot for plot in plots if curves.get(plot.key)]
+    if not shown:
+        return None
+    keyed = max(shown, key=lambda plot: len(curves[plot.key]))
+    views = [_plot_view(plot, curves[plot.key], plot is keyed) for plot in shown]
+    if columns == 1:
+        return rrb.Vertical(*views, row_shares=[_LEGEND_SHARE if plot is keyed else 1 for plot in shown], name=name)
+    return rrb.Grid(*views, grid_columns=columns, name=name)
+
+
+def blueprint(engines: Sequence[str], ground: Ground, curves: Curves, modes: Sequence[Plot] = ()) -> rrb.Blueprint:
+    """Layout of a recording: the ride left, curves and summary right, paused at the start.
+
+    Parameters
+    ----------
+    engines : sequence of str
+        Names in the order of display.
+    ground : Ground
+        What is drawn of the surface.
+    curves : mapping
+        Samples by plot key and engine; a plot without any gets no view.
+    modes : sequence of Plot
+        Of the modes' amplitudes.
+    """
+    where = RADIUS if ground.disc else STATES[1]
+    tabs = (
+        _plot_tab("Comparison", (CHANGE, ERROR, LOG_ENERGY, STATES[0], where), curves, 1),
+        _plot_tab("States", STATES, curves, 2),
+        _plot_tab("Forces", FORCES, curves, 2),
+        _plot_tab("Modes", modes, curves, 1),
+        _plot_tab("Constraints & energy", (*CONSTRAINTS, LOG_ENERGY, ENERGY), curves, 2),
+        rrb.TextDocumentView(name="Summary", origin="/summary"),
+    )
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Tabs(overview(engines, ground), *(chase(engine, engines) for engine in engines), active_tab=0),
+            rrb.Tabs(*(tab for tab in tabs if tab is not None), active_tab=0),
+            column_shares=[3, 2],
+        ),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline="time", play_state="paused", loop_mode="all", playback_speed=1.0),
+        auto_layout=False,
+        auto_views=False,
+    )

@@ -1,0 +1,95 @@
+"""What `velodrome sweep` does between its options and its exit status."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from ..error import ScenarioError
+from ..scenario import shown
+from ..sweep import (
+    STATUSES,
+    SweepView,
+    Work,
+    locally,
+    plan_sweep,
+    resume_command,
+    run_sweep,
+    show_summary,
+    status_of,
+    summary,
+)
+from .options import ending_with, print_json
+from .present import working
+
+FOLDER = Path("sweeps")
+
+
+def sweep(
+    path: Path,
+    scheduler: str | None,
+    workers: int | None,
+    out: Path | None,
+    resume: bool,
+    as_json: bool,
+    retry: Sequence[str] = (),
+) -> int:
+    """Run a sweep file, or what is missing of it, and say what came of it.
+
+    Parameters
+    ----------
+    path : Path
+        The sweep file.
+    scheduler : str or None
+        Address of a Dask scheduler; processes of this machine if not given.
+    workers : int or None
+        Number of processes; one a core if not given.
+    out : Path or None
+        The sweep's folder; one of the file's name in `FOLDER` if not given.
+    resume : bool
+        Whether to go on with a sweep in that folder.
+    as_json : bool
+        Print the summary as JSON on stdout, the table on stderr.
+    retry : sequence of str
+        Statuses of rows that are to be done again; they go with ``resume``.
+
+    Returns
+    -------
+    int
+        Exit status: 0 if every run has its result, 1 if some broke or are missing, 130 after Ctrl-C.
+
+    Raises
+    ------
+    ScenarioError
+        With one line.
+    """
+    if scheduler is not None and workers is not None:
+        raise ScenarioError("--workers goes without --scheduler: a cluster's workers are started with it")
+    if retry and not resume:
+        raise ScenarioError("--retry: it belongs to --resume, which goes on with a sweep")
+    for status in retry:
+        if status not in STATUSES:
+            raise ScenarioError(f"--retry {shown(status)}: no row has such a status; there are {', '.join(STATUSES)}")
+    with working("checking every run of the sweep (the first time on a machine, kernels are compiled: half a minute)"):
+        plan = plan_sweep(path)
+    work = _work(scheduler, workers)
+    with SweepView(len(plan.tasks)) as view:
+        outcome = run_sweep(plan, FOLDER / plan.name if out is None else out, work, resume, view.watch, retry)
+    document = summary(plan, outcome)
+    with ending_with(0):
+        show_summary(Console(stderr=as_json), document, resume_command(plan, outcome, retry))
+        if as_json:
+            print_json(document)
+    return status_of(outcome)
+
+
+def _work(scheduler: str | None, workers: int | None) -> Work:
+    if scheduler is None:
+        return locally(workers or len(os.sched_getaffinity(0)))
+    # Dask takes half a second to load.
+    from ..sweep import on_cluster
+
+    return on_cluster(scheduler)

@@ -1,0 +1,219 @@
+"""`velodrome diff`: two stored run folders against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import shorten
+from typing import Any
+
+import numpy as np
+
+from ...engines.engine import REFERENCE, Trajectory, load_engine, why_failed
+from ...reference.surface import SurfaceOfRevolution
+from ...reports.drawing import colours
+from ...reports.measure import ROUND_OFF, START_ERROR, Scale, as_shown, follow
+from ..error import ScenarioError
+from ..files import make_folder, write_json, write_text
+from ..run import configure, document, installed, part, ride
+from ..scenario import OF_THE_MOTION, CircularTable, Scenario, load_scenario, make_start
+from .differences import DIFFERS, Ground, StoredRun, diff_document, diff_markdown
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two runs of one scenario from one start.
+
+    Attributes
+    ----------
+    scenario : Scenario
+    before, after : StoredRun
+    ground : Ground
+    """
+
+    scenario: Scenario
+    before: StoredRun
+    after: StoredRun
+    ground: Ground
+
+
+def read_pair(first: Path, second: Path, engines: Sequence[str] | None = None) -> Pair:
+    """Read two run folders that can be compared.
+
+    Parameters
+    ----------
+    first, second : Path
+        The earlier run and the later one.
+    engines : sequence of str, optional
+        Only these, beside the reference; all if not given.
+
+    Raises
+    ------
+    ScenarioError
+        If one is no run folder, or they differ in scenario, output times or start, or share no engine.
+    """
+    names = (first.resolve().name, second.resolve().name)
+    if names[0] == names[1]:
+        names = (str(first), str(second))
+    scenarios = [load_scenario(str(part(folder, "scenario.toml")))[1] for folder in (first, second)]
+    _same_scenario(scenarios[0], scenarios[1], first, second)
+    runs = [_read(folder, name, engines) for folder, name in zip((first, second), names, strict=True)]
+    _same_start(runs[0], runs[1], first, second)
+    common = [name for name in runs[1].manifest["engines"] if name in runs[0].manifest["engines"]]
+    if not common:
+        raise ScenarioError(f"{first} and {second} have no engine in common")
+    for engine in engines or []:
+        if engine not in common:
+            raise ScenarioError(f"engine {engine!r} is not in both runs; there are {', '.join(common)}")
+    return Pair(scenarios[1], runs[0], runs[1], _ground(scenarios[1], runs[1]))
+
+
+def _same_scenario(before: Scenario, after: Scenario, first: Path, second: Path) -> None:
+    for name in (*OF_THE_MOTION, "simulation"):
+        tables = [scenario.model_dump(include={name})[name] for scenario in (before, after)]
+        for key in dict.fromkeys(table_key for table in tables for table_key in table):
+            values = [table.get(key) for table in tables]
+            if values[0] != values[1]:
+                what = "different output times" if name == "simulation" else "different scenarios"
+                # A height field has thousands of numbers.
+                said = " against ".join(shorten(repr(value), 60, placeholder=" ...") for value in values)
+                raise ScenarioError(f"{first} and {second}: {what}: {name}.{key} {said}")
+
+
+def _read(folder: Path, name: str, engines: Sequence[str] | None) -> StoredRun:
+    manifest, metrics = document(folder, "manifest.json"), document(folder, "metrics.json")
+    try:
+        entries = {engine: manifest["engines"][engine] for engine in manifest["engines"] if _chosen(engine, engines)}
+        _ = [manifest[key] for key in ("title", "scenario", "created", "complete", "libraries", "platform")]
+        _ = [(entry["version"], dict(entry["settings"])) for entry in entries.values()]
+        _ = [float(manifest["start"]["growth_rate"]), *_state(manifest)]
+        rides = {engine: ride(folder, manifest, metrics, engine) for engine in entries if engine in metrics}
+    except ScenarioError:
+        raise
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        # A ValueError is a sentence; the others are a word that says nothing without their kind.
+        kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
+        raise ScenarioError(f"{folder}: not the files of one run: {kind}{error}") from error
+    return StoredRun(name, {**manifest, "engines": entries}, metrics, rides)
+
+
+def _chosen(engine: str, engines: Sequence[str] | None) -> bool:
+    return not engines or engine == REFERENCE or engine in engines
+
+
+def _state(manifest: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    q, qd = (np.array(manifest["start"][key], float) for key in ("q", "qd"))
+    if q.shape != (9,) or qd.shape != (9,):
+        raise ValueError("a start has nine coordinates and nine rates")
+    return q, qd
+
+
+def _same_start(before: StoredRun, after: StoredRun, first: Path, second: Path) -> None:
+    for a, b, what in zip(_state(before.manifest), _state(after.manifest), ("coordinates", "rates"), strict=True):
+        apart = np.abs(b - a)
+        # Each is a root known to this; a table of numbers cannot say which of them is right.
+        if np.any(apart > START_ERROR * (1 + np.abs(a))):
+            raise ScenarioError(
+                f"{first} and {second}: different starts: {what} differ by up to {apart.max():.2g}; "
+                "they were computed by different versions of the suite, or on other data"
+            )
+    for engine in set(before.trajectories) & set(after.trajectories):
+        times = [run.trajectories[engine].time for run in (before, after)]
+        samples = min(len(time) for time in times)
+        if not np.array_equal(times[0][:samples], times[1][:samples]):
+            raise ScenarioError(f"{first} and {second}: different output times of {engine}")
+
+
+def _ground(scenario: Scenario, run: StoredRun) -> Ground:
+    bicycle, (q, qd) = scenario.make_bicycle(), _state(run.manifest)
+    circular = isinstance(scenario.motion, CircularTable)
+    radius = float(np.hypot(q[0], q[1])) if circular else bicycle.wheelbase
+    growth_rate = float(run.manifest["start"]["growth_rate"])
+    scale = Scale.of(bicycle, qd, radius, growth_rate, scenario.simulation.duration)
+    return Ground(bicycle, scenario.surface.make(), scale)
+
+
+def diff(pair: Pair) -> dict[str, Any]:
+    """The JSON document of `velodrome diff`; ``notes`` say where a limit is not the engine's own."""
+    noises, notes = {}, []
+    for name, entry in pair.after.manifest["engines"].items():
+        if name not in pair.before.manifest["engines"]:
+            continue
+        settings = [pair.before.manifest["engines"][name]["settings"], entry["settings"]]
+        known = [_step_noise(name, values) for values in settings]
+        reasons = dict.fromkeys(value for value in known if isinstance(value, str))
+        notes += [f"{name} {reason}; its steps are allowed round-off only" for reason in reasons]
+        noises[name] = max(ROUND_OFF if isinstance(value, str) else value for value in known)
+    return diff_document(pair.before, pair.after, pair.ground, noises) | {"notes": notes}
+
+
+def _step_noise(name: str, settings: Mapping[str, Any]) -> float | str:
+    """Relative error that a step of an engine may add, or why the engine here does not tell it for such settings."""
+    if name not in installed():
+        return "is not installed here"
+    try:
+        load_engine(name)
+        engine, chosen = configure(name, settings)
+        return float(engine.step_noise(chosen))
+    except ScenarioError:
+        return "is not installed here with such settings"
+    except Exception as error:  # another package's code may break in any way
+        return f"cannot be asked here: {why_failed(error)}"
+
+
+def write_diff(pair: Pair, found: Mapping[str, Any], out: Path) -> list[Path]:
+    """Write ``diff.json``, ``diff.md`` and the recording ``diff.rrd``, and return their paths.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder cannot be made.
+    """
+    make_folder(out)
+    paths = [out / name for name in ("diff.json", "diff.md", "diff.rrd")]
+    write_json(paths[0], found)
+    page = diff_markdown(found)
+    write_text(paths[1], page)
+    if not pair.before.trajectories and not pair.after.trajectories:
+        return paths[:2]
+    _record(paths[2], pair, found, page)
+    return paths
+
+
+def _record(path: Path, pair: Pair, found: Mapping[str, Any], page: str) -> None:
+    # rerun takes a second to load; only this needs it.
+    from ...reports.recording import bright, write_recording
+
+    ground, hues = pair.ground, colours(found["engines"])
+    rides: dict[str, Trajectory] = {}
+    paint, earlier = {}, {}
+    for engine, entry in found["engines"].items():
+        labels = _labels(pair, engine, entry)
+        # The later run has the engine's own colour, the earlier one a pale one.
+        for run, label, hue in zip(
+            (pair.before, pair.after), labels, (bright(hues[engine]), hues[engine]), strict=True
+        ):
+            if engine in run.trajectories:
+                followed = follow(run.trajectories[engine], ground.bicycle, ground.surface)
+                rides[label] = as_shown(followed, ground.bicycle, ground.surface)
+                paint[label] = hue
+        if labels[0] != labels[1] and all(label in rides for label in labels):
+            earlier[labels[1]] = labels[0]
+    steady = isinstance(ground.surface, SurfaceOfRevolution)
+    undisturbed = make_start(pair.scenario).undisturbed if steady else None
+    title = f"{pair.scenario.title}: {pair.before.name} against {pair.after.name}"
+    where = (ground.bicycle, ground.surface)
+    write_recording(path, title, *where, rides, page, undisturbed=undisturbed, before=earlier, paint=paint)
+
+
+def _labels(pair: Pair, engine: str, entry: Mapping[str, Any]) -> tuple[str, str]:
+    """Names of an engine's ride in either run: with its version, or where that is the same with the run's name.
+
+    A reference that is the same in both stands once, as what all others are measured against.
+    """
+    if engine == REFERENCE and entry["verdict"] != DIFFERS:
+        return engine, engine
+    before, after = entry["version"]
+    marks = (before, after) if before != after else (pair.before.name, pair.after.name)
+    return f"{engine} @ {marks[0]}", f"{engine} @ {marks[1]}"

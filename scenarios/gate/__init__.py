@@ -1,0 +1,17 @@
+"""The drift gate: gated scenarios in every engine, held against committed baselines."""
+
+from .checks import check, refused_verdicts, update_baselines
+from .ci_files import UNFINISHED_JUNIT, UNFINISHED_MARKDOWN, junit_xml, markdown_page
+from .verdict import SHOWN, Verdict
+
+__all__ = [
+    "SHOWN",
+    "UNFINISHED_JUNIT",
+    "UNFINISHED_MARKDOWN",
+    "Verdict",
+    "check",
+    "junit_xml",
+    "markdown_page",
+    "refused_verdicts",
+    "update_baselines",
+]

@@ -1,0 +1,95 @@
+"""The gate's verdicts as files for a CI service: JUnit XML and Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+from xml.etree import ElementTree
+
+from ...reports.drawing import escaped, printable
+from .verdict import Verdict
+
+Verdicts = Sequence[tuple[str, Verdict]]
+# What a reader must see first.
+_WORST_FIRST = ("missing", "worse", "changed", "better", "holds", "shown")
+
+
+UNFINISHED_MARKDOWN = "# Drift gate: not finished\n\nThe check has not come to its verdicts.\n"
+UNFINISHED_JUNIT = """\
+<?xml version='1.0' encoding='utf-8'?>
+<testsuites name="velodrome check" tests="1" failures="0" errors="1">
+  <testsuite name="velodrome check" tests="1" failures="0" errors="1">
+    <testcase classname="velodrome" name="check">
+      <error type="unfinished" message="the check has not come to its verdicts" />
+    </testcase>
+  </testsuite>
+</testsuites>
+"""
+
+
+def junit_xml(verdicts: Verdicts) -> str:
+    """JUnit XML: a test suite a scenario, a test case a quantity of an engine.
+
+    Parameters
+    ----------
+    verdicts : sequence of (scenario, Verdict)
+        Grouped by scenario.
+
+    Returns
+    -------
+    str
+    """
+    root = ElementTree.Element("testsuites", {"name": "velodrome check"} | _counts(verdicts))
+    for name, group in groupby(verdicts, key=lambda item: item[0]):
+        cases = list(group)
+        suite = ElementTree.SubElement(root, "testsuite", {"name": name} | _counts(cases))
+        for _, verdict in cases:
+            case = ElementTree.SubElement(
+                suite, "testcase", classname=f"{name}.{verdict.engine}", name=verdict.quantity
+            )
+            if not verdict.passes:
+                ElementTree.SubElement(case, "failure", type=verdict.status, message=printable(verdict.reason))
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _counts(verdicts: Verdicts) -> dict[str, str]:
+    failures = sum(not verdict.passes for _, verdict in verdicts)
+    return {"tests": str(len(verdicts)), "failures": str(failures), "errors": "0"}
+
+
+def markdown_page(verdicts: Verdicts) -> str:
+    """Markdown for a summary: the outcome, what moved, then all quantities, the worst first.
+
+    Parameters
+    ----------
+    verdicts : sequence of (scenario, Verdict)
+
+    Returns
+    -------
+    str
+    """
+    passes = all(verdict.passes for _, verdict in verdicts)
+    held = sum(verdict.status == "holds" for _, verdict in verdicts)
+    judged = sum(verdict.status != "shown" for _, verdict in verdicts)
+    lines = [f"# Drift gate: {'holds' if passes else 'fails'}", "", f"{held} of {judged} quantities hold.", ""]
+    ordered = sorted(verdicts, key=lambda item: _WORST_FIRST.index(item[1].status))
+    moved = [(name, one) for name, one in ordered if one.told]
+    for name, verdict in moved:
+        reason = escaped(verdict.reason)
+        who = escaped(f"{name}, {verdict.engine}")
+        lines.append(f"- **{verdict.status}** {who}, {verdict.quantity}: {reason}")
+    lines += [""] if moved else []
+    lines += [
+        "| scenario | engine | quantity | value | baseline | limit | verdict |",
+        "|---|---|---|---:|---:|---:|---|",
+    ]
+    for name, verdict in ordered:
+        numbers = (_number(value) for value in (verdict.value, verdict.baseline, verdict.limit))
+        cells = (escaped(name), escaped(verdict.engine), verdict.quantity, *numbers, verdict.status)
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.6g}"

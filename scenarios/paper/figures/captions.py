@@ -1,0 +1,96 @@
+"""What is said below each figure, from the data it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ....reference.circular import CircularMotion
+from ....reference.kinematics import REAR_ANGLE
+from ....reports.figures import curves
+from .trajectories import Ride, leaves_at
+
+LEFT = 0.01  # of the radius: so far off its circle D has left it
+SETTLED = 10.0  # last part of a ride, over which its mean rate is taken [s]
+
+_AXES = (
+    "Circular motions: (a) lean and (b) steer over the scaled speed of the front wheel; on families 2 and 4, whose "
+    "front wheel turns backward, over its negative, as in the paper."
+)
+
+
+def families_caption(document: Mapping[str, Any], front_radius: float) -> str:
+    """Of a figure of solution families: what its lines mean, and what is stable."""
+    drawn = curves(document["families"], front_radius)
+    words = [_AXES]
+    shared = [curve.families for curve in drawn if len(curve.families) > 1]
+    if shared:
+        pairs = " and ".join(f"{first} with {second}" for first, second in shared)
+        words.append(f"Families have joined: {pairs}, each pair on one curve, striped where a bicycle can ride it.")
+    if any(not pushed for curve in drawn for _, _, pushed in curve.pieces()):
+        words.append("Dashed: the ground would have to pull a wheel, so no bicycle can ride there.")
+    words.append("Open marks are limits: E and F lying flat at infinite speed, others on ever larger circles.")
+    sections = []
+    for family in document["families"]:
+        for section in family["stable_sections"]:
+            low, high = sorted(section["rear_rate"])
+            sections.append(f"family {family['family']} at rear rates from {low:.4f} to {high:.4f} rad/s")
+    stable = (
+        f"Thick and magnified: Lyapunov stable, {' and '.join(sections)}."
+        if sections
+        else "No section is Lyapunov stable."
+    )
+    return " ".join([*words, stable])
+
+
+def configurations_caption(alpha: float) -> str:
+    """Of the bicycles in the bowl."""
+    return (
+        f"Four circular motions in the bowl α = {alpha:g} m⁻¹, one of each family, as marked in Figure 5; wheels, axes "
+        "and poses are computed, the tubes are for the eye. Grey: the steered part. Seen from outside, where the wall "
+        "would turn its back to the eye it is left out."
+    )
+
+
+def departure_caption(ride: Ride, circle: CircularMotion, growth_rate: float) -> str:
+    """Of the ride that leaves Q1."""
+    times = [leaves_at(motion, circle, LEFT) for motion in (ride.paper, ride.precise)]
+    paper, precise = ("never" if time is None else f"after {time:.1f} s" for time in times)
+    ends = [f"{motion.time[-1]:.1f} s" for motion in (ride.paper, ride.precise)]
+    return (
+        f"A ride from {ride.name}: (a) path of D, (b) wheel rates, (c) distance of D from its circle. By modified "
+        f"Euler D is {100 * LEFT:g} % off its circle {paper}, by the precise integrator {precise}: that one starts "
+        f"from round-off alone, and in both errors grow at the rate of linear theory, {growth_rate:.4f} 1/s. They "
+        f"leave along like paths at different times. Curves end where a wheel leaves the ground, after {ends[0]} "
+        f"and {ends[1]}."
+    )
+
+
+def disturbed_caption(rides: Sequence[Ride], circle: CircularMotion, neighbours: Mapping[str, CircularMotion]) -> str:
+    """Of the disturbed rides about Q2."""
+    words = []
+    for ride in rides:
+        level = neighbours[ride.name].rear_rate
+        words.append(
+            f"with {ride.name} its mean over the last {SETTLED:g} s is {settled_rate(ride):.4f} rad/s, and {level:.4f} "
+            f"on the circle of equal energy (integrators apart after {ride.both[0][-1]:g} s: {ride.apart[-1]:.2g} m)"
+        )
+    return (
+        "Rides from Q2, disturbed in the lean rate: (a) path of D in the first 20 s, (b) rate of the rear wheel, (c) "
+        "distance of D between the two integrators. The rate does not return to "
+        f"{circle.rear_rate:g} rad/s: {'; '.join(words)}. "
+        "The slowest disturbance, a drift of the circle's centre, still fades."
+    )
+
+
+def settled_rate(ride: Ride) -> float:
+    """Mean rear-wheel rate at the end of a ride [rad/s]."""
+    late = ride.precise.time > ride.precise.time[-1] - SETTLED
+    return float(np.mean(ride.precise.qd[late, REAR_ANGLE]))
+
+
+def captions_text(captions: Mapping[str, str]) -> str:
+    """All captions as Markdown: name of the figure's file to caption."""
+    return "\n".join(f"## {name.replace('-', ' ').capitalize()}\n\n{text}\n" for name, text in captions.items())

@@ -1,0 +1,170 @@
+"""Computes and draws the figures and tables of Xiong, Wang and Liu (2020)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from ....reference.bicycle import Bicycle
+from ....reference.circular import CircularMotion
+from ....reference.contact import observe
+from ....reference.families import trace
+from ....reference.simulate import simulate, simulate_modified_euler
+from ....reference.stability import independent, linearise
+from ....reference.surface import Paraboloid
+from ....reports.figures import solution_figure, style, write_figure
+from ...files import make_folder, write_json, write_text
+from ...motions import families_document
+from ...run import Watch
+from ...scenario import Start, load_scenario, make_start
+from ..energy import motion_of_energy
+from ..ledger import Line
+from ..ledger import document as ledger_document
+from ..table import markdown
+from .captions import captions_text, configurations_caption, departure_caption, disturbed_caption, families_caption
+from .configurations import Configuration, configurations_figure
+from .tables import LinearisedPoint, linearisation_document, linearisation_tables
+from .trajectories import Ride, departure_figure, disturbed_figure, while_pushed
+
+ENDINGS = (".svg", ".png")
+ALPHAS = {"figure-2": 0.0, "figure-3": 1 / 200, "figure-4": 1 / 20, "figure-5": 1 / 5, "figure-7": 1.0}
+MARKS = {"figure-3": ("q1", "q2"), "figure-5": ("p1", "p2", "p3", "p4")}  # motions that the paper marks
+DISTURBED = {"+0.1 rad/s": "q2-plus", "−0.1 rad/s": "q2-minus"}
+DEPARTURE, SETTLING = 100.0, 60.0  # simulated from Q1 and about Q2 [s]
+
+Drawn = tuple[Figure, str]
+
+
+def write_figures(out: Path, progress: Watch, endings: Iterable[str] = ENDINGS) -> list[Path]:
+    """Compute and write Figures 2 to 9, their captions, and the tables at Q1 and Q2.
+
+    Parameters
+    ----------
+    out : Path
+        Folder, made if need be.
+    progress : callable
+        Called with what comes next, how many are done, and how many there are.
+    endings : iterable of str
+        Formats to write each figure in.
+
+    Returns
+    -------
+    list of Path
+        Files written, each whole or not at all.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    written: list[Path] = []
+    captions: dict[str, str] = {}
+    jobs = _jobs()
+    with style():
+        for done, (name, draw) in enumerate(jobs.items()):
+            progress(name, done, len(jobs) + 1)
+            figure, captions[name] = draw()
+            for ending in endings:
+                write_figure(out / f"{name}{ending}", figure)
+                written.append(out / f"{name}{ending}")
+    progress("tables", len(jobs), len(jobs) + 1)
+    points = [linearised_point("Q1", "q1"), linearised_point("Q2", "q2")]
+    write_text(out / "captions.md", captions_text(captions))
+    write_text(out / "tables.md", linearisation_tables(points))
+    write_json(out / "linearisation.json", linearisation_document(points))
+    return [*written, *(out / name for name in ("captions.md", "tables.md", "linearisation.json"))]
+
+
+def write_paper(out: Path, lines: Sequence[Line], progress: Watch) -> list[Path]:
+    """Write the ledger, as JSON and as a page of Markdown, and all figures and tables into a folder.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder cannot be made.
+    """
+    make_folder(out)
+    write_json(out / "ledger.json", ledger_document(lines))
+    write_text(out / "ledger.md", markdown(lines))
+    return [out / "ledger.json", out / "ledger.md", *write_figures(out, progress)]
+
+
+def _jobs() -> dict[str, Callable[[], Drawn]]:
+    """Name of a figure to what computes and draws it, in the paper's order."""
+    jobs: dict[str, Callable[[], Drawn]] = {name: partial(_families, name) for name in ALPHAS}
+    jobs |= {"figure-6": _configurations, "figure-8": _departure, "figure-9": _disturbed}
+    return dict(sorted(jobs.items()))
+
+
+def _families(name: str) -> Drawn:
+    alpha, marked = ALPHAS[name], {key.upper(): start_named(key) for key in MARKS.get(name, ())}
+    marks = {key: _figures(_motion(start)) for key, start in marked.items()}
+    document = families_document(alpha)
+    return solution_figure(document, Bicycle().front_wheel_radius, marks), families_caption(
+        document, Bicycle().front_wheel_radius
+    )
+
+
+def _configurations() -> Drawn:
+    starts = {name: start_named(name) for name in MARKS["figure-5"]}
+    shown = [Configuration(name.upper(), start.family or 0, _motion(start)) for name, start in starts.items()]
+    problem = starts["p1"].problem
+    figure = configurations_figure(problem.bicycle, problem.surface, shown)
+    return figure, configurations_caption(ALPHAS["figure-5"])
+
+
+def _departure() -> Drawn:
+    start = start_named("q1", DEPARTURE)
+    ride, motion = ride_from("Q1", start), _motion(start)
+    return departure_figure(ride, motion, start.growth_rate), departure_caption(ride, motion, start.growth_rate)
+
+
+def _disturbed() -> Drawn:
+    circle = _motion(start_named("q2"))
+    starts = {words: start_named(name, SETTLING) for words, name in DISTURBED.items()}
+    rides = [ride_from(words, start) for words, start in starts.items()]
+    neighbours = {words: circle_of_equal_energy(start, circle) for words, start in starts.items()}
+    return disturbed_figure(rides, circle, neighbours), disturbed_caption(rides, circle, neighbours)
+
+
+def ride_from(name: str, start: Start) -> Ride:
+    """Integrate a start precisely and by the paper's method, as far as both wheels are pushed."""
+    problem = start.problem
+    motions = [
+        integrate(problem.bicycle, problem.surface, problem.q, problem.qd, problem.times)
+        for integrate in (simulate, simulate_modified_euler)
+    ]
+    return Ride(name, *(while_pushed(motion, problem.bicycle, problem.surface) for motion in motions))
+
+
+def circle_of_equal_energy(start: Start, circle: CircularMotion) -> CircularMotion:
+    """The circular motion of a start's energy, which the ride keeps, in the family of a circle."""
+    problem, number = start.problem, start.family
+    if number is None:
+        raise ValueError("a ride that starts on no circle has no family of circles")
+    seen = observe(problem.bicycle, problem.surface, problem.q[None], problem.qd[None])
+    energy = float(seen.kinetic_energy[0] + seen.potential_energy[0])
+    return motion_of_energy(trace(problem.bicycle, Paraboloid(ALPHAS["figure-3"]), number), energy, circle)
+
+
+def linearised_point(words: str, name: str) -> LinearisedPoint:
+    """The reduced linear system at a scenario's circular motion."""
+    start = start_named(name)
+    problem, motion = start.problem, _motion(start)
+    state = motion.state()
+    return LinearisedPoint(words, independent(*state), linearise(problem.bicycle, problem.surface, *state))
+
+
+def start_named(name: str, duration: float | None = None) -> Start:
+    """Start of a scenario of the library, its duration changed if one is given [s]."""
+    changes = {} if duration is None else {"simulation.duration": duration}
+    return make_start(load_scenario(name, changes)[1])
+
+
+def _motion(start: Start) -> CircularMotion:
+    if start.motion is None:
+        raise ValueError("the paper's points are circular motions")
+    return start.motion
+
+
+def _figures(motion: CircularMotion) -> dict[str, float]:
+    return {"lean": motion.lean, "steer": motion.steer, "front_rate": motion.front_rate}

@@ -1,0 +1,14 @@
+"""The paper's printed figures and the ledger that holds them against what is measured."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+
+@cache
+def printed() -> dict[str, Any]:
+    """Figures as printed by Xiong et al. (2020) and by the papers it is validated against."""
+    return tomllib.loads(Path(__file__).with_name("printed.toml").read_text(encoding="utf-8"))

@@ -1,0 +1,159 @@
+"""What a run leaves behind: a folder with its manifest, its recording and its page."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from ...engines.engine import Engine, Settings, Trajectory, packages
+from ...reference.surface import SurfaceOfRevolution
+from ...reports.drawing import summary
+from ..error import ScenarioError
+from ..files import write_json, write_text
+from ..scenario import Scenario, Start
+
+LIBRARIES = ("velodrome", "numpy", "scipy", "numba", "exudyn", "mujoco", "rerun-sdk", "pyarrow", "jinja2")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A run that has been checked: everything bad input could break is behind it.
+
+    Attributes
+    ----------
+    name : str
+    scenario : Scenario
+    start : Start
+    engines : dict
+        Name to (engine, its settings), the reference first.
+    left_out : dict
+        Engines that were not asked for by name and are not made for this problem, with the reason.
+    """
+
+    name: str
+    scenario: Scenario
+    start: Start
+    engines: dict[str, tuple[Engine, Settings]]
+    left_out: dict[str, str]
+
+
+def new_folder(out: Path, name: str) -> Path:
+    """Make a fresh folder named after the scenario and the time; an older run is never touched."""
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S")
+    for attempt in range(1, 1000):
+        folder = out / (f"{name}-{stamp}" if attempt == 1 else f"{name}-{stamp}-{attempt}")
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise ScenarioError(f"{out}: the run folder cannot be made: {error.strerror}") from error
+        return folder
+    raise ScenarioError(f"{out}: too many runs of {name} in one second")
+
+
+def write_manifest(
+    folder: Path,
+    plan: Plan,
+    trajectories: Mapping[str, Trajectory],
+    failures: Mapping[str, str],
+    verdicts: Sequence[Mapping[str, Any]] = (),
+    complete: bool = False,
+) -> dict[str, Any]:
+    """Write what ran, with which versions, settings and start, and return it.
+
+    Parameters
+    ----------
+    folder : Path
+    plan : Plan
+    trajectories : mapping
+        Those that are done.
+    failures : mapping
+        Reason by the name of an engine that gave no trajectory.
+    verdicts : sequence of mapping
+    complete : bool
+        Whether every engine has had its turn.
+    """
+    start = plan.start
+    engines: dict[str, Any] = {}
+    for name, (engine, settings) in plan.engines.items():
+        entry: dict[str, Any] = {"version": engine.version, "settings": settings.model_dump()}
+        if name in trajectories:
+            done = trajectories[name]
+            entry |= {"cpu_time": done.cpu_time, "steps": done.steps, "ended": done.ended}
+        if name in failures:
+            entry["failed"] = failures[name]
+        engines[name] = entry
+    manifest = {
+        "scenario": plan.name,
+        "title": plan.scenario.title,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "complete": complete,
+        "engines": engines,
+        "left_out": plan.left_out,
+        "verdicts": list(verdicts),
+        "libraries": library_versions(),
+        "platform": {"system": platform.platform(), "machine": platform.machine(), "python": platform.python_version()},
+        "start": {
+            "family": start.family,
+            "growth_rate": start.growth_rate,
+            "q": start.problem.q.tolist(),
+            "qd": start.problem.qd.tolist(),
+        },
+    }
+    write_json(folder / "manifest.json", manifest)
+    return manifest
+
+
+def library_versions() -> dict[str, str]:
+    """Versions of the libraries that results depend on, of those installed, and of the engines' packages."""
+    found = packages()
+    for library in LIBRARIES:
+        try:
+            found[library] = version(library)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def record(
+    folder: Path,
+    plan: Plan,
+    shown: Mapping[str, Trajectory],
+    measured: Mapping[str, Mapping[str, Any]],
+    failures: Mapping[str, str],
+    verdicts: Sequence[Mapping[str, Any]],
+) -> None:
+    """Write the recording of the rides as they are to be shown, where there are any."""
+    if not shown:
+        return
+    # rerun takes a second to load; only a run needs it.
+    from ...reports.recording import write_recording
+
+    problem = plan.start.problem
+    steady = isinstance(problem.surface, SurfaceOfRevolution)
+    facts = (plan.start.growth_rate, plan.scenario.simulation.duration, steady)
+    text = summary(plan.scenario.title, measured, failures, verdicts, *facts)
+    where = (plan.scenario.title, problem.bicycle, problem.surface)
+    undisturbed = plan.start.undisturbed if steady else None
+    write_recording(folder / "comparison.rrd", *where, shown, text, undisturbed=undisturbed)
+
+
+def write_page(
+    folder: Path,
+    plan: Plan,
+    shown: Mapping[str, Trajectory],
+    measured: Mapping[str, Mapping[str, Any]],
+    manifest: Mapping[str, Any],
+) -> None:
+    """Write the report page of the rides as they are to be shown; see `velodrome.reports.page`."""
+    from ...reports.page import page
+
+    surface = plan.start.problem.surface
+    text = page(manifest, plan.scenario.model_dump(), measured, manifest["verdicts"], shown, surface)
+    write_text(folder / "report.html", text)

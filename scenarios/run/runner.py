@@ -1,0 +1,255 @@
+"""Scenario to run folder: every engine from the same start, compared, recorded."""
+
+from __future__ import annotations
+
+import json
+import signal
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+from pydantic import ValidationError
+
+from ...engines.admission import ride
+from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, load_engine, why_failed
+from ...engines.guard import call_engine
+from ...engines.storage import write_trajectory
+from ...reports.measure import ROUND_OFF, as_shown, follow, metrics
+from ..error import ScenarioError
+from ..files import write_json, write_text
+from ..scenario import Scenario, Start, make_start, one_line, refuse_unknown
+from .folder import Plan, new_folder, record, write_manifest, write_page
+from .installed import installed
+
+# (engine, simulated time reached, duration)
+Watch = Callable[[str, float, float], None]
+# (engine, what it raised)
+Trace = Callable[[str, Exception], None]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run came to.
+
+    Attributes
+    ----------
+    folder : Path
+    metrics : dict
+        Per engine, as in ``metrics.json``.
+    failures : dict
+        Engines that gave no trajectory, with the reason.
+    verdicts : list of dict
+        Per engine and criterion: ``engine, quantity, value, limit, holds``.
+    interrupted : bool
+    """
+
+    folder: Path
+    metrics: dict[str, dict[str, Any]]
+    failures: dict[str, str]
+    verdicts: list[dict[str, Any]]
+    interrupted: bool
+
+
+def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> Plan:
+    """Check engines and settings and compute the start.
+
+    Parameters
+    ----------
+    name : str
+    scenario : Scenario
+    wanted : list of str, optional
+        Engines to run beside the reference; all that are installed and made for the problem if not given.
+
+    Raises
+    ------
+    ScenarioError
+        If an engine is not installed, a setting is wrong, or the motion does not exist.
+    """
+    there = installed()
+    for engine in [*(wanted or []), *scenario.engines]:
+        if engine not in there:
+            raise ScenarioError(f"engine {engine!r} is not installed; there are {', '.join(there)}")
+    names = [engine for engine in there if engine == REFERENCE or not wanted or engine in wanted]
+    chosen = {engine: configure(engine, scenario.engines.get(engine, {})) for engine in names}
+    start = make_start(scenario)
+    left_out: dict[str, str] = {}
+    for engine, (library, settings) in chosen.items():
+        try:
+            library.check(start.problem, settings)
+        except ValueError as error:
+            if wanted or not isinstance(error, UnsuitableProblem):
+                raise ScenarioError(f"engines.{engine}: {error}") from error
+            left_out[engine] = str(error)
+        except Exception as error:  # an engine may break here as well
+            raise ScenarioError(f"engines.{engine}: its check failed: {why_failed(error)}") from error
+    chosen = {engine: pair for engine, pair in chosen.items() if engine not in left_out}
+    return Plan(name, scenario, start, chosen, left_out)
+
+
+def configure(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
+    """Load an engine and validate its settings.
+
+    Raises
+    ------
+    ScenarioError
+        If it is no engine, or a setting is unknown or out of range.
+    """
+    try:
+        engine = load_engine(name)
+    except ValueError as error:
+        raise ScenarioError(" ".join(str(error).split())) from error
+    try:
+        refuse_unknown(values, engine.settings.model_fields)
+        # As JSON: strictness would refuse a TOML array where a setting is a tuple.
+        text = json.dumps(dict(values), default=str)
+        return engine, call_engine(engine.settings.model_validate_json, text, strict=True)
+    except ValidationError as error:
+        raise ScenarioError(f"engines.{name}.{one_line(error)}") from error
+    except ValueError as error:
+        raise ScenarioError(f"engines.{name}: {error}") from error
+    except Exception as error:  # settings may have code of their own
+        raise ScenarioError(f"engines.{name}: its settings failed: {why_failed(error)}") from error
+
+
+def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None], trace: Trace | None = None) -> Outcome:
+    """Run every engine of a plan and write the run folder.
+
+    Each engine's trajectory is written when it is done; Ctrl-C ends the engine at work and leaves the
+    finished ones compared and recorded.
+
+    Parameters
+    ----------
+    plan : Plan
+    out : Path
+        Folder that the run folder is made in.
+    watch : callable
+        Called with engine, time reached and duration.
+    note : callable
+        Called with a line when something needs saying.
+    trace : callable, optional
+        Called with an engine that broke and what it raised.
+
+    Returns
+    -------
+    Outcome
+    """
+    folder = new_folder(out, plan.name)
+    write_text(folder / "scenario.toml", tomli_w.dumps(plan.scenario.model_dump(exclude_none=True)))
+    trajectories: dict[str, Trajectory] = {}
+    failures: dict[str, str] = {}
+    interrupted = False
+    write_manifest(folder, plan, trajectories, failures)
+    problem, duration = plan.start.problem, plan.scenario.simulation.duration
+    try:
+        for name, (engine, settings) in plan.engines.items():
+            try:
+                trajectory = ride(engine, problem, settings, lambda t, name=name: watch(name, t, duration))
+            except Exception as error:  # whatever an engine raises must not cost the others' results
+                failures[name] = why_failed(error)
+                note(f"{name}: {failures[name]}")
+                if trace is not None:
+                    trace(name, error)
+            else:
+                write_trajectory(trajectory, folder / f"{name}.parquet")
+                trajectories[name] = trajectory
+            write_manifest(folder, plan, trajectories, failures)
+    except KeyboardInterrupt:
+        interrupted = True
+        note("interrupted: finished engines are kept")
+    with _deaf_to_interrupts():
+        where = (problem.bicycle, problem.surface)
+        followed = {name: follow(one, *where) for name, one in trajectories.items()}
+        measured = measure(plan, trajectories, followed)
+        verdicts = judge(plan, measured)
+        write_json(folder / "metrics.json", measured)
+        shown = {name: as_shown(one, *where) for name, one in followed.items()}
+        record(folder, plan, shown, measured, failures, verdicts)
+        found = write_manifest(folder, plan, trajectories, failures, verdicts, complete=not interrupted)
+        write_page(folder, plan, shown, measured, found)
+    return Outcome(folder, measured, failures, verdicts, interrupted)
+
+
+def measure_one(
+    start: Start,
+    trajectory: Trajectory,
+    reference: Trajectory | None,
+    *,
+    step_noise: float = ROUND_OFF,
+    followed: Trajectory | None = None,
+) -> dict[str, Any]:
+    """Metrics of a trajectory from a start, against a reference where there is one."""
+    return metrics(
+        trajectory,
+        reference,
+        start.problem.bicycle,
+        start.problem.surface,
+        start.growth_rate,
+        start.size,
+        start.motion is not None,
+        step_noise=step_noise,
+        followed=followed,
+    )
+
+
+def measure(
+    plan: Plan, trajectories: Mapping[str, Trajectory], followed: Mapping[str, Trajectory]
+) -> dict[str, dict[str, Any]]:
+    """Metrics of every trajectory against the reference's; without a reference, of each by itself.
+
+    ``followed`` are the trajectories as `velodrome.reports.measure.consistency.follow` gives them.
+    """
+    reference = followed.get(REFERENCE)
+    return {
+        name: measure_one(
+            plan.start,
+            trajectory,
+            None if name == REFERENCE else reference,
+            step_noise=claimed_noise(*plan.engines[name]),
+            followed=followed[name],
+        )
+        for name, trajectory in trajectories.items()
+    }
+
+
+def claimed_noise(engine: Engine, settings: Settings) -> float:
+    """Relative error that a step may add by an engine's own word; round-off where it has none that could be meant."""
+    try:
+        value = float(engine.step_noise(settings))
+    except Exception:  # a plug-in may break in any way, and its ride is done
+        return ROUND_OFF
+    return value if np.isfinite(value) and value >= 0 else ROUND_OFF
+
+
+def judge(plan: Plan, measured: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Verdicts on the scenario's criterion, one an engine; an engine that cannot show it does not hold it."""
+    if plan.scenario.criterion is None:
+        return []
+    limit = plan.scenario.criterion.energy_variation
+    verdicts = []
+    for name in plan.engines:
+        value = measured.get(name, {}).get("energy_variation")
+        # A bicycle that fell, or a run that ended, has not done the manoeuvre.
+        done = name in measured and measured[name]["fell_at"] is None and measured[name]["ended"] is None
+        holds = done and value is not None and value < limit
+        verdicts.append(
+            {"engine": name, "quantity": "energy_variation", "value": value, "limit": limit, "holds": holds}
+        )
+    return verdicts
+
+
+@contextmanager
+def _deaf_to_interrupts():
+    """Let no Ctrl-C tear the files of the finished engines; writing them takes a second."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # signals reach the main thread only
+        return
+    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)

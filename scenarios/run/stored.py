@@ -1,0 +1,95 @@
+"""What is read back of a run folder; a file that is missing or damaged makes one line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ...engines.engine import Trajectory
+from ...engines.storage import read_trajectory
+from ..error import ScenarioError
+from ..scenario import shown
+
+
+def part(folder: Path, name: str) -> Path:
+    """A file of a run folder, which must be there.
+
+    Raises
+    ------
+    ScenarioError
+        If it is not, or the name leads elsewhere.
+    """
+    if Path(name).name != name:
+        raise ScenarioError(f"{folder}: {shown(repr(name))} is no name of a file in it")
+    if not folder.is_dir():
+        raise ScenarioError(f"{folder}: no such folder; velodrome run writes one and says where")
+    if not (folder / name).is_file():
+        raise ScenarioError(f"{folder}: not the folder of a finished run: it has no {shown(name)}")
+    return folder / name
+
+
+def document(folder: Path, name: str) -> Mapping[str, Any]:
+    """A JSON object of a run folder.
+
+    Raises
+    ------
+    ScenarioError
+        If it is missing, cannot be read, or is something else.
+    """
+    path = part(folder, name)
+    try:
+        found = read_json(path)
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise ScenarioError(f"{path}: not a JSON document: {' '.join(str(error).split())}") from error
+    if not isinstance(found, dict):
+        raise ScenarioError(f"{path}: not a JSON object")
+    return found
+
+
+def read_json(path: Path) -> Any:
+    """A JSON document as `velodrome.scenarios.files.write_json` writes them.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    ValueError
+        If it is none: also where it has numbers or letters that JSON or UTF-8 have not.
+    """
+
+    def refuse(constant: str) -> None:
+        raise ValueError(f"{constant} is no number of JSON")
+
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+        # Half of a pair of surrogates can be written in JSON, and nowhere else.
+        json.dumps(found, ensure_ascii=False).encode("utf-8")
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+    return found
+
+
+def ride(folder: Path, manifest: Mapping[str, Any], metrics: Mapping[str, Any], engine: str) -> Trajectory:
+    """An engine's trajectory of a run folder, which must be the one that the other files tell of.
+
+    Raises
+    ------
+    ScenarioError
+        If it is missing, or of another engine or another run.
+    ValueError
+        If it is no trajectory.
+    """
+    path = part(folder, f"{engine}.parquet")
+    found = read_trajectory(path)
+    entries = {"manifest.json": manifest["engines"][engine], "metrics.json": metrics[engine]}
+    if found.engine != engine:
+        raise ScenarioError(f"{path}: is a trajectory of {shown(repr(found.engine))}")
+    for name, entry in entries.items():
+        # No two runs take the same CPU time to the last digit.
+        if (entry["cpu_time"], entry["steps"]) != (found.cpu_time, found.steps):
+            raise ScenarioError(f"{path}: is of another run than {name}")
+    return found

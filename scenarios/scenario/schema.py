@@ -1,0 +1,232 @@
+"""The schema of a scenario file: TOML in, validated data out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError, field_validator, model_validator
+
+from ...reference.bicycle import Bicycle
+from ..error import ScenarioError
+from .surfaces import SurfaceTable
+from .table import Table, UnknownName, one_line, placed, read_toml, shown
+
+LIBRARY = Path(__file__).parents[1] / "library"
+# The tables that the motion depends on.
+OF_THE_MOTION = ("surface", "motion", "perturbation", "bicycle")
+
+
+# Far beyond any bicycle, and far from where products of such numbers overflow.
+_Moderate = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
+class Near(Table):
+    """Angles that a circular motion is near to."""
+
+    lean: float
+    steer: float
+
+
+class CircularTable(Table):
+    """A circular motion to start from."""
+
+    kind: Literal["circular"] = "circular"
+    rear_rate: float = Field(gt=0, le=1e4, description="rear-wheel rate [rad/s]")
+    family: Annotated[int, Field(ge=1, le=4)] | None = None
+    near: Near | None = None
+
+    @model_validator(mode="after")
+    def _determined(self) -> CircularTable:
+        if self.family is None and self.near is None:
+            raise ValueError("a circular motion needs family = 1 to 4, near = { lean, steer }, or both")
+        return self
+
+
+class UprightTable(Table):
+    """A straight upright start along x, the rear contact in the origin."""
+
+    kind: Literal["upright"]
+    speed: float = Field(gt=0, le=1e4, description="forward speed [m/s]")
+
+
+class Perturbation(Table):
+    """Added to the independent variables of the start; the rest is solved."""
+
+    x: _Moderate = 0.0
+    y: _Moderate = 0.0
+    lean: _Moderate = 0.0
+    steer: _Moderate = 0.0
+    lean_rate: _Moderate = 0.0
+    steer_rate: _Moderate = 0.0
+    rear_rate: _Moderate = 0.0
+
+
+class Simulation(Table):
+    """How long, and how often to report."""
+
+    duration: float = Field(gt=0, le=1e5, description="[s]")
+    output_rate: float = Field(100.0, gt=0, le=1e5, description="[1/s]")
+
+    @model_validator(mode="after")
+    def _whole_samples(self) -> Simulation:
+        samples = self.duration * self.output_rate
+        if samples > 5e6:
+            raise ValueError(f"duration x output_rate is {samples:.3g} samples; at most 5e6 fit a run folder")
+        if samples < 0.999 or abs(samples - round(samples)) > 1e-6 * samples:
+            raise ValueError(
+                f"duration {self.duration!r} s is no whole number of output intervals of {1 / self.output_rate!r} s"
+            )
+        return self
+
+
+class Gate(Simulation):
+    """How the drift gate rides a scenario, and what it measures beside the ride."""
+
+    # Seconds of work in the slowest engine.
+    duration: float = Field(default=3.0, gt=0, le=1e5, description="[s]")
+    # An interval that doubled steps divide as well: a coarser step is judged, not refused.
+    output_rate: float = Field(default=50.0, gt=0, le=1e5, description="[1/s]")
+    order: bool = Field(default=True, description="measure the order of convergence")
+    eigenvalues: bool = Field(default=True, description="measure the engine's own eigenvalues, of a circular motion")
+
+
+class Criterion(Table):
+    """A verdict that a benchmark asks of every engine."""
+
+    energy_variation: float = Field(gt=0, description="limit of 100 (Emax - Emin) / E(0) [percent]")
+
+
+class Scenario(Table):
+    """A scenario as its file declares it."""
+
+    title: str
+    tags: Annotated[tuple[str, ...], Field(strict=False)] = ()  # TOML has arrays only
+    surface: SurfaceTable
+    motion: Annotated[CircularTable | UprightTable, Field(discriminator="kind")]
+    perturbation: Perturbation = Perturbation()
+    simulation: Simulation
+    gate: Gate | None = None
+    criterion: Criterion | None = None
+    bicycle: dict[str, _Moderate] = Field(default_factory=dict)
+    engines: dict[str, dict[str, Any]] = Field(default_factory=dict)
+
+    @field_validator("title")
+    @classmethod
+    def _title_is_one_line(cls, title: str) -> str:
+        return _line_of_text(title)
+
+    @field_validator("tags")
+    @classmethod
+    def _tags_are_lines(cls, tags: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(_line_of_text(tag) for tag in tags)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _circular_by_default(cls, data: Any) -> Any:
+        if isinstance(data, Mapping) and isinstance(data.get("motion"), Mapping) and "kind" not in data["motion"]:
+            return {**data, "motion": {"kind": "circular", **data["motion"]}}
+        return data
+
+    @model_validator(mode="after")
+    def _bicycle_exists(self) -> Scenario:
+        self.make_bicycle()
+        return self
+
+    def make_bicycle(self) -> Bicycle:
+        """Build the benchmark bicycle with this scenario's overrides.
+
+        Raises
+        ------
+        ValueError
+            If a name is unknown or a value is not possible.
+        """
+        unknown = sorted(set(self.bicycle) - set(Bicycle.__dataclass_fields__))
+        if unknown:
+            names = ", ".join(Bicycle.__dataclass_fields__)
+            raise UnknownName(f"bicycle parameter {shown(repr(unknown[0]))} is unknown; there are {names}")
+        return Bicycle(**self.bicycle)
+
+
+def _line_of_text(text: str) -> str:
+    if not text.strip() or not text.isprintable():
+        raise ValueError("must be one line of text")
+    return text
+
+
+def library_names() -> list[str]:
+    """Names of the library's scenarios, sorted."""
+    return sorted(entry.name.removesuffix(".toml") for entry in LIBRARY.iterdir() if entry.name.endswith(".toml"))
+
+
+def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tuple[str, Scenario]:
+    """Read a scenario by library name or by path, apply changes, validate.
+
+    Parameters
+    ----------
+    source : str
+        A library name, or a path to a TOML file.
+    changes : mapping, optional
+        Dotted key to value, e.g. ``{"simulation.duration": 5.0}``.
+
+    Returns
+    -------
+    name : str
+        The library name or the file's stem.
+    scenario : Scenario
+
+    Raises
+    ------
+    ScenarioError
+        With one line.
+    """
+    if source in library_names():
+        name, text = source, (LIBRARY / f"{source}.toml").read_text(encoding="utf-8")
+    elif Path(source).suffix != ".toml":
+        raise ScenarioError(
+            f"no scenario {shown(repr(source))} in the library; there are {', '.join(library_names())}, "
+            "or give a path to a .toml file"
+        )
+    else:
+        name, text = read_file(source)
+    try:
+        data = read_toml(text)
+    except ValueError as error:
+        raise ScenarioError(f"{shown(source)}: not valid TOML: {shown(str(error))}") from error
+    try:
+        data = placed(data, changes or {})
+    except ValueError as error:
+        raise ScenarioError(f"--set {error}") from error
+    return name, validate(data, source)
+
+
+def validate(data: Mapping[str, Any], source: str) -> Scenario:
+    """Validate a scenario's data; the first thing wrong makes the one line of a `ScenarioError`."""
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError as error:
+        raise ScenarioError(f"{shown(source)}: {one_line(error)}") from error
+
+
+def read_file(source: str) -> tuple[str, str]:
+    """Stem and text of a file that says what to run.
+
+    Raises
+    ------
+    ScenarioError
+        If it cannot be read.
+    """
+    path = Path(source)
+    # Folders and files of what is run bear the stem.
+    if not path.stem.isprintable():
+        raise ScenarioError(f"{shown(source)}: cannot be read: a scenario's file name must be printable text")
+    try:
+        if path.exists() and not path.is_file():
+            raise ScenarioError(f"{shown(source)}: cannot be read: it is no file")  # and a pipe would keep us waiting
+        return path.stem, path.read_text(encoding="utf-8-sig")
+    except (OSError, ValueError) as error:
+        if isinstance(error, ScenarioError):
+            raise
+        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+        raise ScenarioError(f"{shown(source)}: cannot be read: {reason}") from error

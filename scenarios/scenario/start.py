@@ -1,0 +1,120 @@
+"""From a scenario to a problem: the motion is computed, disturbed and put on the constraints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from ...engines.engine import Problem
+from ...reference.bicycle import Bicycle
+from ...reference.circular import CircularMotion
+from ...reference.dae import consistent_state
+from ...reference.families import find_motion
+from ...reference.kinematics import LEAN, REAR_ANGLE, STEER, YAW, body_positions
+from ...reference.rim import require_clear_rims
+from ...reference.stability import growth_rate, linearise
+from ...reference.surface import Plane, Surface, SurfaceOfRevolution, evaluate
+from ..error import ScenarioError
+from .schema import CircularTable, Scenario
+from .surfaces import bowl
+
+# Runs of one motion, disturbed in many ways, need it once.
+_found = lru_cache(maxsize=256)(find_motion)
+
+
+@dataclass(frozen=True)
+class Start:
+    """A problem with what is known of the motion that it starts from.
+
+    Attributes
+    ----------
+    problem : Problem
+    undisturbed : tuple of ndarray, shapes (9,)
+        Coordinates and rates before the perturbation.
+    family : int or None
+        Family of the circular motion; None for an upright start.
+    motion : CircularMotion or None
+    growth_rate : float
+        Largest real part of the motion's eigenvalues that symmetry does not fix [1/s]; on ground without
+        symmetry, where nothing is steady, that of the same start on the level plane.
+    size : float
+        Radius of the circle of D, or the wheelbase for a straight start [m].
+    """
+
+    problem: Problem
+    undisturbed: tuple[np.ndarray, np.ndarray]
+    family: int | None
+    motion: CircularMotion | None
+    growth_rate: float
+    size: float
+
+
+def make_start(scenario: Scenario) -> Start:
+    """Compute a scenario's start.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such motion, or its disturbed state cannot be reached or has a rim inside the ground.
+    """
+    bicycle, surface = scenario.make_bicycle(), scenario.surface.make()
+    try:
+        # Numbers that no bicycle has may overflow on the way; what comes of them is checked.
+        with np.errstate(all="ignore"):
+            family, motion, q, qd = _undisturbed(scenario, bicycle, surface)
+            rate = _growth_rate(scenario, bicycle, surface, q, qd)
+            undisturbed, (q, qd) = (q, qd), _disturbed(scenario, bicycle, surface, q, qd)
+            require_clear_rims(bicycle, surface, q)
+    except (ValueError, ArithmeticError) as error:
+        raise ScenarioError(f"motion: {error}") from error
+    simulation = scenario.simulation
+    samples = round(simulation.duration * simulation.output_rate)
+    # Each time is rounded once: i / rate, not a sum of steps.
+    times = np.arange(samples + 1) / simulation.output_rate
+    size = float(np.hypot(*motion.position[:2])) if motion is not None else bicycle.wheelbase
+    return Start(Problem(bicycle, surface, q, qd, times), undisturbed, family, motion, rate, size)
+
+
+def _growth_rate(scenario: Scenario, bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> float:
+    if not isinstance(surface, SurfaceOfRevolution):
+        surface = Plane()
+        _, _, q, qd = _undisturbed(scenario, bicycle, surface)
+    return growth_rate(surface, linearise(bicycle, surface, q, qd).eigenvalues, float(qd[YAW]))
+
+
+def _undisturbed(
+    scenario: Scenario, bicycle: Bicycle, surface: Surface
+) -> tuple[int | None, CircularMotion | None, np.ndarray, np.ndarray]:
+    table = scenario.motion
+    if isinstance(table, CircularTable):
+        near = (table.near.lean, table.near.steer) if table.near is not None else None
+        family, motion = _found(bicycle, bowl(surface), table.rear_rate, table.family, near)
+        return family, motion, *motion.state()
+    rates = (0.0, 0.0, table.speed / bicycle.rear_wheel_radius)
+    q, qd = consistent_state(bicycle, surface, (float(bicycle.reference_point[0]), 0.0), 0.0, 0.0, rates)
+    return None, None, q, qd
+
+
+def _disturbed(
+    scenario: Scenario, bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    change = scenario.perturbation
+    if change == type(change)():
+        return q, qd
+    lean = float(q[LEAN]) + change.lean
+    q, qd = consistent_state(
+        bicycle,
+        surface,
+        (float(q[0]) + change.x, float(q[1]) + change.y),
+        lean,
+        float(q[STEER]) + change.steer,
+        (qd[LEAN] + change.lean_rate, qd[STEER] + change.steer_rate, qd[REAR_ANGLE] + change.rear_rate),
+        guess=(float(q[2]), float(q[5])),
+    )
+    centre = body_positions(bicycle, q[None])[0, 0]
+    # The wheels touch the ground from below just as well.
+    if centre[2] <= evaluate(surface, centre[0], centre[1])[0]:
+        raise ValueError(f"at lean = {lean!r} the rear frame lies below the ground; a smaller perturbation would not")
+    return q, qd

@@ -1,0 +1,224 @@
+"""The grounds a scenario can name, and how they are written on the command line and in documents."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, TypeAdapter, ValidationError, field_validator, model_validator
+
+from ...reference.bowls import Cone, Sphere, Torus
+from ...reference.height_field import HeightField
+from ...reference.profile import PolynomialProfile, SplineProfile
+from ...reference.surface import Paraboloid, Plane, Surface, SurfaceOfRevolution
+from ..error import ScenarioError
+from .table import Table, one_line, read_toml, shown
+
+_Length = Annotated[float, Field(gt=0, le=1e6)]
+_Moderate = Annotated[float, Field(ge=-1e6, le=1e6)]
+_Numbers = Annotated[tuple[_Moderate, ...], Field(strict=False, max_length=1000)]  # TOML has arrays only
+
+
+# What a flatter bowl does to a disturbance is lost in the round-off of eigenvalues, some 1e-15 1/s: at 1e-12 1/m it is
+# known to a few thousandths, at 1e-15 not even by its sign.
+FLATTEST = 1e-12
+
+
+def told_from_level(alpha: float) -> float:
+    """The shape of a paraboloid [1/m], which is the plane or can be told from it.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be.
+    """
+    if 0 < alpha < FLATTEST:
+        raise ValueError(f"must be 0, which is the plane, or at least {FLATTEST!r}: less is lost in round-off")
+    return alpha
+
+
+class PlaneTable(Table):
+    """Level ground."""
+
+    kind: Literal["plane"]
+
+    def make(self) -> Plane:
+        """The surface."""
+        return Plane()
+
+
+class ParaboloidTable(Table):
+    """The bowl z = alpha (x^2 + y^2)."""
+
+    kind: Literal["paraboloid"]
+    alpha: float = Field(ge=0, description="shape [1/m]")
+
+    @field_validator("alpha")
+    @classmethod
+    def _told_from_level(cls, alpha: float) -> float:
+        return told_from_level(alpha)
+
+    def make(self) -> Paraboloid:
+        """The surface."""
+        return Paraboloid(self.alpha)
+
+
+class SphereTable(Table):
+    """The lower half of a sphere."""
+
+    kind: Literal["sphere"]
+    radius: _Length = Field(description="[m]")
+
+    def make(self) -> Sphere:
+        """The surface."""
+        return Sphere(self.radius)
+
+
+class ConeTable(Table):
+    """A cone with a rounded tip."""
+
+    kind: Literal["cone"]
+    slope: float = Field(ge=1e-6, le=1e6, description="far from the axis [-]")
+    rounding: float = Field(ge=1e-6, le=1e6, description="scale of the tip [m]")
+
+    def make(self) -> Cone:
+        """The surface."""
+        return Cone(self.slope, self.rounding)
+
+
+class TorusTable(Table):
+    """A circular trough."""
+
+    kind: Literal["torus"]
+    ring: float = Field(ge=0, le=1e6, description="radius of the tube's centre line [m]")
+    tube: _Length = Field(description="radius of the tube [m]")
+
+    def make(self) -> Torus:
+        """The surface."""
+        return Torus(self.ring, self.tube)
+
+
+class ProfileTable(Table):
+    """A bowl z = g(r): a polynomial in r^2, or a spline through points."""
+
+    kind: Literal["profile"]
+    coefficients: _Numbers | None = Field(None, description="of r^2, r^4, ... [1/m, 1/m^3, ...]")
+    radii: _Numbers | None = Field(None, description="of the points, rising [m]")
+    heights: _Numbers | None = Field(None, description="of the points [m]")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> ProfileTable:
+        points = self.radii is not None and self.heights is not None
+        polynomial = self.coefficients is not None and self.radii is None and self.heights is None
+        if not polynomial and not (points and self.coefficients is None):
+            raise ValueError("a profile needs either coefficients = [...] or radii = [...] and heights = [...]")
+        self.make()
+        return self
+
+    def make(self) -> PolynomialProfile | SplineProfile:
+        """The surface."""
+        if self.radii is not None and self.heights is not None:
+            return SplineProfile(self.radii, self.heights)
+        return PolynomialProfile(self.coefficients or ())
+
+
+class HeightFieldTable(Table):
+    """Ground through a regular grid of heights."""
+
+    kind: Literal["height-field"]
+    heights: Annotated[tuple[_Numbers, ...], Field(strict=False, max_length=1000)] = Field(
+        description="row i, column j at origin + spacing (i, j) [m]"
+    )
+    spacing: _Length = Field(description="[m]")
+    origin: Annotated[tuple[_Moderate, _Moderate], Field(strict=False)] = Field(
+        (0.0, 0.0), description="x and y of the first height [m]"
+    )
+
+    @model_validator(mode="after")
+    def _possible(self) -> HeightFieldTable:
+        self.make()
+        return self
+
+    def make(self) -> HeightField:
+        """The surface."""
+        return HeightField(self.heights, self.spacing, self.origin)
+
+
+SurfaceTable = Annotated[
+    PlaneTable | ParaboloidTable | SphereTable | ConeTable | TorusTable | ProfileTable | HeightFieldTable,
+    Field(discriminator="kind"),
+]
+
+_KINDS: dict[type, str] = {
+    Plane: "plane",
+    Paraboloid: "paraboloid",
+    Sphere: "sphere",
+    Cone: "cone",
+    Torus: "torus",
+    PolynomialProfile: "profile",
+    SplineProfile: "profile",
+    HeightField: "height-field",
+}
+
+
+def parse_surface(text: str) -> Surface:
+    """Make the surface that ``KIND`` or ``KIND:KEY=VALUE,...`` names, e.g. ``sphere:radius=20``.
+
+    Values are TOML: ``profile:coefficients=[0.005, 1e-6]``.
+
+    Raises
+    ------
+    ScenarioError
+        With one line.
+    """
+    kind, _, fields = text.partition(":")
+    where = f"--surface {shown(text)}"
+    try:
+        table = read_toml(f"surface = {{ {fields} }}")["surface"]
+        # A second line would be a second statement.
+        if "\n" in fields or "kind" in table:
+            raise ValueError
+    except ValueError:
+        raise ScenarioError(f"{where}: must be KIND:KEY=VALUE,..., e.g. sphere:radius=20") from None
+    try:
+        return TypeAdapter(SurfaceTable).validate_python({"kind": kind.strip(), **table}).make()
+    except ValidationError as error:
+        raise ScenarioError(f"{where}: {one_line(error)}") from error
+
+
+def bowl(ground: Surface | float) -> SurfaceOfRevolution:
+    """The surface of revolution that a ground is; a number is the alpha of a paraboloid.
+
+    Raises
+    ------
+    ScenarioError
+        If it is none.
+    """
+    try:
+        surface = Paraboloid(told_from_level(ground)) if isinstance(ground, int | float) else ground
+    except ValueError as error:
+        where = "" if str(error).startswith("alpha") else f"alpha is {ground!r}; it "
+        raise ScenarioError(f"{where}{error}") from error
+    if not isinstance(surface, SurfaceOfRevolution):
+        raise ScenarioError(f"circular motions ride on a surface of revolution; {describe(surface)['kind']} is none")
+    return surface
+
+
+def describe(surface: Surface) -> dict[str, Any]:
+    """Kind and fields of a surface, JSON values; of one that no table makes, the class and the parameters."""
+    kind: Any = _KINDS.get(type(surface))
+    if kind is None:
+        return {"kind": type(surface).__name__, "parameters": surface.parameters.tolist()}
+    fields: Any = surface
+    return {"kind": kind} | {name: _listed(value) for name, value in asdict(fields).items()}
+
+
+def _listed(value: Any) -> Any:
+    return [_listed(item) for item in value] if isinstance(value, tuple) else value
+
+
+def named(surface: Surface) -> dict[str, Any]:
+    """How a document names its surface: ``alpha`` of a paraboloid or the plane; of others null, and ``surface``."""
+    if isinstance(surface, Plane | Paraboloid):
+        return {"alpha": surface.alpha if isinstance(surface, Paraboloid) else 0.0}
+    return {"alpha": None, "surface": describe(surface)}

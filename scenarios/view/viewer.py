@@ -1,0 +1,97 @@
+"""The rerun viewer for a browser: its files, out of the program that they come in."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from http.client import HTTPConnection
+from pathlib import Path
+
+from .server import LOOPBACK, Content
+
+_FILES = ("", "re_viewer.js", "re_viewer_bg.wasm", "favicon.ico")
+_PATIENCE = 20.0  # for a program of 300 MB to come off a cold disk and listen [s]
+# Fonts from elsewhere: the viewer has its own, and nothing here asks the network.
+_ELSEWHERE = re.compile(rb"<link\b[^>]*\bhttps://[^>]*>")
+
+
+class ReplayError(RuntimeError):
+    """The viewer's files cannot be had."""
+
+
+def rerun() -> str:
+    """Path of the viewer's program, which is installed beside the interpreter."""
+    return str(Path(sys.executable).with_name("rerun"))
+
+
+def viewer_files() -> dict[str, Content]:
+    """Files of the viewer for a browser, by name; the page itself is "".
+
+    The viewer's program serves them. It is run for the moment that it takes to fetch them, on the loopback
+    interface.
+
+    Raises
+    ------
+    ReplayError
+        If it does not serve them.
+    """
+    port = _free_port()
+    # With the address of a recording it serves the viewer and listens for no data.
+    command = [rerun(), "--serve-web", "--bind", LOOPBACK, "--web-viewer-port", str(port), f"http://{LOOPBACK}/x.rrd"]
+    try:
+        # A group of its own: the program runs under a launcher that would leave it behind.
+        program = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+        )
+    except OSError as error:
+        raise ReplayError(f"the viewer {command[0]} cannot be started: {error.strerror}") from error
+    try:
+        _await(program, port)
+        return {name: _fetch(port, name) for name in _FILES}
+    finally:
+        with suppress(ProcessLookupError):  # it may have ended of itself
+            os.killpg(program.pid, signal.SIGTERM)
+        program.wait()
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        return probe.getsockname()[1]
+
+
+def _await(program: subprocess.Popen[bytes], port: int) -> None:
+    """Wait until the program listens."""
+    deadline = time.monotonic() + _PATIENCE
+    while time.monotonic() < deadline:
+        if program.poll() is not None:
+            raise ReplayError(f"the viewer ended with status {program.returncode} instead of serving its files")
+        try:
+            socket.create_connection((LOOPBACK, port), timeout=1).close()
+        except OSError:
+            time.sleep(0.05)
+        else:
+            return
+    raise ReplayError(f"the viewer did not serve its files within {_PATIENCE:g} s")
+
+
+def _fetch(port: int, name: str) -> Content:
+    connection = HTTPConnection(LOOPBACK, port, timeout=_PATIENCE)
+    try:
+        connection.request("GET", f"/{name}")
+        answer = connection.getresponse()
+        body = answer.read()
+    except OSError as error:
+        raise ReplayError(f"the viewer did not give its file {name!r}: {error}") from error
+    finally:
+        connection.close()
+    if answer.status != 200:
+        raise ReplayError(f"the viewer has no file {name!r}: this version of rerun keeps them elsewhere")
+    kind = answer.getheader("Content-Type", "application/octet-stream")
+    return Content(kind, _ELSEWHERE.sub(b"", body) if name == "" else body)

@@ -1,0 +1,127 @@
+"""A stored run, looked at: in the native viewer, or as its page with the viewer in it."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+from ...reports.measure import as_shown, follow
+from ..error import ScenarioError
+from ..files import write_text
+from ..run import document, part, ride
+from ..scenario import load_scenario, shown
+from .server import LOOPBACK, PageServer
+from .viewer import ReplayError, rerun, viewer_files
+
+RECORDING, REPORT = "comparison.rrd", "report.html"
+
+
+def open_native(folder: Path) -> None:
+    """Open a run's recording in the native viewer; returns when its window is closed.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder has no recording, or the viewer cannot run here.
+    """
+    command = native_command(part(folder, RECORDING))
+    try:
+        status = subprocess.call(command)
+    except OSError as error:
+        raise ScenarioError(f"the viewer {command[0]} cannot be started: {error.strerror}") from error
+    if status != 0:
+        raise ScenarioError(f"the viewer ended with status {status}; without a display, use --web")
+
+
+def native_command(recording: Path) -> list[str]:
+    """How the native viewer is started; it listens for data as well, on this machine only."""
+    return [rerun(), "--bind", LOOPBACK, "--port", "auto", str(recording)]
+
+
+def serve(folder: Path, port: int, ready: Callable[[str], None]) -> None:
+    """Serve a run's page with the viewer in it, to this machine only, until interrupted.
+
+    Parameters
+    ----------
+    folder : Path
+        A run folder; its page is written if it has none.
+    port : int
+        To listen on; 0 for any free one.
+    ready : callable
+        Called with the page's address once it is served.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder is no run folder, the port is taken, or the viewer's files cannot be had.
+    """
+    with page_server(folder, port) as server:
+        ready(server.address)
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            return
+
+
+def page_server(folder: Path, port: int) -> PageServer:
+    """The server of `serve`, listening but not yet answering."""
+    part(folder, RECORDING)
+    if not (folder / REPORT).is_file():
+        text = stored_page(folder)
+        try:
+            write_text(folder / REPORT, text)
+        except OSError as error:
+            raise ScenarioError(f"{folder / REPORT}: cannot be written: {error.strerror}") from error
+    try:
+        viewer = viewer_files()
+    except ReplayError as error:
+        raise ScenarioError(str(error)) from error
+    # What is in the folder now and nothing above it: an address is looked up, never joined to a path, and a link
+    # may lead anywhere.
+    files = {
+        path.name: path
+        for path in folder.iterdir()
+        if path.is_file() and not path.is_symlink() and not path.name.startswith(".")
+    }
+    try:
+        return PageServer(port, files, viewer)
+    except OSError as error:
+        raise ScenarioError(f"--port {port}: cannot listen on it: {error.strerror}; 0 takes a free one") from error
+
+
+def stored_page(folder: Path) -> str:
+    """The page of a stored run, from its files.
+
+    Parameters
+    ----------
+    folder : Path
+        A run folder.
+
+    Returns
+    -------
+    str
+        As `velodrome.reports.page.page` gives it.
+
+    Raises
+    ------
+    ScenarioError
+        If it is no run folder: which file is missing or cannot be read.
+    """
+    from jinja2 import TemplateError
+
+    from ...reports.page import page
+
+    manifest, measured = document(folder, "manifest.json"), document(folder, "metrics.json")
+    _, scenario = load_scenario(str(part(folder, "scenario.toml")))
+    try:
+        where = scenario.make_bicycle(), scenario.surface.make()
+        rides = {name: follow(ride(folder, manifest, measured, name), *where) for name in measured}
+        runs = {name: as_shown(one, *where) for name, one in rides.items()}
+        verdicts = manifest.get("verdicts", [])
+        return page(manifest, scenario.model_dump(), measured, verdicts, runs, where[1])
+    except ScenarioError:
+        raise
+    except (LookupError, TypeError, AttributeError, ArithmeticError, ValueError, TemplateError) as error:
+        what = shown(f"{type(error).__name__}: {error}")
+        raise ScenarioError(f"{folder}: not the files of one run: {what}") from error

@@ -1,0 +1,118 @@
+"""The run in words: what a reader must know is said, with the right numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from velodrome.reports.drawing.summary import COLUMNS, cell, remarks, summary, verdict_line
+
+MEASURED: dict[str, Any] = {
+    "position_error": {"max": 9.397e-6, "end": 8.83e-6},
+    "orientation_error": {"max": 5.1e-6, "end": 2e-6},
+    "contact_force_error": 1.7e-4,
+    "contact_force_error_at": 0.5,
+    "settled_force_error": 1.2e-5,
+    "not_finite": [],
+    "radius_drift_rate": -1.23e-5,
+    "energy_drift": 6.2e-8,
+    "max_slip": 3.1e-12,
+    "cpu_time": 0.24,
+    "required_friction": 0.7,
+    "friction": None,
+    "friction_left_at": None,
+    "min_normal_force": 300.0,
+    "steps": 20000,
+    "unconverged_steps": 0,
+    "largest_residual": 1e-9,
+    "fell_at": None,
+    "ended": None,
+    "horizon": None,
+}
+ALONE = dict.fromkeys(MEASURED) | {"energy_drift": 8e-14, "cpu_time": 0.01}
+
+
+def text(growth_rate: float = -0.4, **changes: Any) -> str:
+    measured = {"reference": ALONE, "exudyn": MEASURED | changes}
+    return summary("A ride", measured, {"mujoco-native": "no such thing"}, [], growth_rate, 20.0)
+
+
+def test_the_table_has_every_quantity_of_every_engine() -> None:
+    lines = text().splitlines()
+    table = [[part.strip() for part in line.strip("|").split("|")] for line in lines if line.startswith("|")]
+    header, rule, *rows = table
+    assert header == ["", "reference", "exudyn"]
+    assert {len(row) for row in table} == {3}
+    assert rule[1:] == ["---:", "---:"]
+    found = {row[0]: row[1:] for row in rows}
+    assert len(found) == len(COLUMNS)
+    assert found["position error [m]"] == ["–", "9.4e-06"]
+    assert found["energy drift [1]"] == ["8e-14", "6.2e-08"]
+    assert found["radius drift [m/s]"] == ["–", "-1.2e-05"]
+
+
+@pytest.mark.parametrize(("value", "shown"), [(None, "–"), ({"max": None}, "–"), ({"max": 0.5}, "0.5"), (0.0, "0")])
+def test_a_cell_shows_a_dash_for_nothing_and_nought_for_nought(value: Any, shown: str) -> None:
+    assert cell({"x": value}, "x", "max") == shown
+
+
+def test_no_news_is_no_remark() -> None:
+    assert remarks("exudyn", MEASURED, 20.0) == []
+    assert remarks("exudyn", MEASURED | {"horizon": 20.0}, 20.0) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"fell_at": 2.5}, ["exudyn fell at 2.50 s; its figures are those up to there"]),
+        ({"min_normal_force": -12.34}, ["exudyn: the ground pulls a wheel, by up to 12.3 N; no contact could"]),
+        (
+            {"friction": 0.5, "friction_left_at": 1.234},
+            [
+                "exudyn: rolling needs a coefficient of friction of up to 0.7, its contacts have 0.5: "
+                "too little from 1.23 s on"
+            ],
+        ),
+        ({"fell_at": 0.0}, ["exudyn fell at 0.00 s; its figures are those up to there"]),
+        ({"ended": "Newton failed"}, ["exudyn ended early: Newton failed"]),
+        ({"unconverged_steps": 3}, ["exudyn: its iterations did not converge in 3 of 20000 steps", "up to 1e-09"]),
+        (
+            {"unconverged_steps": 1, "largest_residual": None},
+            ["exudyn: its iterations did not converge in 1 of 20000 steps; its figures are not those of its equations"],
+        ),
+        (
+            {"position_error": {"max": 0.0}, "orientation_error": {"max": 0.0}, "rear_rate_error": 0.0},
+            ["exudyn: its ride equals the reference's to the last bit, so nothing was compared"],
+        ),
+        ({"horizon": 7.25}, ["exudyn", "7.25 s", "instability"]),
+        ({"contact_force_error_at": 0.0}, ["exudyn", "first sample"]),
+    ],
+)
+def test_what_spoils_a_row_is_said(change: dict[str, Any], words: list[str]) -> None:
+    (line,) = remarks("exudyn", MEASURED | change, 20.0)
+    assert all(word in line for word in words)
+    assert f"- {line}" in text(**change)
+
+
+def test_a_failure_and_the_stability_are_said() -> None:
+    assert text().startswith("# A ride\n")
+    assert "- mujoco-native did not run: no such thing" in text()
+    assert "Lyapunov stable" in text()
+    assert "0.4 1/s" in text()
+    assert "unstable" in text(growth_rate=0.38445)
+    assert "exp(0.3845 t / s)" in text(growth_rate=0.38445)
+
+
+@pytest.mark.parametrize(
+    ("value", "holds", "line"),
+    [
+        (5e-4, True, "exudyn: energy_variation 0.0005, limit 0.001: holds"),
+        (0.5, False, "exudyn: energy_variation 0.5, limit 0.001: falls short"),
+        (None, False, "exudyn: energy_variation not done, limit 0.001: falls short"),
+    ],
+)
+def test_a_verdict_is_one_line(value: float | None, holds: bool, line: str) -> None:
+    verdict = {"engine": "exudyn", "quantity": "energy_variation", "value": value, "limit": 1e-3, "holds": holds}
+    assert verdict_line(verdict) == line
+    assert summary("A ride", {}, {}, [verdict], -1.0, 1.0).endswith(f"- {line}\n")

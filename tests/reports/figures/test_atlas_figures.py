@@ -1,0 +1,26 @@
+"""What the figures of the atlas draw."""
+
+import numpy as np
+
+from velodrome.reports.figures.atlas import sheet
+
+
+def test_where_a_curve_folds_the_least_growth_is_shown() -> None:
+    """Family 2 runs from rate 0 to 10 with growth 4, folds and comes back with growth 1; family 1 is elsewhere."""
+    rate = np.array([0.0, 10.0, 4.0, 2.0])
+    growth = np.array([4.0, 4.0, 1.0, 1.0])
+    columns = {
+        "family": np.array([1, *[2] * 8]),
+        "alpha": np.array([0.5, *[0.1] * 4, *[0.5] * 4]),
+        "rear_rate": np.concatenate([[3.0], rate, rate + 5]),
+        "growth_rate": np.concatenate([[-1.0], growth, growth]),
+        "physical": np.concatenate([[True], [True, True, True, False], [False] * 4]),
+    }
+    order = np.argsort(columns["alpha"], kind="stable")
+    rates = np.array([1.0, 3.0, 7.0, 12.0])
+    shown, pushed = sheet({name: values[order] for name, values in columns.items()}, 2, np.array([0.1, 0.5]), rates)
+    # At rate 7 the second branch is half-way between growth 4 and 1.
+    assert np.array_equal(shown[:, 0], [4.0, 1.0, 2.5, np.nan], equal_nan=True)
+    assert np.array_equal(shown[:, 1], [np.nan, np.nan, 1.0, 2.5], equal_nan=True)
+    assert pushed[:, 0].tolist() == [True, True, True, False]
+    assert not pushed[:, 1].any()

@@ -1,0 +1,460 @@
+"""The page of a run: whole, escaped, readable without eyes, and seen in a browser."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import headless_page as headless
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+from velodrome.engines.engine import REFERENCE, Trajectory
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.height_field import HeightField
+from velodrome.reference.surface import Paraboloid
+from velodrome.reports.drawing.palette import PALETTE, colours
+from velodrome.reports.drawing.plots import PLOTS
+from velodrome.reports.drawing.summary import COLUMNS, cell, verdict_line
+from velodrome.reports.measure.metrics import metrics
+from velodrome.reports.page import page
+from velodrome.reports.page.curves import GROUPS, curve, kept
+from velodrome.reports.page.ink import CONTRAST, DASHES, css, dashes, luminance, on_paper
+from velodrome.reports.page.trust import MEANINGS, trust
+from velodrome.reports.page.words import bicycle, disturbance, ground, motion, setting
+
+BOWL = Paraboloid(0.005)
+HOSTILE = "<script>alert(1)</script>"
+GROWTH = 0.4
+
+
+def ride(engine: str, samples: int = 301, error: float = 0.0, seed: int = 0) -> Trajectory:
+    """A circle of 2.4 m, noise on all that can be noisy, and an error that grows."""
+    noise = np.random.default_rng(seed)
+    time = np.arange(samples) * 0.01
+    q, qd = np.zeros((samples, 9)), np.zeros((samples, 9))
+    angle = 2.2 * time + error * time
+    q[:, 0], q[:, 1] = 2.4 * np.cos(angle), 2.4 * np.sin(angle)
+    q[:, 4], q[:, 6], qd[:, 7] = 0.74 + error * time, 2.84, 18.0 - error * time
+    height = BOWL.alpha * 2.4**2
+    point = np.zeros((samples, 2, 3))
+    point[:, :, :2], point[:, :, 2] = q[:, None, :2], height
+    body = np.repeat(q[:, None, :3] + [0, 0, 0.9], 4, axis=1)
+    return Trajectory(
+        engine=engine,
+        version="1.2.3",
+        settings={"step": 0.001},
+        time=time,
+        q=q,
+        qd=qd,
+        body_position=body,
+        body_quaternion=np.tile([1.0, 0, 0, 0], (samples, 4, 1)),
+        contact_point=point,
+        contact_force=np.array([0, 0, 500.0]) + noise.normal(size=(samples, 2, 3)),
+        gap=1e-14 * noise.normal(size=(samples, 2)),
+        slip=1e-12 * noise.normal(size=(samples, 2, 2)),
+        kinetic_energy=1000 + 1e-9 * noise.normal(size=samples),
+        potential_energy=np.full(samples, 800.0),
+        steps=samples,
+        cpu_time=0.1,
+    )
+
+
+RUNS = {
+    REFERENCE: ride(REFERENCE),
+    "one": ride("one", error=1e-4, seed=1),
+    "short": ride("short", samples=61, error=-0.05, seed=2),
+    "bare": replace(
+        ride("bare", error=0.01, seed=3),
+        **dict.fromkeys(("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")),
+    ),
+}
+
+
+def measured(runs: dict[str, Trajectory]) -> dict[str, dict[str, Any]]:
+    reference = runs.get(REFERENCE)
+    where = (Bicycle(), BOWL, GROWTH, 2.4, True)
+    return {name: metrics(run, None if run is reference else reference, *where) for name, run in runs.items()}
+
+
+def made(runs: dict[str, Trajectory] | None = None, verdicts: Any = (), **changes: Any) -> str:
+    runs = RUNS if runs is None else runs
+    engines = {
+        name: {
+            "version": run.version,
+            "settings": run.settings,
+            "cpu_time": run.cpu_time,
+            "steps": run.steps,
+            "ended": run.ended,
+        }
+        for name, run in runs.items()
+    }
+    manifest = {
+        "scenario": "ride",
+        "title": "Once around",
+        "created": "2026-01-02T03:04:05+00:00",
+        "complete": True,
+        "engines": engines | changes.pop("engines", {}),
+        "libraries": {"velodrome": "0.1.0", "numpy": "2.4"},
+        "platform": {"system": "Linux", "machine": "x86_64", "python": "3.11"},
+        "start": {"family": 2, "growth_rate": GROWTH},
+    }
+    scenario = {
+        "surface": {"kind": "paraboloid", "alpha": 0.005},
+        "motion": {"kind": "circular", "rear_rate": 18.0},
+        "perturbation": {"lean_rate": 0.1},
+        "simulation": {"duration": 3.0, "output_rate": 100.0},
+    } | changes.pop("tables", {})
+    surface = changes.pop("surface", BOWL)
+    return page(manifest | changes, scenario, measured(runs), verdicts, runs, surface)
+
+
+class Parsed(HTMLParser):
+    """Elements with their attributes, and their text."""
+
+    VOID = ("meta", "link", "br", "input", "img", "line")
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.elements: list[tuple[str, dict[str, str | None], list[str]]] = []
+        self._open: list[int] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs), []))
+        if tag not in self.VOID:
+            self._open.append(len(self.elements) - 1)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in self.VOID:
+            assert self.elements[self._open.pop()][0] == tag, f"</{tag}> closes another element"
+
+    def handle_data(self, data: str) -> None:
+        for index in self._open:
+            self.elements[index][2].append(data)
+
+    def all(self, *tags: str) -> list[tuple[dict[str, str | None], str]]:
+        return [(attrs, " ".join("".join(t).split())) for tag, attrs, t in self.elements if tag in tags]
+
+    def data(self) -> dict[str, Any]:
+        return next(json.loads(text) for attrs, text in self.all("script") if attrs.get("id") == "data")
+
+
+@pytest.fixture(scope="module")
+def text() -> str:
+    return made()
+
+
+@pytest.fixture(scope="module")
+def parsed(text: str) -> Parsed:
+    return Parsed(text)
+
+
+def test_the_table_has_the_summarys_figures(parsed: Parsed):
+    values = measured(RUNS)
+    cells = [found for _, found in parsed.all("td")]
+    for name in RUNS:
+        row = [cell(values[name], metric, part) for _, _, metric, part in COLUMNS]
+        assert any(cells[k : k + len(row)] == row for k in range(len(cells))), name
+    heads = [found for _, found in parsed.all("th")]
+    assert {title for title, *_ in COLUMNS} <= set(heads)
+    assert {metric for _, _, metric, _ in COLUMNS} == set(MEANINGS)
+
+
+def test_input_is_text_and_never_markup():
+    name = '"><img src=x onerror=alert(1)>'
+    reason = "</script><b>{{ 7 * 7 }}</b>"
+    runs = {REFERENCE: RUNS[REFERENCE], name: replace(RUNS["one"], engine=name, settings={"a</table>": "<i>&"})}
+    shown = made(
+        runs,
+        title=HOSTILE,
+        scenario="<u>",
+        engines={"<s>": {"version": "<q>", "settings": {}, "failed": reason}},
+        left_out={"<del>": "<ins>"},
+        libraries={"<kbd>": "<samp>"},
+    )
+    parsed = Parsed(shown)
+    assert [found for _, found in parsed.all("h1")] == [HOSTILE]
+    assert len(parsed.all("script")) == 2
+    assert not parsed.all("img", "i", "u", "s", "q", "del", "ins", "kbd", "samp")
+    assert all(found.startswith("Figure") for _, found in parsed.all("b"))
+    assert parsed.data()["engines"] == list(runs)
+    assert any(reason in found for _, found in parsed.all("li"))
+
+
+def test_the_page_needs_nothing_from_elsewhere(text: str, parsed: Parsed):
+    assert set(re.findall(r"https?://[^\s\"'<)]+", text)) == {"http://www.w3.org/2000/svg"}  # a name, not an address
+    addresses = [value for _, attrs, _ in parsed.elements for key, value in attrs.items() if key in ("href", "src")]
+    assert all(a == "comparison.rrd" or (a or "").startswith(("#", "data:")) for a in addresses)
+    script = text.rpartition("<script>")[2].partition("</script>")[0]
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = next(a["content"] for a, _ in parsed.all("meta") if "http-equiv" in a) or ""
+    assert f"script-src 'sha256-{digest}'" in policy
+    assert "default-src 'none'" in policy
+
+
+def test_the_page_can_be_read_without_eyes(parsed: Parsed):
+    levels = [int(tag[1]) for tag, _, _ in parsed.elements if re.fullmatch("h[1-6]", tag)]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+    assert len(parsed.all("caption")) == len(parsed.all("table"))
+    assert all(attrs.get("scope") in ("row", "col") for attrs, _ in parsed.all("th"))
+    ids = [attrs["id"] for _, attrs, _ in parsed.elements if "id" in attrs]
+    assert len(ids) == len(set(ids))
+    links = [(a.get("href") or "")[1:] for a, _ in parsed.all("a") if (a.get("href") or "").startswith("#")]
+    named = [attrs["aria-labelledby"] for _, attrs, _ in parsed.elements if "aria-labelledby" in attrs]
+    assert set(links) | set(named) <= set(ids)
+    assert "main" in links  # past the header
+    assert all(attrs.get("aria-label") for _, attrs, _ in parsed.elements if attrs.get("role") in ("img", "region"))
+    assert all(attrs.get("aria-pressed") == "true" for attrs, _ in parsed.all("button"))
+    assert next(attrs for tag, attrs, _ in parsed.elements if tag == "html").get("lang") == "en"
+
+
+def test_what_went_wrong_is_said():
+    verdicts = [
+        {"engine": "one", "quantity": "energy_variation", "value": 2.0, "limit": 1.0, "holds": False},
+        {"engine": REFERENCE, "quantity": "energy_variation", "value": 1e-9, "limit": 1.0, "holds": True},
+    ]
+    parsed = Parsed(
+        made(
+            verdicts=verdicts,
+            engines={"broken": {"version": "9", "settings": {}, "failed": "no luck"}},
+            left_out={"flat": "rolls on a plane only"},
+            complete=False,
+        )
+    )
+    said = [found for _, found in parsed.all("li")]
+    assert f"✗ {verdict_line(verdicts[0])}" in said
+    assert f"✓ {verdict_line(verdicts[1])}" in said
+    assert "✗ broken did not run: no luck" in said
+    assert "– flat left out: rolls on a plane only" in said
+    assert any("interrupted" in found for _, found in parsed.all("dd"))
+
+
+def test_a_run_without_a_trajectory_has_a_page():
+    parsed = Parsed(made({}, engines={"broken": {"version": "9", "settings": {"step": 1.0}, "failed": "no luck"}}))
+    assert parsed.data() == {"duration": 3.0, "engines": [], "panels": [], "plan": None}
+    assert not parsed.all("figure")
+
+
+def test_what_the_scenario_lacks_is_not_shown():
+    straight = {"motion": {"kind": "upright", "speed": 4.6}, "criterion": {"energy_variation": 1.0}}
+    waves = HeightField(tuple((0.01 * (i % 2),) * 40 for i in range(40)), 1.0, (-20.0, -20.0))
+    shown = made(tables=straight, surface=waves)
+    assert "radius" not in {panel["key"] for panel in Parsed(shown).data()["panels"]}
+    assert "no verdict on the scenario's criterion" in shown
+    assert "On this ground no motion is steady" in shown
+    plain = made()
+    assert "sets no criterion" in plain
+    assert "Nothing is steady on this ground" not in plain
+
+
+def test_every_panel_has_a_plot_and_what_an_engine_lacks_is_absent(parsed: Parsed):
+    keys = {panel.key for _, panels in GROUPS for panel in panels}
+    assert keys <= {plot.key for plot in PLOTS}
+    panels = {panel["key"]: panel for panel in parsed.data()["panels"]}
+    assert set(panels) == keys
+    bare = str(list(RUNS).index("bare"))
+    assert {key for key, panel in panels.items() if bare in panel["curves"]} == {
+        *("log_position_error", "lean", "steer", "rear_rate", "radius")
+    }
+    assert len(parsed.all("figure")) == len(keys) + 1  # and the ride from above
+
+
+def test_a_curve_in_the_page_is_the_trajectorys(parsed: Parsed):
+    data = parsed.data()
+    lean = next(panel for panel in data["panels"] if panel["key"] == "lean")["curves"]["1"]
+    # Seven digits are kept.
+    np.testing.assert_allclose(np.interp(lean["t"], RUNS["one"].time, RUNS["one"].q[:, 4]), lean["v"], rtol=5e-7)
+    assert data["duration"] == RUNS[REFERENCE].time[-1]
+    trail = data["plan"]["trails"]["0"]
+    np.testing.assert_allclose(np.hypot(trail["x"], trail["y"]), 2.4, rtol=1e-4)  # five digits of each
+
+
+def test_the_horizon_is_marked_on_the_error(parsed: Parsed):
+    error = next(panel for panel in parsed.data()["panels"] if panel["key"] == "log_position_error")
+    horizons = [values["horizon"] for values in measured(RUNS).values()]
+    assert {mark["engine"]: mark["t"] for mark in error["marks"]} == {
+        k: horizon for k, horizon in enumerate(horizons) if horizon is not None
+    }
+
+
+@given(
+    st.lists(st.one_of(st.floats(-1e3, 1e3), st.just(float("nan"))), max_size=200).map(np.array),
+    st.integers(4, 60),
+)
+def test_no_extreme_is_lost(values: np.ndarray, most: int):
+    values = values.astype(float)
+    chosen = kept(values, most)
+    finite = np.flatnonzero(np.isfinite(values))
+    assert len(chosen) <= most
+    assert np.all(np.diff(chosen) > 0)
+    if len(finite):
+        assert {finite[0], finite[-1]} <= set(chosen)
+        assert (values[chosen].min(), values[chosen].max()) == (np.nanmin(values), np.nanmax(values))
+    else:
+        assert len(chosen) == 0
+
+
+def test_a_gap_in_a_curve_stays_a_gap():
+    values = np.array([1.0, 2.0, np.nan, np.nan, 3.0, 4.0])
+    assert curve(np.arange(6.0), values, 10) == {"t": [0, 1, 4, 4, 5], "v": [1, 2, None, 3, 4]}
+
+
+def test_the_page_stays_under_two_megabytes():
+    # Noise with holes: as many points as can be, and a break between each two.
+    runs = {name: ride(name, 2001, 1e-3 * k, k) for k, name in enumerate([REFERENCE, *"abcdefghij"])}
+    for run in runs.values():
+        assert run.slip is not None
+        run.slip[::2] = np.nan
+    assert len(made(runs).encode()) < 2e6
+
+
+def test_engines_are_told_apart_on_paper():
+    names = [REFERENCE, *"abcdefgh"]
+    for name, colour in colours(names).items():
+        assert 1.05 / (luminance(on_paper(name, colour)) + 0.05) >= CONTRAST
+    assert len({on_paper("a", colour) for colour in PALETTE}) == len(PALETTE)
+    assert luminance((255, 255, 255)) == pytest.approx(1.0, abs=1e-12)
+    patterns = dashes(names)
+    assert patterns[REFERENCE] == ""
+    assert [patterns[name] for name in "abcdefgh"] == list(DASHES)
+
+
+def test_what_ran_is_said_in_words():
+    assert ground({"kind": "plane"}) == "level plane"
+    assert ground({"kind": "sphere", "radius": 20.0}) == "sphere, radius 20.0"
+    assert len(ground({"kind": "height-field", "heights": [[0.0] * 100] * 100})) < 120
+    assert motion({"kind": "upright", "speed": 4.6}) == "straight and upright, 4.6 m/s"
+    assert motion({"kind": "circular", "rear_rate": 18.0}) == "circle with the rear wheel at 18 rad/s"
+    assert disturbance({"x": 0.0, "lean_rate": -0.1}) == "lean rate -0.1 rad/s"
+    assert disturbance({}) == "nothing"
+    assert bicycle({"wheelbase": 1.1}).endswith("with wheelbase 1.1")
+    assert [setting(value) for value in (None, True, 0.001, [0.9, 2.0], "dop853")] == [
+        *("not set", "true", "0.001", "0.9, 2.0", "dop853")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("growth", "horizon", "error", "says"),
+    [
+        (-0.1, None, {"max": 1.0}, "amplifies no error"),
+        (0.4, 5.0, {"max": 1.0}, "Up to 5.00 s"),
+        (0.4, 50.0, {"max": 1.0}, "longer than the run"),
+        (0.4, None, {"max": 0.0}, "to the last digit"),
+        (0.4, None, None, "no reference in this run"),
+    ],
+)
+def test_trust_follows_from_the_metrics(growth: float, horizon: float | None, error: Any, says: str):
+    assert says in trust("one", {"horizon": horizon, "position_error": error}, growth, 20.0)
+
+
+@pytest.mark.parametrize(
+    ("growth", "horizon", "changes", "end", "says"),
+    [
+        (-0.1, None, {}, 20.0, "own, over the whole run."),
+        (-0.1, None, {"fell_at": 3.217}, 3.22, "own, up to its fall at 3.22 s."),
+        (-0.1, None, {"ended": "it gave up"}, 6.1, "own, up to its early end at 6.10 s."),
+        (-0.1, None, {"ended": "it gave up"}, None, "own, up to its early end."),
+        (0.4, 5.0, {"fell_at": 3.0}, 3.1, "longer than it rode: it is seen up to its fall at 3.00 s."),
+        (0.4, 2.0, {"fell_at": 3.0}, 3.1, "Up to 2.00 s the error"),
+        (0.4, None, {"ended": "it gave up"}, 6.1, "to the last digit up to its early end at 6.10 s:"),
+    ],
+)
+def test_trust_goes_no_further_than_the_ride(
+    growth: float, horizon: float | None, changes: dict[str, Any], end: float | None, says: str
+):
+    values = {"horizon": horizon, "position_error": {"max": 1.0}, "fell_at": None, "ended": None} | changes
+    assert says in trust("one", values, growth, 20.0, end)
+
+
+def test_bounds_of_the_reference_are_rounded_up():
+    values = {"energy_drift": 5.01e-13, "max_gap": 1.3004e-14, "max_slip": 9.91e-12}
+    said = trust(REFERENCE, values, 0.4, 20.0)
+    for words in ("at most 5.1e-13 of itself", "within 1.4e-14 m", "within 1e-11 m/s"):
+        assert words in said
+    said = trust(REFERENCE, {"energy_drift": 0.0, "max_gap": 1.3e-14, "max_slip": None}, 0.4, 20.0)
+    assert "at most 0 of itself, its gaps stay within 1.3e-14 m." in said
+
+
+def test_a_fall_is_said_where_the_figures_count_a_sample_more():
+    lying = RUNS["one"].q.copy()
+    lying[200:, 2] -= 1.0
+    fallen = made({REFERENCE: RUNS[REFERENCE], "one": replace(RUNS["one"], q=lying)})
+    words = "What fell (one) is drawn up to the first sample after its fall"
+    assert words in " ".join(fallen.split())
+    assert "What fell" not in made()
+
+
+# In a browser.
+
+needs_browser = pytest.mark.skipif(headless.missing() is not None, reason=str(headless.missing()))
+
+
+@pytest.fixture(scope="module")
+def address(text: str, tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    path.write_text(text, encoding="utf-8")
+    return path.as_uri()
+
+
+def pixels(path: Path) -> dict[str, int]:
+    """Number of pixels of each exact colour."""
+    picture = np.asarray(Image.open(path).convert("RGB")).astype(int)
+    codes, counts = np.unique(picture @ [65536, 256, 1], return_counts=True)
+    return {f"#{code:06x}": int(count) for code, count in zip(codes, counts, strict=True)}
+
+
+@needs_browser
+@pytest.mark.parametrize("dark", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["light", "dark"])
+def test_an_engine_that_is_switched_off_is_not_seen(address: str, dark: bool, tmp_path: Path):
+    paint = colours(RUNS)
+    ink = {name: css(paint[name] if dark else on_paper(name, paint[name])) for name in RUNS}
+    size = (1280, 7000 if dark else 3600)  # the tables, the toolbar, the ride from above and some curves; or all
+    assert headless.picture(address, tmp_path / "all.png", dark, size) == []
+    everything = pixels(tmp_path / "all.png")
+    hidden = ["one", "bare"]
+    assert headless.picture(f"{address}#hide={','.join(hidden)}", tmp_path / "some.png", dark, size) == []
+    some = pixels(tmp_path / "some.png")
+    for name, colour in ink.items():
+        # A line of 28 by 3 pixels beside the name stands at least six times in the page.
+        assert everything.get(colour, 0) > 6 * 28, name
+        assert (some.get(colour, 0) == 0) == (name in hidden), name
+
+
+@needs_browser
+def test_a_view_can_be_passed_on_by_its_address(address: str):
+    parsed = Parsed(headless.document(f"{address}#hide=short&t=1.5"))
+    assert [attrs["aria-pressed"] for attrs, _ in parsed.all("button")] == ["true", "true", "false", "true"]
+    assert [found for _, found in parsed.all("output")] == ["1.50 s"]
+    slider = next(attrs for attrs, _ in parsed.all("input"))
+    assert slider["aria-valuetext"] == "1.50 s"
+    lean = f"{RUNS['one'].q[150, 4]:#.6g}"
+    assert any(found == f"one {lean}" for _, found in parsed.all("li"))
+    # Not served by the suite's own server, it asks for no viewer.
+    assert not parsed.all("iframe")
+
+
+@needs_browser
+def test_complaints_of_a_page_are_heard(tmp_path: Path, text: str):
+    broken = tmp_path / "broken.html"
+
+    def said() -> str:
+        return "\n".join(headless.picture(broken.as_uri(), tmp_path / "p.png", size=(500, 300)))
+
+    broken.write_text("<script>undefined_function()</script>", encoding="utf-8")
+    assert "undefined_function" in said()
+    # A script that is not the page's own does not run.
+    broken.write_text(text.replace("<h1>", "<script>document.title = 'no'</script><h1>"), encoding="utf-8")
+    assert "Content Security Policy" in said()

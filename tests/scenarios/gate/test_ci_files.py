@@ -1,0 +1,45 @@
+"""The gate's verdicts in the formats of CI services."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+from velodrome.scenarios.gate.ci_files import junit_xml, markdown_page
+from velodrome.scenarios.gate.verdict import Verdict, missing
+
+HOLDS = Verdict("exudyn", "short_error", 1e-5, 1e-5, 1e-7, "holds", "1e-05 -> 1e-05, limit 1e-07")
+WORSE = Verdict("mujoco-native", "max_slip", 0.2, 0.1, 1e-3, "worse", "0.1 -> 0.2, limit 0.001; step 0.002 -> 0.004")
+GONE = missing("warp", "did not run: <no> \x07 *engine* | of that name")
+VERDICTS = [("q2", HOLDS), ("q2", WORSE), ("plane-circle", GONE)]
+
+
+def test_junit_counts_and_names_every_failure() -> None:
+    root = ElementTree.fromstring(junit_xml(VERDICTS))
+    assert (root.tag, root.attrib["tests"], root.attrib["failures"]) == ("testsuites", "3", "2")
+    suites = {suite.attrib["name"]: suite for suite in root}
+    assert [(suite.attrib["tests"], suite.attrib["failures"]) for suite in suites.values()] == [("2", "1"), ("1", "1")]
+    first, second = suites["q2"]
+    assert (first.attrib["classname"], first.attrib["name"], len(first)) == ("q2.exudyn", "short_error", 0)
+    (failure,) = second
+    assert failure.attrib == {"type": "worse", "message": WORSE.reason}
+    ((failure,),) = suites["plane-circle"]
+    # What XML cannot carry is a blank, the rest comes back as it was.
+    assert failure.attrib["message"] == "did not run: <no>   *engine* | of that name"
+
+
+def test_markdown_puts_the_worst_first_and_shows_foreign_text_as_it_is() -> None:
+    page = markdown_page(VERDICTS)
+    lines = page.splitlines()
+    assert lines[0] == "# Drift gate: fails"
+    assert lines[2] == "1 of 3 quantities hold."
+    assert lines[4].startswith("- **missing** plane-circle, warp, run: did not run: \\<no>   \\*engine\\* \\|")
+    assert lines[5].startswith("- **worse** q2, mujoco-native, max_slip: 0.1 -> 0.2")
+    rows = [line for line in lines if line.startswith("| ")][1:]
+    assert [row.split(" | ")[-1] for row in rows] == ["missing |", "worse |", "holds |"]
+
+
+def test_a_gate_that_holds_says_so() -> None:
+    page = markdown_page([("q2", HOLDS)])
+    assert page.startswith("# Drift gate: holds\n\n1 of 1 quantities hold.\n\n| scenario")
+    root = ElementTree.fromstring(junit_xml([("q2", HOLDS)]))
+    assert root.attrib["failures"] == "0"

@@ -1,0 +1,61 @@
+"""The files of the atlas."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from velodrome.engines.storage import METADATA_KEY
+from velodrome.reference.bicycle import Bicycle
+from velodrome.scenarios.error import ScenarioError
+from velodrome.scenarios.motions.atlas import UNITS, make_atlas
+
+
+def test_an_atlas_is_written_whole(tmp_path: Path) -> None:
+    done: list[float] = []
+    out = tmp_path / "new" / "atlas"
+    document = make_atlas(out, size=2000, largest=0.02, progress=done.append)
+    assert done == sorted(done)
+    assert done[-1] == 1.0
+    assert sorted(path.name for path in out.iterdir()) == [
+        "atlas.parquet",
+        "boundaries.json",
+        "growth.png",
+        "stable.png",
+    ]
+    assert json.loads((out / "boundaries.json").read_text()) == document
+    table = pq.read_table(out / "atlas.parquet")
+    assert table.num_rows == document["motions"]
+    for name, unit in UNITS.items():
+        assert table.schema.field(name).metadata == {b"unit": unit.encode()}
+    facts = json.loads((table.schema.metadata or {})[METADATA_KEY])
+    assert facts["bicycle"]["wheelbase"] == Bicycle().wheelbase
+    values = {name: table.column(name).to_numpy() for name in table.column_names}
+    assert sorted(set(values["alpha"])) == document["alphas"]
+    assert np.array_equal(values["stable"], values["growth_rate"] < 0)
+    pushed = (values["normal_force_rear"] > 0) & (values["normal_force_front"] > 0)
+    assert np.array_equal(values["physical"], pushed)
+    # The stable motions of a family are one piece of its curve at every alpha.
+    for boundary in document["stable"]:
+        for alpha in boundary["alpha"]:
+            inside = values["stable"] & (values["family"] == boundary["family"]) & (values["alpha"] == alpha)
+            assert np.all(np.diff(values["index"][inside]) == 1)
+    assert {boundary["family"] for boundary in document["stable"]} == {2, 4}
+
+
+@pytest.mark.parametrize(
+    ("size", "largest", "words"),
+    [(10, 1.0, "--size 10"), (2000, 0.0, "--largest 0.0"), (2000, 1.5, "--largest 1.5"), (2000, np.nan, "--largest")],
+)
+def test_impossible_atlases_are_refused(tmp_path: Path, size: int, largest: float, words: str) -> None:
+    with pytest.raises(ScenarioError, match=words):
+        make_atlas(tmp_path / "atlas", size, largest)
+    assert not (tmp_path / "atlas").exists()
+
+
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ScenarioError, match="cannot be made"):
+        make_atlas(tmp_path / "file" / "atlas", 2000)

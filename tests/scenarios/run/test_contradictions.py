@@ -1,0 +1,193 @@
+"""What an engine says of itself must agree with its coordinates: contradictions are named, honest engines are not."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
+
+import pytest
+from altered import CONTRADICTIONS, Altered, raising
+from typer.testing import CliRunner
+
+from velodrome.engines import engine as registry
+from velodrome.engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory, engine_names
+from velodrome.reports.drawing.summary import remarks
+from velodrome.reports.measure.consistency import describe
+from velodrome.scenarios.cli import app
+from velodrome.scenarios.gate import checks as gate
+from velodrome.scenarios.gate import sample as gate_sample
+from velodrome.scenarios.run.folder import Plan
+from velodrome.scenarios.run.runner import configure, plan_run, run
+from velodrome.scenarios.scenario.schema import Gate, library_names, load_scenario
+from velodrome.scenarios.sweep.rows import flat
+
+OWN = "own"
+HONEST = [("q2-plus", 1.0), ("iftomm-2", 1.0), ("plane-circle", 0.3)]
+
+
+def plan_with(engine: Engine, name: str = "q2-plus", duration: float = 0.5) -> Plan:
+    """A run of the reference and one more engine, which is built upon the reference."""
+    plan = plan_run(*load_scenario(name, {"simulation.duration": duration}), [REFERENCE])
+    return replace(plan, engines=plan.engines | {OWN: (engine, plan.engines[REFERENCE][1])})
+
+
+@pytest.fixture(autouse=True)
+def no_recording(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the recording, which takes the longest."""
+    monkeypatch.setattr("velodrome.scenarios.run.runner.record", lambda *_: None)
+
+
+@pytest.mark.parametrize("what", CONTRADICTIONS)
+def test_a_run_names_every_report_that_contradicts_the_coordinates(what: str, tmp_path: Path) -> None:
+    after, named = CONTRADICTIONS[what]
+    inner, _ = configure(REFERENCE, {})
+    outcome = run(plan_with(Altered(inner, after=after, called=OWN)), tmp_path, lambda *_: None, lambda _: None)
+    assert not outcome.failures
+    measured = json.loads((outcome.folder / "metrics.json").read_text())
+    assert measured[REFERENCE]["inconsistent_reports"] == []
+    found = measured[OWN]["inconsistent_reports"]
+    assert {report["quantity"] for report in found} == named
+    lines = remarks(OWN, measured[OWN], 0.5)
+    assert [f"{OWN}: {describe(report)}" for report in found] == [line for line in lines if "from" in line]
+    assert set(flat(measured[OWN])["inconsistent_reports"].split(", ")) == named
+    # What is shown is what follows from the coordinates.
+    if "qd" in named:
+        assert measured[OWN]["max_slip"] > 1e-3
+        assert measured[OWN]["rate_error"] > 5e-4
+    else:
+        assert measured[OWN]["max_slip"] < 1e-13
+        assert measured[OWN]["orientation_error"]["max"] < 1e-15
+        assert measured[OWN]["energy_drift"] < 1e-12
+
+
+def test_an_engine_that_reports_nothing_has_slip_gaps_and_energies(tmp_path: Path) -> None:
+    inner, _ = configure(REFERENCE, {})
+    optional = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
+    silent = Altered(inner, after=lambda one: replace(one, **dict.fromkeys(optional)), called=OWN)
+    measured = run(plan_with(silent), tmp_path, lambda *_: None, lambda _: None).metrics[OWN]
+    assert measured["max_slip"] < 1e-13
+    assert measured["max_gap"] < 1e-12
+    assert measured["energy_drift"] < 1e-12
+    assert measured["contact_force_error"] is None
+    assert measured["inconsistent_reports"] == []
+
+
+@pytest.mark.parametrize(("name", "duration"), HONEST)
+def test_no_engine_is_accused(name: str, duration: float, tmp_path: Path) -> None:
+    accused(name, duration, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", library_names())
+def test_no_engine_is_accused_in_the_whole_library(name: str, tmp_path: Path) -> None:
+    accused(name, None, tmp_path)
+
+
+def accused(name: str, duration: float | None, out: Path) -> None:
+    changes = {} if duration is None else {"simulation.duration": duration}
+    outcome = run(plan_run(*load_scenario(name, changes)), out, lambda *_: None, lambda _: None)
+    assert not outcome.failures
+    assert len(outcome.metrics) >= len(engine_names()) - 1  # one rides on the level plane only
+    assert [describe(report) for found in outcome.metrics.values() for report in found["inconsistent_reports"]] == []
+
+
+@pytest.fixture
+def rides_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measure the ride alone: orders and eigenvalues take the longest."""
+    monkeypatch.setattr(gate_sample, "_order", lambda *_: ({}, {}))
+    monkeypatch.setattr(gate_sample, "_eigenvalues", lambda *_: {})
+
+
+def chosen_with(after: Any) -> gate.Chosen:
+    def chosen(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
+        engine, settings = configure(name, values)
+        return (Altered(engine, after=after) if name == REFERENCE else engine), settings
+
+    return chosen
+
+
+# Energies of a steady circle are constant: late ones are the same.
+@pytest.mark.usefixtures("rides_only")
+@pytest.mark.parametrize("what", [what for what in CONTRADICTIONS if what != "late energies"])
+def test_no_baseline_is_written_of_an_engine_that_contradicts_itself(what: str, tmp_path: Path) -> None:
+    chosen = chosen_with(CONTRADICTIONS[what][0])
+    verdicts, fresh = gate.check(lambda *_: None, ["q2"], [REFERENCE, "mujoco-multipliers"], tmp_path, chosen)
+    ((name, verdict),) = gate.refused_verdicts(verdicts)
+    assert (name, verdict.engine, verdict.status, verdict.limit) == ("q2", REFERENCE, "worse", 1.0)
+    assert " from " in verdict.reason
+    (path,) = gate.update_baselines(fresh, verdicts, None, tmp_path)
+    assert set(json.loads(path.read_text())["engines"]) == {"mujoco-multipliers"}
+
+
+@pytest.mark.usefixtures("rides_only")
+def test_no_baseline_excuses_a_contradiction_and_the_old_one_stays(tmp_path: Path) -> None:
+    after, _ = CONTRADICTIONS["bodies 1 mm high"]
+    _, fresh = gate.check(lambda *_: None, ["q2"], [REFERENCE], tmp_path, chosen_with(after))
+    # Whoever writes it by hand gains nothing.
+    (tmp_path / "q2.json").write_text(json.dumps(fresh["q2"]))
+    again, fresh = gate.check(lambda *_: None, ["q2"], [REFERENCE], tmp_path, chosen_with(after))
+    assert [verdict.quantity for _, verdict in again if not verdict.passes] == ["report_mismatch"]
+    assert gate.update_baselines(fresh, again, None, tmp_path) == []
+
+
+BROKEN = """
+import numpy as np
+from dataclasses import replace
+from engines.lagrange import LagrangeEngine
+
+class Own(LagrangeEngine):
+    name = "own"
+    def simulate(self, problem, settings, progress):
+        # Another method than the reference's, or it would be taken for a copy.
+        ride = super().simulate(problem, settings.model_copy(update={"integrator": "modified-euler"}), progress)
+        return replace(ride, settings=settings.model_dump(), body_position=ride.body_position + [0, 0, 1e-3])
+
+ENGINE = Own()
+"""
+
+
+@pytest.mark.usefixtures("rides_only")
+def test_the_command_refuses_to_update_and_says_which_report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "own_high.py").write_text(BROKEN, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    announced = registry.entry_points(group=registry.ENTRY_POINT_GROUP)
+    point = EntryPoint(OWN, "own_high:ENGINE", registry.ENTRY_POINT_GROUP)
+    monkeypatch.setattr(registry, "entry_points", lambda group: [*announced, point])
+    baselines = tmp_path / "baselines"
+    command = ["check", "q2", "--engine", OWN, "--engine", REFERENCE, "--baselines", str(baselines), "--update"]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 1
+    assert "no baseline written of own on q2: its position of the" in " ".join(done.output.split())
+    assert set(json.loads((baselines / "q2.json").read_text())["engines"]) == {REFERENCE}
+
+
+RIDE_SAMPLES = round(Gate().duration * Gate().output_rate) + 1
+
+
+@pytest.mark.parametrize(
+    "after",
+    [raising(EngineError("no such step")), raising(ZeroDivisionError("by zero"))],
+    ids=["refused", "broken"],
+)
+def test_an_order_that_cannot_be_measured_costs_only_itself(after: Any) -> None:
+    def otherwise(problem: Problem, trajectory: Trajectory) -> Trajectory:
+        return trajectory if len(problem.times) == RIDE_SAMPLES else after(trajectory)
+
+    class Fragile(Altered):
+        def simulate(self, problem: Problem, settings: Any, progress: Any) -> Trajectory:
+            return otherwise(problem, self.inner.simulate(problem, settings, progress))
+
+    def chosen(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
+        engine, settings = configure(name, values)
+        return Fragile(engine), settings
+
+    verdicts, _ = gate.check(lambda *_: None, ["q2"], [REFERENCE], chosen=chosen)
+    fails = {verdict.quantity: verdict for _, verdict in verdicts if not verdict.passes}
+    assert set(fails) == {"observed_order", *gate_sample.EIGENVALUE_QUANTITIES}
+    for verdict in fails.values():
+        assert verdict.status == "missing"
+        assert "no such step" in verdict.reason or "ZeroDivisionError: by zero" in verdict.reason
