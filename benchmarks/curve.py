@@ -15,11 +15,11 @@ from rich.console import Console
 from rich.table import Table
 
 from velodrome.reference.anchors import ANCHORS, anchor
-from velodrome.reference.atlas import SIZE, atlas, spacing
+from velodrome.reference.atlas import ATLAS_SIZE, compute_atlas, spacing
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.circular import Steady
-from velodrome.reference.continuation import follow
-from velodrome.reference.curve import sample
+from velodrome.reference.continuation import follow_curve
+from velodrome.reference.curve import sample_curve
 from velodrome.reference.stability import linearise
 from velodrome.reference.surface import Paraboloid, SurfaceOfRevolution
 
@@ -45,12 +45,14 @@ def curve_table(alpha: float, family: int, rounds: int) -> Table:
     equations = start.equations
 
     def followed() -> np.ndarray:
-        return np.array([point.unknowns for point in follow(equations, start.unknowns, start.directions[0], LONGEST)])
+        return np.array(
+            [point.unknowns for point in follow_curve(equations, start.unknowns, start.directions[0], LONGEST)]
+        )
 
     points = followed()
     title = f"family {family}, alpha = {alpha:g}: {len(points)} points"
     table = Table(title, "us a point", box=None, pad_edge=False)
-    steps, seen = fastest(followed, rounds), fastest(lambda: sample(equations, points), rounds)
+    steps, seen = fastest(followed, rounds), fastest(lambda: sample_curve(equations, points), rounds)
     alone = fastest(lambda: single(equations, points[::10]), rounds) * 10
     table.add_row("predictor, Newton's method, tangent", f"{1e6 * steps / len(points):.1f}")
     table.add_row("7 x 7 Jacobian, eigenvalues, forces, energy", f"{1e6 * seen / len(points):.1f}")
@@ -68,9 +70,9 @@ def single(equations: Steady, points: np.ndarray) -> None:
 def atlas_table(size: int) -> Table:
     """Time the atlas: curves, stable sections, critical points; no files."""
     alphas, longest = spacing(size)
-    atlas(BICYCLE, alphas[:2], longest)  # compiles
+    compute_atlas(BICYCLE, alphas[:2], longest)  # compiles
     begin = time.process_time()
-    found = atlas(BICYCLE, alphas, longest)
+    found = compute_atlas(BICYCLE, alphas, longest)
     seconds = time.process_time() - begin
     table = Table("atlas", "motions", "CPU s", "us a motion", box=None, pad_edge=False)
     table.add_row(f"{len(alphas)} shapes", str(found.size), f"{seconds:.1f}", f"{1e6 * seconds / found.size:.1f}")
@@ -82,7 +84,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Speed of circular motions along a curve and of the atlas.")
     parser.add_argument("--rounds", type=int, default=7, help="repetitions of each measurement")
     parser.add_argument("--atlas", action="store_true", help="time the whole atlas too")
-    parser.add_argument("--size", type=int, default=SIZE, help="its number of motions")
+    parser.add_argument("--size", type=int, default=ATLAS_SIZE, help="its number of motions")
     options, console = parser.parse_args(), Console()
     for alpha, family in ((0.005, 2), (0.2, 3)):
         console.print(curve_table(alpha, family, options.rounds))

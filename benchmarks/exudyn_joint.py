@@ -19,7 +19,7 @@ from rich.table import Table
 from velodrome.engines.engine import Problem
 from velodrome.engines.exudyn.engine import BUILTIN, ENGINE, PLANE_NORMAL, ExudynEngine
 from velodrome.engines.exudyn.model import Model, build_model
-from velodrome.engines.exudyn.solve import Integration, silent, simulation_settings
+from velodrome.engines.exudyn.solve import Integration, no_progress, simulation_settings
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.dae import consistent_state
 from velodrome.reference.surface import Paraboloid, Plane, Surface
@@ -120,7 +120,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="What rolling costs in Exudyn.")
     parser.add_argument("--rounds", type=int, default=9, help="repetitions of each measurement")
     rounds, console = parser.parse_args().rounds, Console(width=140)
-    with silent():
+    with no_progress():
         for table in (speed_table(rounds), profile_table(rounds), call_table(rounds)):
             console.print(table)
             console.print()

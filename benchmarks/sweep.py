@@ -22,7 +22,7 @@ import pyarrow.parquet as pq
 from rich.console import Console
 from rich.table import Table
 
-from velodrome.scenarios.sweep.plan import Plan, plan_sweep
+from velodrome.scenarios.sweep.plan import SweepPlan, plan_sweep
 from velodrome.scenarios.sweep.pool import ONE_THREAD
 from velodrome.scenarios.sweep.run import Work, locally, run_sweep
 from velodrome.scenarios.sweep.store import JOURNAL, RESULTS, TIMINGS, open_folder, write_results
@@ -74,14 +74,14 @@ class Measured:
     finish: float
 
 
-def planned(folder: Path, engines: list[str], count: int, duration: float = 20.0) -> Plan:
+def planned(folder: Path, engines: list[str], count: int, duration: float = 20.0) -> SweepPlan:
     """A sweep of rides on the plane."""
     path = folder / "sweep.toml"
     path.write_text(SWEEP.format(engines=", ".join(f'"{name}"' for name in engines), count=count, duration=duration))
     return plan_sweep(path)
 
 
-def measured(plan: Plan, work: Work) -> Measured:
+def measured(plan: SweepPlan, work: Work) -> Measured:
     """Run a sweep in a fresh folder."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..reference.rim import find_second_touch, require_clear_rims
 from .engine import REQUIRED, SHAPES, Engine, EngineError, Problem, Progress, Settings, Trajectory
-from .guard import simulate
+from .guard import simulate_guarded
 
 # By how much a sample's time may be off, relative to it. `velodrome.reference.simulate.steps_per_output` lets a step be
 # off by as much. An engine that adds its step up errs by half a unit of round-off an addition at the most: less in nine
@@ -19,7 +19,7 @@ from .guard import simulate
 CLOCK_ERROR = 1e-9
 
 
-def ride(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
+def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
     """Run a problem in an engine and look at what it gives.
 
     A state that is not finite ends the ride before it, and so does a rim that touches the ground at a second place.
@@ -50,7 +50,7 @@ def ride(engine: Engine, problem: Problem, settings: Any, progress: Progress) ->
         require_clear_rims(problem.bicycle, problem.surface, problem.q, may_sink=True)
     except ValueError as error:
         raise EngineError(str(error)) from error
-    trajectory = simulate(engine, problem, settings, progress)
+    trajectory = simulate_guarded(engine, problem, settings, progress)
     if not isinstance(trajectory, Trajectory):
         raise EngineError(f"it gave a {type(trajectory).__name__}, not a Trajectory")
     for wrong in _faults(engine, problem, settings, trajectory):

@@ -76,7 +76,7 @@ class Trajectory:
         The settings it ran with, JSON values.
     time : ndarray, shape (n,)
         Times of the samples by the engine's own clock [s], one for each of the problem's, or fewer where the run
-        ended early. `velodrome.engines.admission.ride` holds them against the problem's.
+        ended early. `velodrome.engines.admission.ride_engine` holds them against the problem's.
     q, qd : ndarray, shape (n, 9)
         Generalised coordinates and rates.
     body_position : ndarray, shape (n, 4, 3)

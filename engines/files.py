@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 @contextmanager
-def whole(path: Path) -> Iterator[Path]:
+def write_whole(path: Path) -> Iterator[Path]:
     """Give a name beside ``path`` to write to; it takes the path's place when all is written, else it goes.
 
     Its ending is the path's own, from which writers tell the format.

@@ -148,7 +148,7 @@ def _is_between(frame: FrameType) -> bool:
     return any(name == package or name.startswith(f"{package}.") for package in _BETWEEN)
 
 
-def simulate(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
+def simulate_guarded(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
     """Run a problem in an engine; what the ``progress`` callback raises is not the engine's failure.
 
     Raises
@@ -213,4 +213,4 @@ class GuardedEngine:
 
     def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
         """Run a problem."""
-        return simulate(self.inner, problem, settings, progress)
+        return simulate_guarded(self.inner, problem, settings, progress)

@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ..reference.bicycle import BODIES
 from ..reference.kinematics import COORDINATES, WHEELS
 from .engine import REQUIRED, SHAPES, Trajectory
-from .files import whole
+from .files import write_whole
 
 METADATA_KEY, DIGEST_KEY = b"velodrome", b"velodrome-sha256"
 
@@ -42,7 +42,7 @@ class _Facts(BaseModel):
     largest_residual: Annotated[float, Field(ge=0)] | None = None
 
 
-FACTS = tuple(_Facts.model_fields)
+STORED_FACTS = tuple(_Facts.model_fields)
 
 
 def _coordinate_columns() -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
@@ -51,7 +51,7 @@ def _coordinate_columns() -> tuple[list[tuple[str, str]], list[tuple[str, str]]]
     return positions, [(f"{name}_rate", f"{unit}/s") for name, unit in positions]
 
 
-def columns() -> Iterator[tuple[str, list[tuple[str, str]]]]:
+def trajectory_columns() -> Iterator[tuple[str, list[tuple[str, str]]]]:
     """Fields of a trajectory with their columns: (field, [(column, unit), ...]), flattened in C order."""
     positions, rates = _coordinate_columns()
     yield "time", [("time", "s")]
@@ -73,13 +73,13 @@ _LONGEST_REASON = 300  # letters of what a reader of damaged files says
 def write_trajectory(trajectory: Trajectory, path: Path) -> None:
     """Write a trajectory to ``path``, whole or not at all."""
     found = []
-    for name, names in columns():
+    for name, names in trajectory_columns():
         value = getattr(trajectory, name)
         if value is None:
             continue
         flat = np.asarray(value, float).reshape(len(trajectory.time), len(names))
         found += [(column, flat[:, j], unit) for j, (column, unit) in enumerate(names)]
-    write_columns(found, path, {key: getattr(trajectory, key) for key in FACTS})
+    write_columns(found, path, {key: getattr(trajectory, key) for key in STORED_FACTS})
 
 
 def write_columns(
@@ -104,7 +104,7 @@ def write_columns(
         fields.append(pa.field(name, arrays[-1].type, nullable=False, metadata=metadata))
     table = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata={METADATA_KEY: json.dumps(facts).encode()}))
     sealed = {**(table.schema.metadata or {}), DIGEST_KEY: digest(table)}
-    with whole(path) as partial:
+    with write_whole(path) as partial:
         pq.write_table(table.replace_schema_metadata(sealed), partial, **options)
 
 
@@ -132,7 +132,7 @@ def read_trajectory(path: Path) -> Trajectory:
     """
     table = _table(path)
     facts = _facts(table, path)
-    values = {name: _field(table, name, names, path) for name, names in columns()}
+    values = {name: _field(table, name, names, path) for name, names in trajectory_columns()}
     time = table.column("time").to_numpy()
     if not (len(time) and np.all(np.isfinite(time)) and np.all(np.diff(time) > 0)):
         raise ValueError(f"{path} is not a trajectory: its times must be finite and rising, one or more")

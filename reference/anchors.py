@@ -51,10 +51,10 @@ from .circular import (
     nearest_condition,
     newton,
     rear_rate_condition,
-    turned,
+    reverse_speeds,
     unknown_condition,
 )
-from .continuation import LARGEST_LEAN, crossings, follow, tangent
+from .continuation import LARGEST_LEAN, crossings, follow_curve, tangent
 from .kernels import dynamics as kernel
 from .kernels.steady import STANDING, UNKNOWNS
 from .kinematics import body_positions, constants
@@ -207,7 +207,7 @@ def _on_the_plane(family: int, rear_rate: float | None) -> np.ndarray:
 def _met_from(start: np.ndarray, towards: np.ndarray, condition: Callable[[np.ndarray], Condition]) -> np.ndarray:
     """The first solution of a condition on the benchmark's curve on the plane."""
     level = Steady(Bicycle(), Plane())
-    return next(crossings(level, follow(level, start, towards), condition))
+    return next(crossings(level, follow_curve(level, start, towards), condition))
 
 
 def _unit(index: int) -> np.ndarray:
@@ -270,7 +270,7 @@ def _anchor_at(
     if abs(u[REAR_SPEED]) < STANDING:
         along = tangent(equations, u)
         if along[REAR_SPEED] * (along @ directions[0]) < 0:
-            u = turned(u)
+            u = reverse_speeds(u)
     return Anchor(family, equations, u, directions, condition)
 
 
@@ -400,7 +400,7 @@ def _to_surface_or_middle(
         raise lost
     halfway = _radius_condition(radius)
     for towards in directions:
-        for start in crossings(plane, follow(plane, u, towards), halfway):
+        for start in crossings(plane, follow_curve(plane, u, towards), halfway):
             try:
                 return _to_surface(bicycle, surface, start, halfway), halfway
             except ValueError:
@@ -416,7 +416,7 @@ def _other_pivot(bicycle: Bicycle, surface: SurfaceOfRevolution) -> np.ndarray:
     """
     branch = anchor(bicycle, surface, 2, ANCHORS[2][-1])
     for towards in branch.directions:
-        points = follow(branch.equations, branch.unknowns, towards)
+        points = follow_curve(branch.equations, branch.unknowns, towards)
         for u in crossings(branch.equations, points, _anchored(None)):
             return u
     raise ValueError(f"there is no pivoting motion on {surface}")

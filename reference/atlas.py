@@ -16,7 +16,7 @@ from .families import FAMILIES, trace_from
 from .sections import SectionEnd, sample_family, stable_sections
 from .surface import Paraboloid
 
-SIZE = 400_000
+ATLAS_SIZE = 400_000
 _CROWDED = 0.04  # the last stable section vanishes at 0.033, the cusps meet at 0.017
 _ARC = 38.0  # of all four families together, a mean over alpha
 _LONGEST_STEP = 0.05  # of the arc: no section known is so short that its neighbours would not tell of it
@@ -106,7 +106,7 @@ class Atlas:
         return sum(len(curve.seen.lean) for curve in self.curves)
 
 
-def spacing(size: int = SIZE, largest: float = 1.0) -> tuple[np.ndarray, float]:
+def spacing(size: int = ATLAS_SIZE, largest: float = 1.0) -> tuple[np.ndarray, float]:
     """Shapes and longest step of the arc for an atlas of some ``size`` motions.
 
     Half of the shapes lie evenly up to 0.04, where things happen, the others evenly in log alpha up to the
@@ -126,7 +126,7 @@ def spacing(size: int = SIZE, largest: float = 1.0) -> tuple[np.ndarray, float]:
     return alphas, min(_LONGEST_STEP, _ARC * shapes / size)
 
 
-def atlas(
+def compute_atlas(
     bicycle: Bicycle,
     alphas: Sequence[float] | np.ndarray,
     longest: float,

@@ -144,7 +144,7 @@ class Steady:
         )
 
 
-def turned(unknowns: np.ndarray) -> np.ndarray:
+def reverse_speeds(unknowns: np.ndarray) -> np.ndarray:
     """The same solution, or its tangent, (22,) each, with the signs of all three speeds exchanged."""
     other = unknowns.copy()
     other[YAW_SPEED : FRONT_SPEED + 1] *= -1
@@ -153,7 +153,7 @@ def turned(unknowns: np.ndarray) -> np.ndarray:
 
 def as_solved(unknowns: np.ndarray) -> np.ndarray:
     """The same solution (22,) with the signs of the speeds that solvers give: a turn to the left."""
-    return turned(unknowns) if unknowns[YAW_SPEED] < 0 else unknowns
+    return reverse_speeds(unknowns) if unknowns[YAW_SPEED] < 0 else unknowns
 
 
 @dataclass(frozen=True)

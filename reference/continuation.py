@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from .circular import CONTACT, Condition, Steady, as_solved, newton, turned
+from .circular import CONTACT, Condition, Steady, as_solved, newton, reverse_speeds
 from .kernels import curve as kernel
 from .kernels.steady import UNKNOWNS
 from .surface import SurfaceOfRevolution, has_tip
@@ -60,7 +60,7 @@ def tangent(equations: Steady, u: np.ndarray) -> np.ndarray:
     return along
 
 
-def follow(
+def follow_curve(
     equations: Steady, start: np.ndarray, towards: np.ndarray, longest: float = LONGEST_STEP, most: int = 4000
 ) -> Iterator[Point]:
     """Follow the curve through a solution.
@@ -85,7 +85,7 @@ def follow(
         steps no longer converge. The speeds of all are `as_solved`.
     """
     if as_solved(start) is not start:
-        start, towards = turned(start), turned(towards)
+        start, towards = reverse_speeds(start), reverse_speeds(towards)
     direction = tangent(equations, start)
     first = Point(start, direction if direction @ towards > 0 else -direction)
     tip, side = has_tip(equations.surface), start[_REAR_SIDE]

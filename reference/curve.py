@@ -57,7 +57,7 @@ class Samples:
         return np.all(self.normal_force > 0, axis=1)
 
 
-def sample(equations: Steady, unknowns: np.ndarray) -> Samples:
+def sample_curve(equations: Steady, unknowns: np.ndarray) -> Samples:
     """Evaluate circular motions.
 
     Parameters

@@ -25,7 +25,7 @@ from .circular import (
     CircularMotion,
     Steady,
     rear_rate_condition,
-    turned,
+    reverse_speeds,
 )
 from .continuation import (
     FARTHEST,
@@ -35,7 +35,7 @@ from .continuation import (
     Point,
     at_edge,
     crossings,
-    follow,
+    follow_curve,
     roots_along,
 )
 from .kernels.steady import STANDING, direction
@@ -138,7 +138,7 @@ def trace_from(start: Anchor, longest: float = LONGEST_STEP) -> Family:
     """Follow a curve from an anchor to both ends, see `velodrome.reference.anchors.anchor` and `trace`."""
     halves = []
     for towards in start.directions:
-        points = list(_to_an_end(follow(start.equations, start.unknowns, towards, longest)))
+        points = list(_to_an_end(follow_curve(start.equations, start.unknowns, towards, longest)))
         halves.append(_end_exactly(start.equations, points))
     forward, *backward = halves
     before = [Point(point.unknowns, -point.tangent) for half in backward for point in reversed(half[1:])]
@@ -207,7 +207,7 @@ def _cleared_end(end: Point, neighbour: Point) -> Point:
             u[unknown] = 0.0
     turning = neighbour.unknowns[YAW_SPEED] * direction(neighbour.unknowns[REAR_SPEED])
     if _is_zero(u, REAR_SPEED) and u[YAW_SPEED] * turning < 0:
-        u, along = turned(u), turned(along)
+        u, along = reverse_speeds(u), reverse_speeds(along)
     return Point(u, along)
 
 
@@ -239,7 +239,7 @@ def _all_curves(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Sequence[Fami
     return trace_all(bicycle, surface)[0]
 
 
-def motions(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float) -> list[CircularMotion]:
+def find_motions(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float) -> list[CircularMotion]:
     """All motions of a family at a rear-wheel rate, nearest to the family's anchor first.
 
     Parameters
@@ -276,7 +276,7 @@ def _met(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate:
             continue
         anchors.append(start)
         for towards in start.directions:
-            points = _to_an_end(follow(start.equations, start.unknowns, towards))
+            points = _to_an_end(follow_curve(start.equations, start.unknowns, towards))
             yield from _new(found, start.equations, points, rear_rate)
     every = _all_curves(bicycle, surface)
     others = [c for c in every if c.number == family and not any(_passes(c, start) for start in anchors)]

@@ -8,7 +8,7 @@ import numpy as np
 
 from .anchors import ANCHORS, Anchor, anchor, next_anchor
 from .circular import Steady
-from .curve import sample
+from .curve import sample_curve
 from .families import Family
 from .sections import sample_family
 from .stability import are_zero
@@ -22,7 +22,7 @@ _SAME = 1e-9  # of an eigenvalue: what round-off leaves of an imaginary part, or
 _STEPS = 40
 
 
-def modes(family: Family) -> np.ndarray:
+def follow_modes(family: Family) -> np.ndarray:
     """Eigenvalues along a family with their modes.
 
     They are plain on the level plane, at the family's anchor: beside the family's zero a pair is +-i times the yaw
@@ -75,7 +75,7 @@ def _at_the_anchor(family: Family) -> tuple[int, np.ndarray] | None:
 
 
 def _spectrum(here: Anchor) -> tuple[np.ndarray, float]:
-    seen = sample(here.equations, here.unknowns[None])
+    seen = sample_curve(here.equations, here.unknowns[None])
     return seen.eigenvalues[0], float(seen.yaw_rate[0])
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from .circular import CircularMotion, Steady
 from .continuation import Point, least_between, roots_along
-from .curve import Samples, sample
+from .curve import Samples, sample_curve
 from .families import Family
 from .stability import Linearisation, free_eigenvalues, linearise
 
@@ -40,12 +40,12 @@ def linearise_point(equations: Steady, point: Point) -> tuple[CircularMotion, Li
 
 def growth_along(equations: Steady, point: Point) -> float:
     """Growth rate of disturbances at a point of a family [1/s]."""
-    return float(sample(equations, point.unknowns[None]).growth_rate[0])
+    return float(sample_curve(equations, point.unknowns[None]).growth_rate[0])
 
 
 def sample_family(family: Family) -> Samples:
     """All points of a family."""
-    return sample(family.equations, np.array([point.unknowns for point in family.points]))
+    return sample_curve(family.equations, np.array([point.unknowns for point in family.points]))
 
 
 def stable_sections(family: Family, growth: np.ndarray | None = None) -> list[tuple[SectionEnd, SectionEnd]]:

@@ -27,7 +27,7 @@ _AT_THE_EDGE = 1e-3  # [m]
 
 
 @dataclass(frozen=True)
-class Motion:
+class PreciseMotion:
     """A computed motion; the arrays end early where the integration did.
 
     Attributes
@@ -62,12 +62,12 @@ def _motion(
     steps: int,
     evaluations: int,
     ended: str | None,
-) -> Motion:
+) -> PreciseMotion:
     n = len(rows)
     q, qd, p = (np.ascontiguousarray(part) for part in (rows[:, :9], rows[:, 9:18], rows[:, 18:]))
     force = np.empty((n, 6))
     kernel.contact_forces(rows, surface.function.real, surface.parameters, constants(bicycle), force)
-    return Motion(times[:n].copy(), q, qd, p.reshape(n, 2, 3), force.reshape(n, 2, 3), steps, evaluations, ended)
+    return PreciseMotion(times[:n].copy(), q, qd, p.reshape(n, 2, 3), force.reshape(n, 2, 3), steps, evaluations, ended)
 
 
 def simulate(
@@ -78,7 +78,7 @@ def simulate(
     times: np.ndarray,
     tolerance: float = 1e-13,
     progress: Callable[[float], None] | None = None,
-) -> Motion:
+) -> PreciseMotion:
     """Integrate precisely: Dormand-Prince 8(5,3), adaptive, projected on all constraints.
 
     The motion ends where a rim touches the ground at a second place: what follows is an impact, which the
@@ -142,7 +142,7 @@ def _where_the_ground_ends(surface: Surface, contact: np.ndarray) -> str | None:
 
 def simulate_modified_euler(
     bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, times: np.ndarray, step: float = 1e-3
-) -> Motion:
+) -> PreciseMotion:
     """Integrate as the paper does (section 4.2): modified Euler with a fixed step, nothing projected.
 
     Ends at a second touch as `simulate` does.

@@ -104,12 +104,12 @@ def write_documents(path: Path, seed: int | None, paper: bool) -> None:
         shake(seed)
     from velodrome.scenarios.motions.families import families_document
     from velodrome.scenarios.paper.claims import make_ledger
-    from velodrome.scenarios.paper.ledger import document
+    from velodrome.scenarios.paper.ledger import ledger_document
 
     found: dict[str, Any] = {f"families at alpha = {alpha:g}": families_document(alpha) for alpha in ALPHAS}
     if paper:
         told = ("claim", "kind", "verdict", "fault")
-        found["paper"] = [{name: line[name] for name in told} for line in document(make_ledger())["lines"]]
+        found["paper"] = [{name: line[name] for name in told} for line in ledger_document(make_ledger())["lines"]]
     path.write_text(json.dumps(found))
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from velodrome.reports.drawing.palette import colours
+from velodrome.reports.drawing.palette import assign_colours
 from velodrome.reports.figures.labels import Label, place_labels
-from velodrome.reports.figures.style import FAMILY_COLOURS, GREY, INK, new_figure, style, write_figure
+from velodrome.reports.figures.style import FAMILY_COLOURS, GREY, INK, new_figure, use_style, write_figure
 
 from .advice import beats, cost, label, rode
 
@@ -33,7 +33,7 @@ def creep_figure(path: Path, document: Mapping[str, Any]) -> None:
         ``creep``: for each ground the rows of the creep law; ``energy``: rows of integrator, step and gain;
         ``settings``: for each ground the choices, of which the first ground's are drawn.
     """
-    with style():
+    with use_style():
         figure = new_figure(6.2)
         (creep, price), (deviation, energy) = figure.subplots(2, 2, height_ratios=(1.25, 1))
         _draw_creep(creep, document["creep"])
@@ -137,7 +137,7 @@ def _draw_energy(ax: Axes, rows: Sequence[Row]) -> None:
 
 def _draw_price(ax: Axes, rows: Sequence[Row], ground: str) -> None:
     """Slip over CPU time; choices that nothing beats are full and named."""
-    shades = colours(dict.fromkeys(row["engine"] for row in rows))
+    shades = assign_colours(dict.fromkeys(row["engine"] for row in rows))
     labels = []
     for engine in shades:
         shade: Any = tuple(_DARKER * part / 255 for part in shades[engine])

@@ -11,10 +11,10 @@ from typing import get_args
 
 import numpy as np
 
-from velodrome.engines.admission import ride
+from velodrome.engines.admission import ride_engine
 from velodrome.engines.engine import EngineError, Problem
 from velodrome.engines.mujoco import exact_contact, native
-from velodrome.engines.mujoco.ride import start
+from velodrome.engines.mujoco.ride import set_start
 from velodrome.engines.mujoco.settings import ExactContactSettings, Integrator, NativeSettings
 from velodrome.reference.kinematics import WHEELS
 
@@ -83,11 +83,11 @@ def creep_row(problem: Problem, settings: NativeSettings) -> CreepRow:
     EngineError
         If it fell before its contacts had settled.
     """
-    trajectory = ride(native.ENGINE, problem, settings, lambda _: None)
+    trajectory = ride_engine(native.ENGINE, problem, settings, lambda _: None)
     settled = is_settled(trajectory, settings)
     if trajectory.slip is None or not settled.any():
         raise EngineError(f"the wheels did not settle within {trajectory.time[-1]:g} s")
-    model, _ = start(problem, settings, "planes")
+    model, _ = set_start(problem, settings, "planes")
     rear, front = (float(model.body(f"{wheel}_wheel").invweight0[0]) for wheel in WHEELS)
     missing = contact_acceleration(problem.bicycle, problem.surface, trajectory.q, trajectory.qd)
     both = missing / settings.damping, settled_slip(problem, trajectory, settings, (rear, front))
@@ -145,7 +145,7 @@ def creep_study(
 def energy_row(problem: Problem, integrator: Integrator, step: float) -> EnergyRow:
     """Measure the energy that an integrator adds on a circular motion, with exact contacts."""
     settings = ExactContactSettings(integrator=integrator, step=step)
-    trajectory = ride(exact_contact.ENGINE, problem, settings, lambda _: None)
+    trajectory = ride_engine(exact_contact.ENGINE, problem, settings, lambda _: None)
     settled = is_settled(trajectory, settings)
     assert trajectory.kinetic_energy is not None
     assert trajectory.potential_energy is not None

@@ -19,11 +19,11 @@ import mujoco
 import numpy as np
 from scipy.stats import t as student
 
-from velodrome.engines.admission import ride
+from velodrome.engines.admission import ride_engine
 from velodrome.engines.engine import Problem, Trajectory
 from velodrome.engines.mujoco import default, exact_contact, multipliers, native
 from velodrome.engines.mujoco.engine import MujocoEngine
-from velodrome.engines.mujoco.ride import start
+from velodrome.engines.mujoco.ride import set_start
 from velodrome.engines.mujoco.settings import ContactSettings, MultiplierSettings, StepSettings
 from velodrome.reference.contact import observe
 from velodrome.reference.kernels.contact import tangents
@@ -168,7 +168,7 @@ def slip_power(problem: Problem, trajectory: Trajectory) -> np.ndarray:
 def plain_step_cost(problem: Problem, integrator: str, step: float = 0.002, steps: int = 5000) -> float:
     """Process CPU time of MuJoCo's own step of the same tree, without ground and callbacks [s]."""
     settings = MultiplierSettings.model_validate({"integrator": integrator, "step": step})
-    model, data = start(problem, settings, "nothing")
+    model, data = set_start(problem, settings, "nothing")
     mujoco.mj_step(model, data, 100)
     begun = process_time()
     mujoco.mj_step(model, data, steps)
@@ -194,7 +194,7 @@ def _on_circle(trajectory: Trajectory) -> Trajectory:
 
 def _quickest(engine: MujocoEngine[Any], problem: Problem, settings: StepSettings) -> tuple[Trajectory, float]:
     """The ride, and the least CPU time of a step [s] over `_REPEATS` rides: what the machine does else only adds."""
-    rides = [ride(engine, problem, settings, _quiet) for _ in range(_REPEATS)]
+    rides = [ride_engine(engine, problem, settings, _quiet) for _ in range(_REPEATS)]
     return rides[0], min(one.cpu_time / one.steps for one in rides)
 
 
@@ -268,7 +268,7 @@ def settings_study(
 def drift_row(engine: MujocoEngine[Any], changed: dict[str, Any], problem: Problem) -> DriftRow:
     """Ride a circular motion for long; drifts are measured while it is still on its circle."""
     settings = engine.settings(**changed)
-    whole = ride(engine, problem, settings, _quiet)
+    whole = ride_engine(engine, problem, settings, _quiet)
     part = _on_circle(whole)
     chosen = is_settled(part, settings)
     if chosen.sum() < 3 * _BLOCKS:

@@ -20,7 +20,7 @@ from .settings import ExudynSettings, SolverSettings
 
 if TYPE_CHECKING:
     from .model import Model
-    from .solve import Integration, Outcome
+    from .solve import Integration, IntegrationOutcome
     from .wheels import PutOnGround
 
 
@@ -76,27 +76,29 @@ class ExudynEngine:
         EngineError
             If the engine does not even accept the initial state.
         """
-        from .model import build_model, rim_look
-        from .solve import integrate, silent
+        from .model import build_model, make_rim_check
+        from .solve import integrate, no_progress
 
         self.check(problem, settings)
-        with silent():
+        with no_progress():
             model = build_model(problem, settings, self.put_on_ground())
-            look = rim_look(model, problem)
+            look = make_rim_check(model, problem)
             outcome = integrate(model.system, _integration(problem, settings, model), progress, look)
         trajectory = self._trajectory(problem, settings, model, outcome)
         return trajectory.until(outcome.until)
 
-    def _trajectory(self, problem: Problem, settings: SolverSettings, model: Model, outcome: Outcome) -> Trajectory:
+    def _trajectory(
+        self, problem: Problem, settings: SolverSettings, model: Model, outcome: IntegrationOutcome
+    ) -> Trajectory:
         from .model import read_motion
-        from .results import coordinates, energies, measure_contacts, weights
+        from .results import measure_contacts, read_coordinates, read_energies, weights
 
         motion = read_motion(model)
         contacts = measure_contacts(problem, model, motion)
         if not np.all(np.isfinite(contacts.gap[0])):
             raise EngineError(f"{self.name} could not start: a wheel has no contact point")
-        q, qd = coordinates(problem, motion)
-        kinetic, potential = energies(problem.bicycle, motion)
+        q, qd = read_coordinates(problem, motion)
+        kinetic, potential = read_energies(problem.bicycle, motion)
         return Trajectory(
             engine=self.name,
             version=self.version,

@@ -35,7 +35,7 @@ def axes(t0, t1, t2, t3):
 
 
 @jit
-def turned(body, v):
+def rotate_vector(body, v):
     """Inertial components of a vector ``v`` fixed in a body with unit vectors ``body``."""
     return (
         body[0][0] * v[0] + body[1][0] * v[1] + body[2][0] * v[2],
@@ -63,9 +63,9 @@ def wheel_contact(coordinates, centre, triad, radius, ground, function, paramete
     axle in the middle. ``ground`` is the `velodrome.reference.kernels.rim.RimSearch`.
     """
     body = axes(coordinates[3], coordinates[4], coordinates[5], coordinates[6])
-    offset = turned(body, centre)
+    offset = rotate_vector(body, centre)
     middle = (coordinates[0] + offset[0], coordinates[1] + offset[1], coordinates[2] + offset[2])
-    x, axle, z = turned(body, triad[0]), turned(body, triad[1]), turned(body, triad[2])
+    x, axle, z = rotate_vector(body, triad[0]), rotate_vector(body, triad[1]), rotate_vector(body, triad[2])
     gap, d, frame = contact_frame(middle, x, axle, z, radius, ground, function, parameters)
     return gap, add(offset, d), frame
 
@@ -152,7 +152,7 @@ def normals(coordinates, centres, triads, radii, ground, function, parameters, o
 
 
 @jit
-def observe(position, velocity, rotation, spin, radius, ground, function, parameters, point, frames, gap, slip):
+def observe_wheel(position, velocity, rotation, spin, radius, ground, function, parameters, point, frames, gap, slip):
     """Measure one wheel's contact along n samples of its own motion.
 
     position, velocity, spin (n, 3) and rotation (n, 3, 3) are the body's, in inertial axes; its centre is

@@ -16,7 +16,7 @@ from ...reference.kinematics import angular_velocities, body_positions, body_vel
 from ...reference.rim import Ending, RimWatch
 from ..engine import EngineError, Problem
 from .settings import SolverSettings
-from .wheels import LEFT, MASS_UNIT, PutOnGround, Rolling
+from .wheels import LEFT_AXIS, MASS_UNIT, PutOnGround, WheelRolling
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Model:
 
     container: exu.SystemContainer
     system: exu.MainSystem
-    rolling: Rolling
+    rolling: WheelRolling
     sensors: tuple[dict[str, Any], ...]
     wheels: tuple[Any, Any]
 
@@ -86,8 +86,8 @@ def _connect(system: exu.MainSystem, bicycle: Bicycle, q: np.ndarray, bodies: li
     rear_frame, front_frame, rear_wheel, front_wheel = bodies
     rotation, position = rotations(bicycle, q[None])[0], body_positions(bicycle, q[None])[0]
     for pair, point, axis in (
-        ([rear_wheel, rear_frame], position[2], rotation[0] @ LEFT),
-        ([front_wheel, front_frame], position[3], rotation[1] @ LEFT),
+        ([rear_wheel, rear_frame], position[2], rotation[0] @ LEFT_AXIS),
+        ([front_wheel, front_frame], position[3], rotation[1] @ LEFT_AXIS),
         ([rear_frame, front_frame], q[:3], rotation[0] @ bicycle.steer_axis),
     ):
         system.CreateRevoluteJoint(itemNumbers=pair, position=point, axis=axis, show=False)
@@ -109,7 +109,7 @@ def _watch(system: exu.MainSystem, body: Any) -> dict[str, Any]:
     }
 
 
-def rim_look(model: Model, problem: Problem) -> Callable[[float], Ending | None]:
+def make_rim_check(model: Model, problem: Problem) -> Callable[[float], Ending | None]:
     """Make the look at both rims that `velodrome.engines.exudyn.solve.integrate` calls at every step.
 
     Raises
@@ -135,7 +135,7 @@ def rim_look(model: Model, problem: Problem) -> Callable[[float], Ending | None]
 
 
 @dataclass(frozen=True)
-class Motion:
+class BodyMotion:
     """Motion of the four bodies as the engine computed it, all in inertial axes.
 
     Attributes
@@ -158,17 +158,17 @@ class Motion:
 _SIZES = {"position": 3, "velocity": 3, "rotation": 9, "spin": 3}  # of a body's sensors
 
 
-def stored(model: Model, sensor: Any) -> np.ndarray:
+def stored_samples(model: Model, sensor: Any) -> np.ndarray:
     """Samples of a sensor after a run, shape (n, 1 + k): time and values."""
     return np.atleast_2d(model.system.GetSensorStoredData(sensor))
 
 
-def read_motion(model: Model) -> Motion:
+def read_motion(model: Model) -> BodyMotion:
     """Collect the samples of the bodies' sensors after a run."""
-    time = stored(model, model.sensors[0]["position"])[:, 0].copy()
+    time = stored_samples(model, model.sensors[0]["position"])[:, 0].copy()
     values = {name: np.empty((len(time), 4, size)) for name, size in _SIZES.items()}
     for body, sensors in enumerate(model.sensors):
         for name, where in values.items():  # one sensor's copy at a time: a long ride has many samples
-            where[:, body] = stored(model, sensors[name])[:, 1:]
+            where[:, body] = stored_samples(model, sensors[name])[:, 1:]
     rotation = values["rotation"].reshape(len(time), 4, 3, 3)
-    return Motion(time, values["position"], values["velocity"], rotation, values["spin"])
+    return BodyMotion(time, values["position"], values["velocity"], rotation, values["spin"])

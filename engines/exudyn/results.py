@@ -11,7 +11,7 @@ from ...reference.kinematics import YAW, coordinates_from_bodies
 from ...reference.rim import rim_search
 from ..engine import Problem
 from . import kernel
-from .model import Model, Motion
+from .model import BodyMotion, Model
 from .wheels import MASS_UNIT, wheel_radii
 
 
@@ -25,7 +25,7 @@ class Contacts:
     slip: np.ndarray
 
 
-def measure_contacts(problem: Problem, model: Model, motion: Motion) -> Contacts:
+def measure_contacts(problem: Problem, model: Model, motion: BodyMotion) -> Contacts:
     """Measure gap and slip on the wheels' own bodies, and turn the contact forces to inertial axes."""
     n = len(motion.time)
     point, force, gap, slip = np.empty((n, 2, 3)), np.empty((n, 2, 3)), np.empty((n, 2)), np.empty((n, 2, 2))
@@ -35,7 +35,7 @@ def measure_contacts(problem: Problem, model: Model, motion: Motion) -> Contacts
     for wheel, radius in enumerate(wheel_radii(problem)):
         body = 2 + wheel
         frames = np.empty((n, 3, 3))
-        kernel.observe(
+        kernel.observe_wheel(
             *(motion.position[:, body], motion.velocity[:, body], motion.rotation[:, body], motion.spin[:, body]),
             *(radius, looking, function, parameters),
             *(point[:, wheel], frames, gap[:, wheel], slip[:, wheel]),
@@ -49,7 +49,7 @@ def weights(bicycle: Bicycle) -> np.ndarray:
     return bicycle.gravity / MASS_UNIT * np.array([bicycle.body_mass(body) for body in BODIES])
 
 
-def energies(bicycle: Bicycle, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+def read_energies(bicycle: Bicycle, motion: BodyMotion) -> tuple[np.ndarray, np.ndarray]:
     """Kinetic and potential energy of the four bodies, each of shape (n,) [J]."""
     mass = np.array([bicycle.body_mass(body) for body in BODIES])
     inertia = np.stack([bicycle.inertia(body) for body in BODIES])
@@ -59,7 +59,7 @@ def energies(bicycle: Bicycle, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     return 0.5 * (translation + turning), bicycle.gravity * (motion.position[:, :, 2] @ mass)
 
 
-def coordinates(problem: Problem, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+def read_coordinates(problem: Problem, motion: BodyMotion) -> tuple[np.ndarray, np.ndarray]:
     """Generalised coordinates and rates (n, 9), the angles on the turn on which the problem starts."""
     q, qd = coordinates_from_bodies(
         problem.bicycle, motion.time, motion.position[:, 0], motion.velocity[:, 0], motion.rotation, motion.spin

@@ -16,7 +16,7 @@ import exudyn as exu
 from ...reference.rim import Ending
 from ..engine import EngineError, Progress
 from .settings import SolverSettings
-from .start import Start, begin, correct, second_order_start
+from .start import GeneralizedAlphaStart, begin, correct_start, second_order_start
 
 PROGRESS_STEPS = 100
 
@@ -37,7 +37,7 @@ class Integration:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class IntegrationOutcome:
     """What an integration came to.
 
     Attributes
@@ -96,9 +96,9 @@ class _Steps:
         if self.taken % self._stride == 0:
             self._output.lastSensorsWritten = time
 
-    def outcome(self, done: int, cpu_time: float, ended: str | None, until: float = math.inf) -> Outcome:
+    def outcome(self, done: int, cpu_time: float, ended: str | None, until: float = math.inf) -> IntegrationOutcome:
         """Outcome of a run."""
-        return Outcome(done, cpu_time, ended, self.unconverged, self.residual, until)
+        return IntegrationOutcome(done, cpu_time, ended, self.unconverged, self.residual, until)
 
 
 def integrate(
@@ -106,7 +106,7 @@ def integrate(
     integration: Integration,
     progress: Progress,
     look: Callable[[float], Ending | None] = lambda _: None,
-) -> Outcome:
+) -> IntegrationOutcome:
     """Integrate a system from its initial state; its sensors hold the result.
 
     Parameters
@@ -126,7 +126,7 @@ def integrate(
     """
     raised: list[BaseException] = []
     step = integration.end / integration.steps
-    start: Start | None = None
+    start: GeneralizedAlphaStart | None = None
     solver: Any = exu.MainSolverImplicitSecondOrder()
     steps = _Steps(solver, integration)
     ending: Ending | None = None
@@ -142,7 +142,7 @@ def integrate(
                 if ending is not None:
                     return False
                 if steps.taken == 0 and start is not None:
-                    correct(system, start)
+                    correct_start(system, start)
                 if steps.taken > 0 and steps.taken % PROGRESS_STEPS == 0:
                     progress(steps.taken * step)
                 steps.begin(time)
@@ -207,7 +207,7 @@ def simulation_settings(integration: Integration) -> exu.SimulationSettings:
 
 
 @contextmanager
-def silent() -> Iterator[None]:
+def no_progress() -> Iterator[None]:
     """Keep the engine's messages off the standard output."""
     before = exu.config.printToConsole
     exu.config.printToConsole = False

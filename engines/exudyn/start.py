@@ -33,7 +33,7 @@ CURRENT: Any = exu.ConfigurationType.Current
 
 
 @dataclass(frozen=True)
-class Start:
+class GeneralizedAlphaStart:
     """Start values.
 
     Attributes
@@ -54,7 +54,7 @@ class Start:
 
 def second_order_start(
     system: exu.MainSystem, settings: exu.SimulationSettings, step: float, slip_equations: Sequence[int]
-) -> Start:
+) -> GeneralizedAlphaStart:
     """Compute the start values from an assembled system's initial state.
 
     Parameters
@@ -89,11 +89,11 @@ def second_order_start(
     excess[list(slip_equations)] = 0.0
     matrix = np.block([[mass, jacobian.T], [jacobian, np.zeros((len(excess), len(excess)))]])
     correction = np.linalg.solve(matrix, np.concatenate([np.zeros(len(v)), excess]))[: len(v)]
-    return Start(a, multipliers, a + shift * step * jerk, v + correction)
+    return GeneralizedAlphaStart(a, multipliers, a + shift * step * jerk, v + correction)
 
 
-def begin(system: exu.MainSystem, settings: exu.SimulationSettings, solver: Any, start: Start) -> bool:
-    """Initialize a solver with start values; the velocity is left to `correct`."""
+def begin(system: exu.MainSystem, settings: exu.SimulationSettings, solver: Any, start: GeneralizedAlphaStart) -> bool:
+    """Initialize a solver with start values; the velocity is left to `correct_start`."""
     settings.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
     # What the solver finds as initial accelerations becomes its auxiliary ones; the true ones follow.
     data: Any = system.systemData
@@ -104,7 +104,7 @@ def begin(system: exu.MainSystem, settings: exu.SimulationSettings, solver: Any,
     return ready
 
 
-def correct(system: exu.MainSystem, start: Start) -> None:
+def correct_start(system: exu.MainSystem, start: GeneralizedAlphaStart) -> None:
     """Set the corrected velocity: after the initial sample, before the first step."""
     data: Any = system.systemData
     data.SetODE2Coordinates_t(start.velocity, CURRENT)

@@ -21,12 +21,12 @@ from .settings import SolverSettings
 # lengths, measured against the bodies' weights: in kilograms it would let go of lengths a thousand times too soon.
 MASS_UNIT = 1000.0
 
-LEFT = np.array([0.0, 1.0, 0.0])
+LEFT_AXIS = np.array([0.0, 1.0, 0.0])
 
-Wheel = dict[str, Any]
+WheelBody = dict[str, Any]
 
 
-class Rolling(Protocol):
+class WheelRolling(Protocol):
     """Both wheels on the ground."""
 
     def local_forces(self, system: exu.MainSystem) -> np.ndarray:
@@ -38,7 +38,7 @@ class Rolling(Protocol):
         ...
 
 
-PutOnGround = Callable[[exu.MainSystem, Sequence[Wheel], Problem, SolverSettings], Rolling]
+PutOnGround = Callable[[exu.MainSystem, Sequence[WheelBody], Problem, SolverSettings], WheelRolling]
 
 
 @dataclass(frozen=True)
@@ -49,23 +49,23 @@ class Constrained:
     sensor: Any
 
     def local_forces(self, system: exu.MainSystem) -> np.ndarray:
-        """See `Rolling`: the engine adds W^T lambda to the inertia forces' side, so forces are minus lambda."""
+        """See `WheelRolling`: the engine adds W^T lambda to the inertia forces' side, so forces are minus lambda."""
         return -_samples(system, self.sensor).reshape(-1, 2, 3)
 
     def slip_equations(self, system: exu.MainSystem) -> list[int]:
-        """See `Rolling`."""
+        """See `WheelRolling`."""
         return slip_equations(system, self.joint)
 
 
 def constrain(
-    system: exu.MainSystem, wheels: Sequence[Wheel], problem: Problem, settings: SolverSettings
+    system: exu.MainSystem, wheels: Sequence[WheelBody], problem: Problem, settings: SolverSettings
 ) -> Constrained:
     """Put the wheels on the surface by true constraints."""
     method = generalized_alpha(settings.spectral_radius)
     joint = CreateRollingJointOnSurface(
         system,
         bodyNumbers=[wheel["bodyNumber"] for wheel in wheels],
-        axisVector=LEFT.tolist(),
+        axisVector=LEFT_AXIS.tolist(),
         discRadius=wheel_radii(problem),
         surface=problem.surface,
         newmarkRatio=method.beta / method.gamma,
@@ -80,21 +80,23 @@ class Discs:
     sensors: tuple[Any, Any]
 
     def local_forces(self, system: exu.MainSystem) -> np.ndarray:
-        """See `Rolling`; the engine's contact axes are the same."""
+        """See `WheelRolling`; the engine's contact axes are the same."""
         return np.stack([_samples(system, sensor) for sensor in self.sensors], axis=1)
 
     def slip_equations(self, system: exu.MainSystem) -> list[int]:
-        """See `Rolling`: the discs are declared nonholonomic."""
+        """See `WheelRolling`: the discs are declared nonholonomic."""
         return []
 
 
-def roll_discs(system: exu.MainSystem, wheels: Sequence[Wheel], problem: Problem, _settings: SolverSettings) -> Discs:
+def roll_discs(
+    system: exu.MainSystem, wheels: Sequence[WheelBody], problem: Problem, _settings: SolverSettings
+) -> Discs:
     """Put the wheels on the level plane by the engine's rolling discs."""
     return _add_discs(system, wheels, problem, np.array([[0.0, 0.0, 1.0]] * 2))[0]
 
 
 def roll_discs_on_tangents(
-    system: exu.MainSystem, wheels: Sequence[Wheel], problem: Problem, _settings: SolverSettings
+    system: exu.MainSystem, wheels: Sequence[WheelBody], problem: Problem, _settings: SolverSettings
 ) -> Discs:
     """Put the wheels on the surface by rolling discs whose normal follows the contact before every residual.
 
@@ -128,14 +130,14 @@ def wheel_radii(problem: Problem) -> list[float]:
 
 
 def _add_discs(
-    system: exu.MainSystem, wheels: Sequence[Wheel], problem: Problem, normals: np.ndarray
+    system: exu.MainSystem, wheels: Sequence[WheelBody], problem: Problem, normals: np.ndarray
 ) -> tuple[Discs, list[Any]]:
     ground = system.CreateGround()
     objects = [
         system.CreateRollingDisc(
             bodyNumbers=[ground, wheel["bodyNumber"]],
             axisPosition=[0.0, 0.0, 0.0],
-            axisVector=LEFT.tolist(),
+            axisVector=LEFT_AXIS.tolist(),
             discRadius=radius,
             planeNormal=normal.tolist(),
             show=False,

@@ -21,7 +21,7 @@ _in_use = Lock()
 
 
 @contextmanager
-def installed(control: Any, collision: Any = None) -> Iterator[None]:
+def install_callbacks(control: Any, collision: Any = None) -> Iterator[None]:
     """Let MuJoCo call compiled functions; what it called before is restored, however the block ends.
 
     Parameters

@@ -40,9 +40,9 @@ from ...reference.kernels.compilation import compile_callback, jit
 from ...reference.kernels.linear import factorise, solve_factorised
 from ...reference.kernels.rim import RimSearch, find_contact, level_axes
 from ...reference.kernels.vector import add, cross, dot, scale
-from .library import announce
+from .library import announce_collision
 
-WHEELS = 8  # the most that a blackboard has room for
+WHEEL_COUNT = 8  # the most that a blackboard has room for
 # A wheel whose centre is less than this above its contact lies flat [m].
 FLAT = 1e-4
 
@@ -111,12 +111,12 @@ BLACKBOARD = np.dtype(
         ("stabilisation", np.float64),
         # The wheels.
         ("wheels", np.int64),
-        ("ground", np.int64, WHEELS),
-        ("geom", np.int64, WHEELS),
-        ("body", np.int64, WHEELS),
-        ("radius", np.float64, WHEELS),
-        ("place", np.float64, (WHEELS, 3)),  # xi, eta, angle of the contacts
-        ("force", np.float64, (WHEELS, 3)),
+        ("ground", np.int64, WHEEL_COUNT),
+        ("geom", np.int64, WHEEL_COUNT),
+        ("body", np.int64, WHEEL_COUNT),
+        ("radius", np.float64, WHEEL_COUNT),
+        ("place", np.float64, (WHEEL_COUNT, 3)),  # xi, eta, angle of the contacts
+        ("force", np.float64, (WHEEL_COUNT, 3)),
         ("lost", np.int64),  # how often a wheel had no contact point
         ("found", np.int64),  # contacts made since the callbacks were installed
     ],
@@ -135,7 +135,7 @@ def _where_the_board_is():
 
 
 llvm.add_symbol(_WHERE, _where_the_board_is.address)
-announce("mj_jac", "mj_jacDot", "mj_solveM", "mj_fwdActuation", "mj_fwdAcceleration")
+announce_collision("mj_jac", "mj_jacDot", "mj_solveM", "mj_fwdActuation", "mj_fwdAcceleration")
 
 _pointer = types.voidptr
 _numbers = types.CPointer(types.float64)

@@ -25,7 +25,7 @@ import mujoco
 import numpy as np
 
 from . import compiled
-from .callbacks import installed
+from .callbacks import install_callbacks
 from .settings import WRONG
 
 STATE = (
@@ -49,7 +49,7 @@ def share(residual: float) -> str:
     return f"its forces are off by up to {2 * residual:.2g} times themselves"
 
 
-class Convergence:
+class SolverConvergence:
     """What the judge of the solver has seen since a block began."""
 
     def begin(self, steps: int) -> None:
@@ -80,7 +80,7 @@ class Convergence:
 
 
 @contextmanager
-def judged(model: mujoco.MjModel, data: mujoco.MjData, converged_below: float) -> Iterator[Convergence]:
+def judge_solver(model: mujoco.MjModel, data: mujoco.MjData, converged_below: float) -> Iterator[SolverConvergence]:
     """Write on the blackboard whose solver is judged, and wipe it at the end.
 
     Parameters
@@ -103,19 +103,19 @@ def judged(model: mujoco.MjModel, data: mujoco.MjData, converged_below: float) -
     board["last_unconverged"] = board["wrong_step"] = board["largest_residual"] = -1
     board["model"], board["data"] = model._address, data._address
     try:
-        yield Convergence()
+        yield SolverConvergence()
     finally:
         board["model"] = board["data"] = board["pending"] = 0
 
 
 @contextmanager
-def watched(model: mujoco.MjModel, data: mujoco.MjData, converged_below: float) -> Iterator[Convergence]:
-    """Watch the solver of a model of MuJoCo's own contacts; parameters as in `judged`.
+def watch_solver(model: mujoco.MjModel, data: mujoco.MjData, converged_below: float) -> Iterator[SolverConvergence]:
+    """Watch the solver of a model of MuJoCo's own contacts; parameters as in `judge_solver`.
 
     Raises
     ------
     EngineError
         If callbacks are in use already.
     """
-    with installed(compiled.watch), judged(model, data, converged_below) as convergence:
+    with install_callbacks(compiled.watch), judge_solver(model, data, converged_below) as convergence:
         yield convergence

@@ -13,4 +13,4 @@ from __future__ import annotations
 from .engine import MujocoEngine
 from .settings import DefaultSettings
 
-ENGINE = MujocoEngine("mujoco-default", DefaultSettings, "velodrome.engines.mujoco.planes:build")
+ENGINE = MujocoEngine("mujoco-default", DefaultSettings, "velodrome.engines.mujoco.planes:build_planes")

@@ -12,7 +12,7 @@ import numpy as np
 from ...reference.kinematics import WHEELS
 from ..engine import Problem
 from .knife_edge import pressing_forces, rolling_forces, standing, stiffen, watched_edges
-from .ride import Rig, bodies, contact_forces, rim_look, rim_stride, start, wheel_geoms
+from .ride import Rig, bodies, look_at_rims, read_contact_forces, rim_stride, set_start, wheel_geoms
 from .settings import ExactContactSettings, MultiplierSettings
 
 GROUNDS: dict[str, str] = dict.fromkeys(WHEELS, "ground")
@@ -26,7 +26,7 @@ def build_contacts(problem: Problem, settings: ExactContactSettings) -> Rig:
     EngineError
         If MuJoCo refuses the model.
     """
-    model, data = start(problem, settings, "edges")
+    model, data = set_start(problem, settings, "edges")
     stiffen(model, GROUNDS, settings.softness)
     wheels = wheel_geoms(model)
     return Rig(
@@ -36,8 +36,8 @@ def build_contacts(problem: Problem, settings: ExactContactSettings) -> Rig:
         wheels=wheels,
         follow=standing,
         stride=rim_stride(problem, settings.step),
-        look=rim_look(data, problem),
-        forces=partial(contact_forces, model, data, wheels),
+        look=look_at_rims(data, problem),
+        forces=partial(read_contact_forces, model, data, wheels),
         callbacks=lambda: watched_edges(model, data, problem.surface, GROUNDS, settings.converged_below),
         judged=settings.noslip_iterations == 0,
     )
@@ -51,7 +51,7 @@ def build_multipliers(problem: Problem, settings: MultiplierSettings) -> Rig:
     EngineError
         If MuJoCo refuses the model.
     """
-    model, data = start(problem, settings, "nothing")
+    model, data = set_start(problem, settings, "nothing")
 
     def forces(out: np.ndarray) -> None:
         out[:] = pressing_forces(2)
@@ -63,7 +63,7 @@ def build_multipliers(problem: Problem, settings: MultiplierSettings) -> Rig:
         wheels=wheel_geoms(model),
         follow=standing,
         stride=rim_stride(problem, settings.step),
-        look=rim_look(data, problem),
+        look=look_at_rims(data, problem),
         forces=forces,
         callbacks=lambda: rolling_forces(model, data, problem.surface, GROUNDS, settings.stabilisation),
     )

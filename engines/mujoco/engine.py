@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 S = TypeVar("S", bound=StepSettings)
 GIVES = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
 # Output times and steps are both rounded decimals: a millionth of a step is far above their round-off.
-ROUND_OFF = 1e-6
+STEP_ROUND_OFF = 1e-6
 
 
 def step_counts(times: np.ndarray, step: float) -> list[int]:
@@ -32,9 +32,9 @@ def step_counts(times: np.ndarray, step: float) -> list[int]:
         If an output time lies between two steps.
     """
     counts = np.round(times / step)
-    if np.any(np.abs(times - counts * step) > ROUND_OFF * step) or np.any(np.diff(counts) < 1):
+    if np.any(np.abs(times - counts * step) > STEP_ROUND_OFF * step) or np.any(np.diff(counts) < 1):
         interval = float(np.diff(times).min())
-        right = interval / np.ceil(interval / step * (1 - ROUND_OFF))
+        right = interval / np.ceil(interval / step * (1 - STEP_ROUND_OFF))
         raise ValueError(
             f"step is {step!r}; it must divide the output interval of {interval:.9g} s, as {right:.9g} would"
         )
@@ -97,11 +97,11 @@ class MujocoEngine(Generic[S]):
             If MuJoCo refuses the model, or a wheel stands nowhere at the start.
         """
         counts = step_counts(problem.times, settings.step)
-        from .ride import ride
+        from .ride import ride_rig
 
         module, name = self.builder.split(":")
         build: Callable[[Problem, Any], Rig] = getattr(import_module(module), name)
-        ridden = ride(build(problem, settings), settings.step, counts, progress)
+        ridden = ride_rig(build(problem, settings), settings.step, counts, progress)
         recording = ridden.recording
         q, qd = from_mujoco(recording.time, recording.qpos, recording.qvel, problem.q)
         seen = observe(problem.bicycle, problem.surface, q, qd)

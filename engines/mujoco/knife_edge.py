@@ -39,14 +39,14 @@ from ...reference.rim import rim_search
 from ...reference.surface import Surface
 from ..engine import EngineError
 from . import compiled, layout
-from .callbacks import installed
-from .convergence import WRONG, Convergence, judged, share
+from .callbacks import install_callbacks
+from .convergence import WRONG, SolverConvergence, judge_solver, share
 
 
 @contextmanager
 def knife_edges(
     model: mujoco.MjModel, data: mujoco.MjData, surface: Surface, wheels: Mapping[str, str]
-) -> Iterator[Convergence]:
+) -> Iterator[SolverConvergence]:
     """Let wheels touch a surface as knife edges do.
 
     Parameters
@@ -86,7 +86,7 @@ def watched_edges(
     surface: Surface,
     wheels: Mapping[str, str],
     converged_below: float,
-) -> Iterator[Convergence]:
+) -> Iterator[SolverConvergence]:
     """Let wheels touch as in `knife_edges`, and leave it to the caller to look at what the solver left.
 
     Parameters
@@ -98,9 +98,9 @@ def watched_edges(
     """
     _check_pairs(model, wheels)
     with (
-        installed(compiled.correct, compiled.touch),
+        install_callbacks(compiled.correct, compiled.touch),
         _written(model, surface, wheels),
-        judged(model, data, converged_below) as convergence,
+        judge_solver(model, data, converged_below) as convergence,
     ):
         yield convergence
 
@@ -108,7 +108,7 @@ def watched_edges(
 @contextmanager
 def rolling_forces(
     model: mujoco.MjModel, data: mujoco.MjData, surface: Surface, wheels: Mapping[str, str], stabilisation: float
-) -> Iterator[Convergence]:
+) -> Iterator[SolverConvergence]:
     """Let the exact forces of rolling without slip act on wheels, instead of MuJoCo's contacts.
 
     They are solved from MuJoCo's own mass matrix and bias forces in every evaluation of the dynamics, and
@@ -122,9 +122,9 @@ def rolling_forces(
         Rate at which gaps and slip are brought back to zero [1/s].
     """
     with (
-        installed(compiled.press),
+        install_callbacks(compiled.press),
         _written(model, surface, wheels, stabilisation),
-        judged(model, data, WRONG) as convergence,
+        judge_solver(model, data, WRONG) as convergence,
     ):
         yield convergence
 
@@ -177,9 +177,13 @@ def _written(
     model: mujoco.MjModel, surface: Surface, wheels: Mapping[str, str], stabilisation: float = 0.0
 ) -> Iterator[None]:
     """Write wheels and ground on the blackboard; what it points to lives as long as the block."""
-    if not 0 < len(wheels) <= compiled.WHEELS:
-        raise ValueError(f"there are {len(wheels)} wheels; there must be 1 to {compiled.WHEELS}")
-    found, function, parameters = layout.find(), surface.function.real, np.ascontiguousarray(surface.parameters, float)
+    if not 0 < len(wheels) <= compiled.WHEEL_COUNT:
+        raise ValueError(f"there are {len(wheels)} wheels; there must be 1 to {compiled.WHEEL_COUNT}")
+    found, function, parameters = (
+        layout.find_layout(),
+        surface.function.real,
+        np.ascontiguousarray(surface.parameters, float),
+    )
     board = compiled.board[0]
     board["surface"], board["parameters"], board["parameter_count"] = (
         function.address,

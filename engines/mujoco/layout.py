@@ -140,7 +140,7 @@ def _check_state(layout: Layout, data: mujoco.MjData) -> None:
 
 
 @cache
-def find() -> Layout:
+def find_layout() -> Layout:
     """Find and check all offsets, once a process.
 
     Raises

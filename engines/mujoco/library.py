@@ -20,7 +20,7 @@ _PATTERNS = ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll")
 
 
 @cache
-def library() -> ctypes.CDLL:
+def load_library() -> ctypes.CDLL:
     """The library that MuJoCo's Python package has loaded.
 
     Raises
@@ -35,7 +35,7 @@ def library() -> ctypes.CDLL:
     return ctypes.CDLL(str(found[0]))
 
 
-def announce(*names: str) -> None:
+def announce_collision(*names: str) -> None:
     """Make C functions of MuJoCo known to the linker of compiled code.
 
     Raises
@@ -45,7 +45,7 @@ def announce(*names: str) -> None:
     """
     for name in names:
         try:
-            function = getattr(library(), name)
+            function = getattr(load_library(), name)
         except AttributeError as error:
             raise EngineError(f"MuJoCo {mujoco.__version__} has no function {name}; MuJoCo 4.0 has") from error
         llvm.add_symbol(name, ctypes.cast(function, ctypes.c_void_p).value)
@@ -61,7 +61,7 @@ def collision_slot() -> Any:
     """
     place = int(mujoco.mjtGeom.mjGEOM_PLANE) * _GEOM_TYPES + int(mujoco.mjtGeom.mjGEOM_CYLINDER)
     try:
-        table = (ctypes.c_void_p * _GEOM_TYPES**2).in_dll(library(), "mjCOLLISIONFUNC")
+        table = (ctypes.c_void_p * _GEOM_TYPES**2).in_dll(load_library(), "mjCOLLISIONFUNC")
     except ValueError as error:
         raise EngineError(f"MuJoCo {mujoco.__version__} has no table mjCOLLISIONFUNC; MuJoCo 4.0 has") from error
     return ctypes.c_void_p.from_buffer(table, place * ctypes.sizeof(ctypes.c_void_p))

@@ -18,4 +18,4 @@ from __future__ import annotations
 from .engine import MujocoEngine
 from .settings import NativeSettings
 
-ENGINE = MujocoEngine("mujoco-native", NativeSettings, "velodrome.engines.mujoco.planes:build")
+ENGINE = MujocoEngine("mujoco-native", NativeSettings, "velodrome.engines.mujoco.planes:build_planes")

@@ -14,13 +14,13 @@ from ...reference.kernels.dynamics import guess_contacts
 from ...reference.kinematics import constants
 from ...reference.surface import is_level
 from ..engine import EngineError, Problem
-from .convergence import watched
-from .ride import Rig, bodies, contact_forces, look_stride, rim_look, rim_stride, start, wheel_geoms
+from .convergence import watch_solver
+from .ride import Rig, bodies, look_at_rims, look_stride, read_contact_forces, rim_stride, set_start, wheel_geoms
 from .settings import ContactSettings
-from .tangent import place
+from .tangent import place_planes
 
 
-def build(problem: Problem, settings: ContactSettings) -> Rig:
+def build_planes(problem: Problem, settings: ContactSettings) -> Rig:
     """Everything at the start of a problem.
 
     On level ground the planes need no care, and `Rig.follow` only looks for the contacts.
@@ -31,14 +31,14 @@ def build(problem: Problem, settings: ContactSettings) -> Rig:
         If MuJoCo refuses the model or a wheel has no contact point.
     """
     moving = not is_level(problem.surface)
-    model, data = start(problem, settings, "planes" if moving else "plane")
+    model, data = set_start(problem, settings, "planes" if moving else "plane")
     position, quaternion = (data.mocap_pos, data.mocap_quat) if moving else (np.empty((2, 3)), np.empty((2, 4)))
     c, contact = constants(problem.bicycle), np.empty(6)
     function, parameters = problem.surface.function.real, problem.surface.parameters
     guess_contacts(problem.q, contact, function, parameters, c)
     arguments = (data.qpos, c, function, parameters, contact, position, quaternion)
     # The types never change, and finding them out takes numba longer than MuJoCo its step.
-    follow = partial(place.compile(tuple(typeof(argument) for argument in arguments)), *arguments)
+    follow = partial(place_planes.compile(tuple(typeof(argument) for argument in arguments)), *arguments)
     if not follow():
         raise EngineError("a wheel has no contact point with the surface at the start")
     wheels = wheel_geoms(model)
@@ -49,8 +49,8 @@ def build(problem: Problem, settings: ContactSettings) -> Rig:
         wheels=wheels,
         follow=follow,
         stride=1 if moving else look_stride(settings.step),
-        look=rim_look(data, problem, rim_stride(problem, settings.step)),
-        forces=partial(contact_forces, model, data, wheels),
-        callbacks=lambda: watched(model, data, settings.converged_below),
+        look=look_at_rims(data, problem, rim_stride(problem, settings.step)),
+        forces=partial(read_contact_forces, model, data, wheels),
+        callbacks=lambda: watch_solver(model, data, settings.converged_below),
         judged=settings.noslip_iterations == 0,
     )

@@ -21,7 +21,7 @@ from ...reference.bicycle import BODIES
 from ...reference.kinematics import WHEELS, constants
 from ...reference.rim import Ending, RimWatch, bicycle_rim_search
 from ..engine import EngineError, Problem, Progress
-from .convergence import Convergence, share
+from .convergence import SolverConvergence, share
 from .model import Touching, mjcf
 from .settings import StepSettings
 from .state import to_mujoco
@@ -108,12 +108,12 @@ class Rig:
     stride: int
     look: Callable[[float], Ending | None]
     forces: Callable[[np.ndarray], None]
-    callbacks: Callable[[], AbstractContextManager[Convergence]]
+    callbacks: Callable[[], AbstractContextManager[SolverConvergence]]
     judged: bool = True
 
 
 @dataclass(frozen=True)
-class Ride:
+class RideState:
     """What became of a ride.
 
     Attributes
@@ -139,7 +139,7 @@ class Ride:
     largest_residual: float | None
 
 
-def start(problem: Problem, settings: StepSettings, touching: Touching) -> tuple[mujoco.MjModel, mujoco.MjData]:
+def set_start(problem: Problem, settings: StepSettings, touching: Touching) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """The model, and its state at the start of a problem.
 
     Raises
@@ -156,7 +156,7 @@ def start(problem: Problem, settings: StepSettings, touching: Touching) -> tuple
     return model, data
 
 
-def rim_look(data: mujoco.MjData, problem: Problem, every: int = 1) -> Callable[[float], Ending | None]:
+def look_at_rims(data: mujoco.MjData, problem: Problem, every: int = 1) -> Callable[[float], Ending | None]:
     """Make the look at both rims of a `Rig`, which looks only at every so many calls.
 
     Raises
@@ -208,7 +208,7 @@ def wheel_geoms(model: mujoco.MjModel) -> dict[int, int]:
     return {model.geom(name).id: k for k, name in enumerate(WHEELS)}
 
 
-def contact_forces(model: mujoco.MjModel, data: mujoco.MjData, wheels: dict[int, int], out: np.ndarray) -> None:
+def read_contact_forces(model: mujoco.MjModel, data: mujoco.MjData, wheels: dict[int, int], out: np.ndarray) -> None:
     """Fill ``out`` (2, 3) with MuJoCo's contact forces on the wheels, inertial axes; zero without contact."""
     out[:] = 0
     wrench = np.empty(6)
@@ -219,7 +219,7 @@ def contact_forces(model: mujoco.MjModel, data: mujoco.MjData, wheels: dict[int,
         out[wheels[int(contacts.geom[i, 1])]] += contacts.frame[i].reshape(3, 3).T @ wrench[:3]
 
 
-def record(rig: Rig, recording: Recording, k: int) -> None:
+def record_sample(rig: Rig, recording: Recording, k: int) -> None:
     """Measure sample k at the present state.
 
     Poses, forces and energies are stale after a step, so everything is computed anew. `mj_forward`
@@ -235,7 +235,7 @@ def record(rig: Rig, recording: Recording, k: int) -> None:
     rig.forces(recording.force[k])
 
 
-def trouble(data: mujoco.MjData, standing: bool) -> str | None:
+def find_trouble(data: mujoco.MjData, standing: bool) -> str | None:
     """Why the ride cannot go on; None if it can."""
     # MuJoCo looks at a state before it steps from it: the last one has not been seen yet.
     if any(data.warning[kind].number for kind in UNSTABLE) or not np.all(np.isfinite([*data.qpos, *data.qvel])):
@@ -243,7 +243,7 @@ def trouble(data: mujoco.MjData, standing: bool) -> str | None:
     return None if standing else "a wheel lies flat or has no contact point with the surface"
 
 
-def unconverged(convergence: Convergence, step: float) -> str | None:
+def find_unconverged(convergence: SolverConvergence, step: float) -> str | None:
     """Where MuJoCo's contact solver gave forces that are none; None if it did not."""
     convergence.look()
     if convergence.wrong is None:
@@ -271,7 +271,7 @@ def advance(rig: Rig, step: float, steps: int, until: int) -> tuple[int, bool, E
 
 
 @contextmanager
-def silent() -> Iterator[None]:
+def no_report() -> Iterator[None]:
     """Keep MuJoCo from writing its warnings to a log file in the current folder."""
     previous = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda message: None)
@@ -281,7 +281,7 @@ def silent() -> Iterator[None]:
         mujoco.set_mju_user_warning(previous)
 
 
-def ride(rig: Rig, step: float, counts: list[int], progress: Progress) -> Ride:
+def ride_rig(rig: Rig, step: float, counts: list[int], progress: Progress) -> RideState:
     """Integrate from the state that a rig is in.
 
     Parameters
@@ -299,17 +299,17 @@ def ride(rig: Rig, step: float, counts: list[int], progress: Progress) -> Ride:
         If a wheel stands nowhere at the start, or MuJoCo's contact solver fails there.
     """
     recording = Recording.empty(len(counts))
-    with silent(), rig.callbacks() as convergence:
+    with no_report(), rig.callbacks() as convergence:
         mujoco.mj_forward(rig.model, rig.data)
         if not rig.follow():
             raise EngineError("a wheel has no contact point with the surface at the start")
         rig.look(0.0)
-        record(rig, recording, 0)
-        ended = unconverged(convergence, step)
+        record_sample(rig, recording, 0)
+        ended = find_unconverged(convergence, step)
         if ended is not None:
             raise EngineError(ended)
         samples, steps, cpu_time, ended = _go_on(rig, step, counts, progress, recording, convergence)
-        return Ride(
+        return RideState(
             recording=recording.first(samples),
             steps=steps,
             cpu_time=cpu_time,
@@ -321,7 +321,7 @@ def ride(rig: Rig, step: float, counts: list[int], progress: Progress) -> Ride:
 
 
 def _go_on(
-    rig: Rig, step: float, counts: list[int], progress: Progress, recording: Recording, convergence: Convergence
+    rig: Rig, step: float, counts: list[int], progress: Progress, recording: Recording, convergence: SolverConvergence
 ) -> tuple[int, int, float, str | None]:
     """Ride on from the first sample; return the samples, the steps, their CPU time [s] and why it ended early."""
     steps, cpu_time, reported = 0, 0.0, 0
@@ -332,9 +332,9 @@ def _go_on(
             begun = process_time()
             steps, standing, touch = advance(rig, step, steps, min(steps + most, counts[k]))
             cpu_time += process_time() - begun
-            ended = trouble(rig.data, standing)
+            ended = find_trouble(rig.data, standing)
             # A solver that has failed may be why the state is as it is.
-            if (stopped := unconverged(convergence, step)) is not None:
+            if (stopped := find_unconverged(convergence, step)) is not None:
                 return k, steps, cpu_time, stopped
             if touch is not None and ended is None:
                 # It may lie before the last sample.
@@ -345,7 +345,7 @@ def _go_on(
                 reported = steps
                 progress(steps * step)
         convergence.begin(steps)
-        record(rig, recording, k)
-        if (stopped := unconverged(convergence, step)) is not None:
+        record_sample(rig, recording, k)
+        if (stopped := find_unconverged(convergence, step)) is not None:
             return k, steps, cpu_time, stopped
     return len(counts), steps, cpu_time, None

@@ -21,7 +21,7 @@ Impedances = tuple[
 IMPEDANCES = (0.9, 0.95, 0.001, 0.5, 2.0)
 # MuJoCo moves a larger impedance here without a word.
 LARGEST_IMPEDANCE = 0.9999
-ROUND_OFF = 2.0**-52
+SOLVER_ROUND_OFF = 2.0**-52
 FORCE_NOISE = 0.01  # the largest share of round-off that a contact force may have
 # Contact forces that may be off by more than this share of themselves are none.
 WRONG = 0.01
@@ -43,7 +43,7 @@ class StepSettings(Settings):
     @property
     def noise(self) -> float:
         """Relative error that a step may add beyond its method."""
-        return ROUND_OFF
+        return SOLVER_ROUND_OFF
 
     @property
     def least_friction(self) -> float | None:
@@ -85,7 +85,7 @@ class ContactSettings(StepSettings):
     @property
     def noise(self) -> float:
         """Relative error that a step may add beyond its method: what the contact solver leaves unconverged."""
-        return max(self.tolerance, ROUND_OFF)
+        return max(self.tolerance, SOLVER_ROUND_OFF)
 
     @property
     def condition(self) -> float:
@@ -101,7 +101,7 @@ class ContactSettings(StepSettings):
         stiffness: a residual r of the forces costs r^2 / condition. Round-off leaves some of that of an
         acceleration, times the condition.
         """
-        return min(sqrt(self.tolerance * self.condition) + 10 * ROUND_OFF * self.condition, WRONG)
+        return min(sqrt(self.tolerance * self.condition) + 10 * SOLVER_ROUND_OFF * self.condition, WRONG)
 
     @property
     def least_friction(self) -> float:
@@ -207,8 +207,8 @@ class ExactContactSettings(ContactSettings):
 
     @model_validator(mode="after")
     def _forces_have_digits(self) -> Self:
-        if ROUND_OFF * self.condition > FORCE_NOISE:
-            least = self.softness * ROUND_OFF * self.condition / FORCE_NOISE
+        if SOLVER_ROUND_OFF * self.condition > FORCE_NOISE:
+            least = self.softness * SOLVER_ROUND_OFF * self.condition / FORCE_NOISE
             raise ValueError(
                 f"softness is {self.softness!r}; with impratio {self.impratio!r} it must be at least {least:.2g}, "
                 "or contact forces drown in round-off"

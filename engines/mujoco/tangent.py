@@ -23,7 +23,7 @@ HALF_THICKNESS = 1e-4
 
 
 @jit
-def coordinates(qpos):
+def tangent_coordinates(qpos):
     """Generalised coordinates (9,) of MuJoCo's ``qpos`` (10,)."""
     w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
     q = np.empty(9)
@@ -38,21 +38,21 @@ def coordinates(qpos):
 @jit
 def wheel_poses(qpos, c, centre, axle):
     """Fill the wheels' centres and axles (2, 3) at ``qpos`` (10,)."""
-    both = wheels(coordinates(qpos), c)
+    both = wheels(tangent_coordinates(qpos), c)
     for k in range(2):
         for i in range(3):
             centre[k, i], axle[k, i] = both[k][0][i], both[k][2][i]
 
 
 @jit
-def place(qpos, c, function, parameters, p, position, quaternion):
+def place_planes(qpos, c, function, parameters, p, position, quaternion):
     """Fill the poses (2, 3), (2, 4) of both planes at ``qpos`` (10,); True where both wheels stand on one.
 
     ``p`` (6,) are the contact parameters: a guess, replaced by the solution. False where a search
     fails, or where a wheel lies flat, its centre less than its own thickness above the contact; once it
     has gone through that, the search has followed the rim and the contact is above the centre.
     """
-    q = coordinates(qpos)
+    q = tangent_coordinates(qpos)
     if not find_contacts(q, p, function, parameters, c):
         return False
     both = wheels(q, c)

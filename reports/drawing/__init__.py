@@ -1,9 +1,9 @@
 """What the ground, the bicycle, the curves and the table of a run look like, whatever shows them."""
 
 from .bicycle_shape import Mesh, ball, body_meshes
-from .ground import LINE_LIFT, STEEPEST, Ground, disc, ground_of_ride, lifted
-from .markdown import escaped, printable
-from .palette import Colour, colours
+from .ground import LINE_LIFT, STEEPEST, GroundMesh, ground_disc, lift_points, make_ground
+from .markdown import escape_markdown, make_printable
+from .palette import Colour, assign_colours
 from .plots import (
     CHANGE,
     CONSTRAINTS,
@@ -14,14 +14,14 @@ from .plots import (
     PLOTS,
     RADIUS,
     STATES,
-    Curve,
     Plot,
-    Ride,
-    drawable,
+    PlotCurve,
+    RideData,
+    drawable_values,
     mode_plots,
-    nanoseconds,
+    to_nanoseconds,
 )
-from .summary import COLUMNS, cell, remarks, stability, summary, verdict_line
+from .summary import COLUMNS, describe_stability, format_cell, format_verdict, make_remarks, make_summary
 
 __all__ = [
     "CHANGE",
@@ -37,25 +37,25 @@ __all__ = [
     "STATES",
     "STEEPEST",
     "Colour",
-    "Curve",
-    "Ground",
+    "GroundMesh",
     "Mesh",
     "Plot",
-    "Ride",
+    "PlotCurve",
+    "RideData",
+    "assign_colours",
     "ball",
     "body_meshes",
-    "cell",
-    "colours",
-    "disc",
-    "drawable",
-    "escaped",
-    "ground_of_ride",
-    "lifted",
+    "describe_stability",
+    "drawable_values",
+    "escape_markdown",
+    "format_cell",
+    "format_verdict",
+    "ground_disc",
+    "lift_points",
+    "make_ground",
+    "make_printable",
+    "make_remarks",
+    "make_summary",
     "mode_plots",
-    "nanoseconds",
-    "printable",
-    "remarks",
-    "stability",
-    "summary",
-    "verdict_line",
+    "to_nanoseconds",
 ]

@@ -22,7 +22,7 @@ _HALVINGS = 40  # from any size on the ground to far below a picture's resolutio
 
 
 @dataclass(frozen=True)
-class Ground:
+class GroundMesh:
     """Part of a surface, ready to draw.
 
     Attributes
@@ -57,7 +57,7 @@ class Ground:
     disc: bool
 
 
-def lifted(surface: Surface, x: np.ndarray, y: np.ndarray, lift: float = 0.0) -> np.ndarray:
+def lift_points(surface: Surface, x: np.ndarray, y: np.ndarray, lift: float = 0.0) -> np.ndarray:
     """Points of a surface, moved along its normal by ``lift`` [m]; shape (..., 3)."""
     point = np.stack([x, y, evaluate(surface, x, y)[..., 0]], axis=-1)
     return point + lift * unit_normals(surface, x, y)
@@ -123,10 +123,10 @@ def _quads(rows: int, columns: int, closed: bool) -> np.ndarray:
 
 
 def _polar(surface: Surface, r: np.ndarray, angle: np.ndarray, lift: float) -> np.ndarray:
-    return lifted(surface, r * np.cos(angle), r * np.sin(angle), lift)
+    return lift_points(surface, r * np.cos(angle), r * np.sin(angle), lift)
 
 
-def disc(surface: Surface, path: np.ndarray, radius: float, steepest: float) -> Ground:
+def ground_disc(surface: Surface, path: np.ndarray, radius: float, steepest: float) -> GroundMesh:
     """A disc about the z axis out to a radius [m], as far as there is ground around a path (n, 2) about the axis."""
     ride, around = np.linalg.norm(path, axis=1), np.arange(180) * 2 * np.pi / 180
 
@@ -152,7 +152,7 @@ def disc(surface: Surface, path: np.ndarray, radius: float, steepest: float) -> 
     vertices = _polar(surface, r, around, 0.0).reshape(-1, 3)
     normals = unit_normals(surface, vertices[:, 0], vertices[:, 1])
     edge = _polar(surface, np.append(outer, outer[0]), ring, LINE_LIFT)
-    return Ground(
+    return GroundMesh(
         vertices,
         normals,
         _quads(len(r), len(around), closed=True),
@@ -165,7 +165,7 @@ def disc(surface: Surface, path: np.ndarray, radius: float, steepest: float) -> 
     )
 
 
-def strip(surface: Surface, path: np.ndarray, margin: float, steepest: float) -> Ground:
+def ground_strip(surface: Surface, path: np.ndarray, margin: float, steepest: float) -> GroundMesh:
     """A rectangle along a path (n, 2), wider by a margin on every side [m], as far as there is ground."""
     middle = path.mean(axis=0)
     along = np.linalg.svd(path - middle, full_matrices=False)[2][0] if len(path) > 1 else np.array([1.0, 0.0])
@@ -175,7 +175,7 @@ def strip(surface: Surface, path: np.ndarray, margin: float, steepest: float) ->
     def place(u: np.ndarray, v: np.ndarray, lift: float = LINE_LIFT) -> np.ndarray:
         wanted = middle + u[..., None] * axes[0] + v[..., None] * axes[1]
         x, y = np.moveaxis(_reached(surface, nearest(u), wanted, steepest), -1, 0)
-        return lifted(surface, x, y, lift)
+        return lift_points(surface, x, y, lift)
 
     def nearest(u: np.ndarray) -> np.ndarray:
         """The ride's place nearest to each position along the rectangle."""
@@ -197,7 +197,7 @@ def strip(surface: Surface, path: np.ndarray, margin: float, steepest: float) ->
     edge_u = np.concatenate([us, np.full_like(vs, high[0]), us[::-1], np.full_like(vs, low[0])])
     edge_v = np.concatenate([np.full_like(us, low[1]), vs, np.full_like(us, high[1]), vs[::-1]])
     edge = place(edge_u, edge_v)
-    return Ground(
+    return GroundMesh(
         vertices,
         normals,
         _quads(len(us), len(vs), closed=False),
@@ -210,7 +210,7 @@ def strip(surface: Surface, path: np.ndarray, margin: float, steepest: float) ->
     )
 
 
-def ground_of_ride(surface: Surface, path: np.ndarray) -> Ground:
+def make_ground(surface: Surface, path: np.ndarray) -> GroundMesh:
     """The part of a surface that shows a ride with a margin.
 
     Parameters
@@ -232,8 +232,8 @@ def ground_of_ride(surface: Surface, path: np.ndarray) -> Ground:
     around_axis = np.all(low < 0) and np.all(high > 0) and np.ptp(path, axis=0).min() > 0.5 * np.ptp(path, axis=0).max()
     if around_axis:
         reach = float(np.linalg.norm(path, axis=1).max())
-        shown = disc(surface, path, reach + max(1.0, 0.4 * reach), steepest)
+        shown = ground_disc(surface, path, reach + max(1.0, 0.4 * reach), steepest)
         # Between two places of a ride there may be a hole; a strip starts from places alone.
         if np.isfinite(shown.vertices).all():
             return shown
-    return strip(surface, path, STRIP_MARGIN, steepest)
+    return ground_strip(surface, path, STRIP_MARGIN, steepest)

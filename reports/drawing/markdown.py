@@ -6,11 +6,11 @@ from __future__ import annotations
 _SIGNS = "\\`*|<[]"
 
 
-def escaped(text: str) -> str:
+def escape_markdown(text: str) -> str:
     """Text as a part of one line of Markdown, in which no letter is a sign."""
-    return "".join(f"\\{letter}" if letter in _SIGNS else letter for letter in printable(text))
+    return "".join(f"\\{letter}" if letter in _SIGNS else letter for letter in make_printable(text))
 
 
-def printable(text: str) -> str:
+def make_printable(text: str) -> str:
     """Without control characters, which neither XML nor a line can carry."""
     return "".join(letter if letter.isprintable() else " " for letter in text)

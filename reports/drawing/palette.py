@@ -30,7 +30,7 @@ PALETTE: tuple[Colour, ...] = (
 _SALT = "816:"  # of those tried the first by which the suite's own engines get different slots
 
 
-def colours(names: Iterable[str]) -> dict[str, Colour]:
+def assign_colours(names: Iterable[str]) -> dict[str, Colour]:
     """Assign a colour to each engine name.
 
     The reference is near white. Every other name takes the slot of its checksum, or the next free one,

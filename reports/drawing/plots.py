@@ -19,7 +19,7 @@ NANOSECONDS = 1e9
 
 
 @dataclass(frozen=True)
-class Ride:
+class RideData:
     """One scenario as ridden by several engines.
 
     Attributes
@@ -45,8 +45,8 @@ class Ride:
         return self.trajectories.get(REFERENCE)
 
 
-Values = Callable[[Ride, Trajectory], np.ndarray | None]
-Curve = tuple[np.ndarray, np.ndarray]  # times [s] and values
+Values = Callable[[RideData, Trajectory], np.ndarray | None]
+PlotCurve = tuple[np.ndarray, np.ndarray]  # times [s] and values
 
 
 @dataclass(frozen=True)
@@ -73,10 +73,10 @@ class Plot:
     title: str
     values: Values
     span: float = 0.0
-    expected: Callable[[Ride], Curve | None] = lambda _: None
+    expected: Callable[[RideData], PlotCurve | None] = lambda _: None
 
 
-def drawable(ride: Ride, plot: Plot) -> dict[str, np.ndarray]:
+def drawable_values(ride: RideData, plot: Plot) -> dict[str, np.ndarray]:
     """Values of a plot by engine; what an engine does not give, or gives no number of, has no entry."""
     found = {}
     for name, run in ride.trajectories.items():
@@ -86,7 +86,7 @@ def drawable(ride: Ride, plot: Plot) -> dict[str, np.ndarray]:
     return found
 
 
-def nanoseconds(time: np.ndarray) -> np.ndarray:
+def to_nanoseconds(time: np.ndarray) -> np.ndarray:
     """Times [s] rounded to whole nanoseconds, int64."""
     return np.round(np.asarray(time, float) * NANOSECONDS).astype(np.int64)
 
@@ -100,12 +100,12 @@ def log_size(values: np.ndarray) -> np.ndarray:
     return out
 
 
-def position_error(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
+def position_error(ride: RideData, trajectory: Trajectory) -> np.ndarray | None:
     """Distance of D from the reference's [m], shape (n,), NaN at times the reference lacks."""
     return _distance(trajectory, ride.reference)
 
 
-def position_change(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
+def position_change(ride: RideData, trajectory: Trajectory) -> np.ndarray | None:
     """Distance of D from the earlier run's [m], shape (n,), NaN at times that run lacks."""
     name = next((name for name, run in ride.trajectories.items() if run is trajectory), None)
     return _distance(trajectory, ride.trajectories.get(ride.before.get(name or "", "")))
@@ -114,13 +114,13 @@ def position_change(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
 def _distance(trajectory: Trajectory, other: Trajectory | None) -> np.ndarray | None:
     if other is None or trajectory is other:
         return None
-    _, ours, theirs = np.intersect1d(nanoseconds(trajectory.time), nanoseconds(other.time), return_indices=True)
+    _, ours, theirs = np.intersect1d(to_nanoseconds(trajectory.time), to_nanoseconds(other.time), return_indices=True)
     out = np.full(len(trajectory.time), np.nan)
     out[ours] = np.linalg.norm(trajectory.q[ours, :3] - other.q[theirs, :3], axis=1)
     return out
 
 
-def energy_change(_: Ride, trajectory: Trajectory) -> np.ndarray | None:
+def energy_change(_: RideData, trajectory: Trajectory) -> np.ndarray | None:
     """Change of kinetic and potential energy since the start, as a share of the start's size [-]."""
     if trajectory.kinetic_energy is None or trajectory.potential_energy is None:
         return None
@@ -128,19 +128,19 @@ def energy_change(_: Ride, trajectory: Trajectory) -> np.ndarray | None:
     return (energy - energy[0]) / abs(energy[0]) if energy[0] != 0 else None
 
 
-def pushing_force(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
+def pushing_force(ride: RideData, trajectory: Trajectory) -> np.ndarray | None:
     """Part of the contact forces along the surface's normal, shape (n, 2) [N]."""
     return normal_force(trajectory, ride.surface)
 
 
-def friction_used(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
+def friction_used(ride: RideData, trajectory: Trajectory) -> np.ndarray | None:
     """Tangential over normal contact force, shape (n, 2); NaN where the ground does not push."""
     normal = normal_force(trajectory, ride.surface)
     return None if normal is None else np.where(normal > 0, required_friction(trajectory, ride.surface), np.nan)
 
 
 def _column(get: Values, index: int) -> Values:
-    def values(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
+    def values(ride: RideData, trajectory: Trajectory) -> np.ndarray | None:
         both = get(ride, trajectory)
         return None if both is None else both[:, index]
 
@@ -148,18 +148,18 @@ def _column(get: Values, index: int) -> Values:
 
 
 def _log(get: Values) -> Values:
-    def values(ride: Ride, trajectory: Trajectory) -> np.ndarray | None:
+    def values(ride: RideData, trajectory: Trajectory) -> np.ndarray | None:
         linear = get(ride, trajectory)
         return None if linear is None else log_size(linear)
 
     return values
 
 
-def _gap(_: Ride, trajectory: Trajectory) -> np.ndarray | None:
+def _gap(_: RideData, trajectory: Trajectory) -> np.ndarray | None:
     return trajectory.gap
 
 
-def _slip(_: Ride, trajectory: Trajectory) -> np.ndarray | None:
+def _slip(_: RideData, trajectory: Trajectory) -> np.ndarray | None:
     return None if trajectory.slip is None else np.linalg.norm(trajectory.slip, axis=-1)
 
 
@@ -200,10 +200,10 @@ def mode_plots(modes: Modes | None) -> tuple[Plot, ...]:
 
 
 def _mode_plot(modes: Modes, k: int, mode: Mode) -> Plot:
-    def values(_: Ride, trajectory: Trajectory) -> np.ndarray:
+    def values(_: RideData, trajectory: Trajectory) -> np.ndarray:
         return log_size(modes.amplitude(mode, trajectory))
 
-    def expected(ride: Ride) -> Curve | None:
+    def expected(ride: RideData) -> PlotCurve | None:
         run = ride.reference or next(iter(ride.trajectories.values()))
         begin = float(modes.amplitude(mode, run)[0])
         if begin < START_ERROR:

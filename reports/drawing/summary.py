@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...engines.engine import REFERENCE
-from ..measure import describe
-from .markdown import escaped
+from ..measure import describe_mismatch
+from .markdown import escape_markdown
 
 # (title, unit, metric, part of a metric that has parts).
 COLUMNS: tuple[tuple[str, str, str, str | None], ...] = (
@@ -22,7 +22,7 @@ COLUMNS: tuple[tuple[str, str, str, str | None], ...] = (
 )
 
 
-def cell(metrics: Mapping[str, Any], metric: str, part: str | None) -> str:
+def format_cell(metrics: Mapping[str, Any], metric: str, part: str | None) -> str:
     """Format a metric for a table: two digits, a dash where there is none."""
     value = metrics.get(metric)
     if isinstance(value, Mapping):
@@ -30,7 +30,7 @@ def cell(metrics: Mapping[str, Any], metric: str, part: str | None) -> str:
     return "–" if value is None else f"{value:.2g}"
 
 
-def remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]:
+def make_remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]:
     """Say what a reader must know before trusting an engine's row."""
     lines = []
     if metrics["fell_at"] is not None:
@@ -62,7 +62,7 @@ def remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]
         rest = "" if later is None else f"; once settled it is {later:.2g}"
         lines.append(f"{name}: the force error is largest in the first sample{rest}")
     # Folders of earlier versions do not have it.
-    lines += [f"{name}: {describe(report)}" for report in metrics.get("inconsistent_reports") or ()]
+    lines += [f"{name}: {describe_mismatch(report)}" for report in metrics.get("inconsistent_reports") or ()]
     if metrics["not_finite"]:
         lines.append(f"{name}: not finite in some samples: {', '.join(metrics['not_finite'])}")
     if metrics["horizon"] is not None and metrics["horizon"] < duration:
@@ -79,7 +79,7 @@ def _equals_reference(metrics: Mapping[str, Any]) -> bool:
     return whole and all(error is not None and error["max"] == 0 for error in errors)
 
 
-def summary(
+def make_summary(
     title: str,
     measured: Mapping[str, Mapping[str, Any]],
     failures: Mapping[str, str],
@@ -98,23 +98,23 @@ def summary(
     failures : mapping
         Reason by the name of an engine that gave no trajectory.
     verdicts : sequence of mapping
-        As `velodrome.scenarios.run.runner.judge` gives them.
+        As `velodrome.scenarios.run.runner.judge_run` gives them.
     growth_rate : float
         Of the motion's own disturbances [1/s].
     duration : float
         Of the run [s].
     steady : bool
-        See `stability`.
+        See `describe_stability`.
 
     Returns
     -------
     str
     """
-    lines = [f"# {escaped(title)}", "", stability(growth_rate, steady), ""]
+    lines = [f"# {escape_markdown(title)}", "", describe_stability(growth_rate, steady), ""]
     # Engines as columns: they are fewer than quantities, and the recording's tab is narrow.
-    lines += ["| | " + " | ".join(escaped(name) for name in measured) + " |", "|---|" + "---:|" * len(measured)]
+    lines += ["| | " + " | ".join(escape_markdown(name) for name in measured) + " |", "|---|" + "---:|" * len(measured)]
     for name, unit, metric, part in COLUMNS:
-        cells = (cell(values, metric, part) for values in measured.values())
+        cells = (format_cell(values, metric, part) for values in measured.values())
         lines.append(f"| {name} [{unit}] | " + " | ".join(cells) + " |")
     lines += [
         "",
@@ -122,20 +122,20 @@ def summary(
         "",
     ]
     for engine, values in measured.items():
-        lines += [f"- {escaped(line)}" for line in remarks(engine, values, duration)]
-    lines += [f"- {escaped(f'{engine} did not run: {reason}')}" for engine, reason in failures.items()]
-    lines += [f"- {escaped(verdict_line(verdict))}" for verdict in verdicts]
+        lines += [f"- {escape_markdown(line)}" for line in make_remarks(engine, values, duration)]
+    lines += [f"- {escape_markdown(f'{engine} did not run: {reason}')}" for engine, reason in failures.items()]
+    lines += [f"- {escape_markdown(format_verdict(verdict))}" for verdict in verdicts]
     return "\n".join(lines).rstrip() + "\n"
 
 
-def verdict_line(verdict: Mapping[str, Any]) -> str:
+def format_verdict(verdict: Mapping[str, Any]) -> str:
     """One line on one verdict."""
     value = "not done" if verdict["value"] is None else f"{verdict['value']:.3g}"
     word = "holds" if verdict["holds"] else "falls short"
     return f"{verdict['engine']}: {verdict['quantity']} {value}, limit {verdict['limit']:.3g}: {word}"
 
 
-def stability(growth_rate: float, steady: bool = True) -> str:
+def describe_stability(growth_rate: float, steady: bool = True) -> str:
     """One sentence on a motion's disturbances.
 
     Parameters

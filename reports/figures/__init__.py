@@ -3,21 +3,21 @@
 from .atlas import growth_figure, stable_figure
 from .families import family_figure, solution_figure
 from .precision import precision_figure
-from .solution_curve import curves
-from .style import FAMILY_COLOURS, GREY, INK, WIDTH, new_figure, style, write_figure
+from .solution_curve import make_curves
+from .style import FAMILY_COLOURS, GREY, INK, WIDTH, new_figure, use_style, write_figure
 
 __all__ = [
     "FAMILY_COLOURS",
     "GREY",
     "INK",
     "WIDTH",
-    "curves",
     "family_figure",
     "growth_figure",
+    "make_curves",
     "new_figure",
     "precision_figure",
     "solution_figure",
     "stable_figure",
-    "style",
+    "use_style",
     "write_figure",
 ]

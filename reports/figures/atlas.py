@@ -20,7 +20,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from ...reference.families import FAMILIES
 from .labels import Label, place_labels
-from .style import FAMILY_COLOURS, GREY, INK, new_figure, style, write_figure
+from .style import FAMILY_COLOURS, GREY, INK, new_figure, use_style, write_figure
 
 Columns = Mapping[str, np.ndarray]
 
@@ -44,7 +44,7 @@ def growth_figure(path: Path, columns: Columns, document: Mapping[str, Any]) -> 
     columns, document : mapping
         Of the atlas, as `velodrome atlas` writes them.
     """
-    with style(), rc_context({"hatch.linewidth": 0.4}):
+    with use_style(), rc_context({"hatch.linewidth": 0.4}):
         figure = new_figure(6.2)
         panels = figure.subplots(2, 2, sharex=True, sharey=True)
         for axes, family in zip(panels.flat, FAMILIES, strict=True):
@@ -87,7 +87,7 @@ def _colour_bar(figure: Figure, panels: np.ndarray) -> None:
 
 def stable_figure(path: Path, columns: Columns, document: Mapping[str, Any]) -> None:
     """Write the stable regions, over alpha and rear rate and over alpha and lean; arguments as `growth_figure`."""
-    with style():
+    with use_style():
         figure = new_figure(3.9)
         panels = figure.subplots(1, 2, sharex=True)
         for axes, name, label, tag in zip(

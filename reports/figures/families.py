@@ -15,13 +15,13 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MultipleLocator
 
 from .labels import Badge, Label, place_labels
-from .solution_curve import Curve, NamedPoint, curves, limits, named_points, scaled_speed
-from .style import FAMILY_COLOURS, GREY, INK, new_figure, style, write_figure
+from .solution_curve import NamedPoint, SolutionCurve, find_limits, find_named_points, make_curves, scaled_speed
+from .style import FAMILY_COLOURS, GREY, INK, new_figure, use_style, write_figure
 
 ANGLES = {"lean": "lean θ₀ [rad]", "steer": "steer δ₀ [rad]"}
 RANGES = {"lean": (-np.pi / 2, np.pi / 2), "steer": (0.0, np.pi)}
 MARKERS = {"static": "s", "pivot": "o", "cusp": "^", "straight": "D", "motion": "X"}
-MEANINGS = {
+POINT_MEANINGS = {
     "static": "static equilibrium",
     "pivot": "pivoting motion",
     "cusp": "cusp",
@@ -53,7 +53,7 @@ def family_figure(
     marks : mapping, optional
         More motions to mark: name to ``lean``, ``steer`` and ``front_rate``.
     """
-    with style():
+    with use_style():
         write_figure(path, solution_figure(document, front_radius, marks or {}))
 
 
@@ -61,13 +61,13 @@ def solution_figure(
     document: Mapping[str, Any], front_radius: float, marks: Mapping[str, Mapping[str, float]]
 ) -> Figure:
     """Draw lean and steer of all families over the scaled front speed; call within `figure_style.style`."""
-    drawn = curves(document["families"], front_radius)
-    points = named_points(document["families"], front_radius)
+    drawn = make_curves(document["families"], front_radius)
+    points = find_named_points(document["families"], front_radius)
     points += [
         NamedPoint(name, "motion", scaled_speed(mark["front_rate"], front_radius), mark["lean"], mark["steer"], False)
         for name, mark in marks.items()
     ]
-    points += limits(drawn)
+    points += find_limits(drawn)
     figure = new_figure(3.75)
     panels = figure.subplots(1, 2)
     for axes, angle, tag in zip(panels, ANGLES, "ab", strict=True):
@@ -91,7 +91,7 @@ def _labels(points: Sequence[NamedPoint], angle: str) -> list[Label]:
     return [Label(point.name, (point.speed, getattr(point, angle))) for point in points if point.name]
 
 
-def _magnify(axes: Axes, drawn: Sequence[Curve], points: Sequence[NamedPoint], angle: str) -> None:
+def _magnify(axes: Axes, drawn: Sequence[SolutionCurve], points: Sequence[NamedPoint], angle: str) -> None:
     """Show cusps and stable sections again, larger: they are small, and the families nearly touch there."""
     stable = [curve.line(angle, *section) for curve in drawn for section in curve.stable]
     cusps = [(point.speed, getattr(point, angle)) for point in points if point.kind == "cusp"]
@@ -139,11 +139,11 @@ def _frame(axes: Axes, angle: str, front_radius: float) -> None:
     upper.set_xlabel("|$ω_f$| [rad/s]")
 
 
-def _colour(curve: Curve) -> str:
+def _colour(curve: SolutionCurve) -> str:
     return FAMILY_COLOURS[curve.families[0]]
 
 
-def _draw(axes: Axes, curve: Curve, angle: str) -> None:
+def _draw(axes: Axes, curve: SolutionCurve, angle: str) -> None:
     colour = _colour(curve)
     for low, high, pushed in curve.pieces():
         line = curve.line(angle, low, high)
@@ -182,14 +182,14 @@ def _face(point: NamedPoint) -> dict[str, Any]:
     return {"marker": marker, "ms": 4.6, "mfc": "white" if point.limit else INK, "mec": INK, "mew": 0.9}
 
 
-def _legend(figure: Figure, drawn: Sequence[Curve], points: Sequence[NamedPoint]) -> None:
+def _legend(figure: Figure, drawn: Sequence[SolutionCurve], points: Sequence[NamedPoint]) -> None:
     numbers = sorted({number for curve in drawn for number in curve.families})
     handles: list[Line2D] = [Line2D([], [], color=FAMILY_COLOURS[k], lw=2, label=f"family {k}") for k in numbers]
     if any(curve.stable for curve in drawn):
         handles.append(Line2D([], [], color=GREY, lw=_STABLE, solid_capstyle="butt", label="Lyapunov stable"))
     if any(not pushed for curve in drawn for _, _, pushed in curve.pieces()):
         handles.append(Line2D([], [], color=GREY, lw=_PULLED, dashes=(4, 2.2), label="a wheel pulled"))
-    for kind, meaning in MEANINGS.items():
+    for kind, meaning in POINT_MEANINGS.items():
         shown = [point for point in points if point.kind == kind]
         if shown:
             handles.append(Line2D([], [], ls="", label=meaning, **_face(shown[0])))

@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ...engines.engine import REFERENCE
-from ..drawing import colours
+from ..drawing import assign_colours
 from ..measure import compared_time
-from .style import GREY, INK, new_figure, style, write_figure
+from .style import GREY, INK, new_figure, use_style, write_figure
 
 _MARKERS = "os^Dvp*hX<>"
 _DARKER = 0.72  # the engines' colours are made for a dark ground
@@ -28,10 +28,10 @@ def precision_figure(path: Path, document: Mapping[str, Any]) -> None:
     document : mapping
         As `velodrome precision` gives it.
     """
-    with style():
+    with use_style():
         figure = new_figure(3.1)
         left, right = figure.subplots(1, 2, sharey=True)
-        shades = colours(document["engines"])
+        shades = assign_colours(document["engines"])
         for marker, (name, entry) in zip(_MARKERS, document["engines"].items(), strict=False):
             shade = INK if name == REFERENCE else tuple(_DARKER * part / 255 for part in shades[name])
             _draw(left, right, name, entry, shade, marker)

@@ -35,7 +35,7 @@ class NamedPoint:
 
 
 @dataclass(frozen=True)
-class Curve:
+class SolutionCurve:
     """One curve of a figure.
 
     Attributes
@@ -78,9 +78,9 @@ class Curve:
         return list(zip(bounds[:-1], bounds[1:], signs, strict=True))
 
 
-def curves(families: Sequence[Mapping[str, Any]], front_radius: float) -> list[Curve]:
+def make_curves(families: Sequence[Mapping[str, Any]], front_radius: float) -> list[SolutionCurve]:
     """Curves of the families of a document, each once even where two families share one."""
-    found: dict[tuple, Curve] = {}
+    found: dict[tuple, SolutionCurve] = {}
     for family in families:
         curve = _curve(family, front_radius)
         # Two families share a curve where they own it both and it ends alike.
@@ -89,7 +89,7 @@ def curves(families: Sequence[Mapping[str, Any]], front_radius: float) -> list[C
     return list(found.values())
 
 
-def _curve(family: Mapping[str, Any], front_radius: float) -> Curve:
+def _curve(family: Mapping[str, Any], front_radius: float) -> SolutionCurve:
     points = family["points"]
     rate, lean, steer = (np.array(points[name]) for name in ("front_rate", "lean", "steer"))
     push = np.minimum(points["normal_force_rear"], points["normal_force_front"])
@@ -99,7 +99,7 @@ def _curve(family: Mapping[str, Any], front_radius: float) -> Curve:
         low, high = sorted(_position(lean, steer, *end) for end in ends)
         sections.append((low, high))
     speed = scaled_speed(rate, front_radius)
-    return Curve(_owners(family), speed, lean, steer, push, tuple(sections), _limits(family, speed))
+    return SolutionCurve(_owners(family), speed, lean, steer, push, tuple(sections), _limits(family, speed))
 
 
 def _position(lean: np.ndarray, steer: np.ndarray, at_lean: float, at_steer: float) -> float:
@@ -150,7 +150,7 @@ def _limits(family: Mapping[str, Any], speed: np.ndarray) -> tuple[NamedPoint, .
     return tuple(found)
 
 
-def limits(drawn: Sequence[Curve]) -> list[NamedPoint]:
+def find_limits(drawn: Sequence[SolutionCurve]) -> list[NamedPoint]:
     """What all curves tend to, each once; of circles that tend to one letter's angles the fastest bear it."""
     found: dict[tuple, NamedPoint] = {}
     for point in (limit for curve in drawn for limit in curve.limits):
@@ -159,7 +159,7 @@ def limits(drawn: Sequence[Curve]) -> list[NamedPoint]:
     return [point if fastest[point.name] is point else replace(point, name="") for point in found.values()]
 
 
-def named_points(families: Sequence[Mapping[str, Any]], front_radius: float) -> list[NamedPoint]:
+def find_named_points(families: Sequence[Mapping[str, Any]], front_radius: float) -> list[NamedPoint]:
     """Points with the paper's letters; those that lie on one another share a label, as G and H do."""
     found: dict[tuple, NamedPoint] = {}
     for family in families:

@@ -10,7 +10,7 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from ...engines.files import whole
+from ...engines.files import write_whole
 
 WIDTH = 7.2  # of a page with two columns [inch]: text below stays readable at half of it
 
@@ -51,7 +51,7 @@ _NO_DATE: dict[str, dict[str, Any]] = {".svg": {"Date": None}, ".pdf": {"Creatio
 
 
 @contextmanager
-def style() -> Iterator[None]:
+def use_style() -> Iterator[None]:
     """Draw and write within this: the style holds inside, and matplotlib is left as it was."""
     with rc_context(_STYLE):
         yield
@@ -74,5 +74,5 @@ def write_figure(path: Path, figure: Figure) -> None:
         Its ending gives the format: ``.svg``, ``.pdf`` or ``.png``.
     figure : Figure
     """
-    with whole(path) as partial:
+    with write_whole(path) as partial:
         figure.savefig(partial, metadata=_NO_DATE.get(path.suffix))

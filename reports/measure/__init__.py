@@ -1,21 +1,29 @@
 """Measurements on rides: errors, drift, falls, friction, modes, orders, and what round-off allows them to differ by."""
 
-from .consistency import LARGEST_NOISE, TURNING, Mismatch, describe, follow, mismatches
+from .consistency import LARGEST_NOISE, TURNING, Mismatch, describe_mismatch, evaluate_ride, find_mismatches
 from .convergence import observed_orders
-from .fall import as_shown, fell_at, until_fall
+from .fall import cut_at_fall, fell_at, until_fall
 from .friction import normal_force, required_friction
-from .identify import DISTURBANCES, LEVELS, STENCIL_WEIGHT, Identified, identify, interval_of, jacobian_at
+from .identify import DISTURBANCES, IDENTIFY_LEVELS, STENCIL_WEIGHT, Identified, identify, interval_of, jacobian_at
 from .inspection import relative_differences, rms_force_error, state_error
 from .limits import ROUND_OFF, START_ERROR, Scale, eigenvalue_limits, noise, order_limit, ride_limits, step_force
-from .metrics import metrics, number, position_errors
-from .modes import Mode, Modes, modes_of
-from .precision import SAME_BITS, Level, compared_time, comparison_horizon, eigenvalue_document, engine_document, match
+from .metrics import compute_metrics, position_errors, to_number
+from .modes import Mode, Modes, find_modes
+from .precision import (
+    SAME_BITS,
+    Level,
+    compared_time,
+    comparison_horizon,
+    eigenvalue_document,
+    eigenvalue_pairs,
+    engine_document,
+)
 from .steady import steady_trajectory
 
 __all__ = [
     "DISTURBANCES",
+    "IDENTIFY_LEVELS",
     "LARGEST_NOISE",
-    "LEVELS",
     "ROUND_OFF",
     "SAME_BITS",
     "START_ERROR",
@@ -27,25 +35,24 @@ __all__ = [
     "Mode",
     "Modes",
     "Scale",
-    "as_shown",
     "compared_time",
     "comparison_horizon",
-    "describe",
+    "compute_metrics",
+    "cut_at_fall",
+    "describe_mismatch",
     "eigenvalue_document",
     "eigenvalue_limits",
+    "eigenvalue_pairs",
     "engine_document",
+    "evaluate_ride",
     "fell_at",
-    "follow",
+    "find_mismatches",
+    "find_modes",
     "identify",
     "interval_of",
     "jacobian_at",
-    "match",
-    "metrics",
-    "mismatches",
-    "modes_of",
     "noise",
     "normal_force",
-    "number",
     "observed_orders",
     "order_limit",
     "position_errors",
@@ -56,5 +63,6 @@ __all__ = [
     "state_error",
     "steady_trajectory",
     "step_force",
+    "to_number",
     "until_fall",
 ]

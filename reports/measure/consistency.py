@@ -46,7 +46,7 @@ _WHEELS = tuple(f"{wheel}_wheel" for wheel in WHEELS)
 TURNING = [YAW, REAR_ANGLE, FRONT_ANGLE]
 
 
-def follow(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> Trajectory:
+def evaluate_ride(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> Trajectory:
     """The ride with poses, contact points, gaps, slip and energies as they follow from its coordinates and rates.
 
     Where a wheel has no closest approach its contact point, gap and slip are NaN; forces stay the engine's.
@@ -117,7 +117,7 @@ class Mismatch:
         return asdict(self)
 
 
-def describe(report: Mapping[str, Any]) -> str:
+def describe_mismatch(report: Mapping[str, Any]) -> str:
     """Say in words what of an engine's reports differs from what, by how much and when, from `Mismatch.as_json`."""
     part, unit = report["part"].replace("_", " "), report["unit"].removeprefix("1")
     if report["quantity"] == "qd":
@@ -129,7 +129,7 @@ def describe(report: Mapping[str, Any]) -> str:
     return f"{what} is {difference} from {other} at {report['time']:.4g} s, limit {limit}"
 
 
-def mismatches(
+def find_mismatches(
     reported: Trajectory, followed: Trajectory, exact: Trajectory | None, size: float, step_noise: float
 ) -> list[Mismatch]:
     """Hold an engine's reports and rates against its coordinates.
@@ -139,7 +139,7 @@ def mismatches(
     reported : Trajectory
         As the engine gave it, up to its fall.
     followed : Trajectory
-        The same ride as `follow` gives it.
+        The same ride as `evaluate_ride` gives it.
     exact : Trajectory or None
         The reference, sampled at the same times as far as both go. Without one no rates are judged, and reports at
         the start only, but for the reference itself.

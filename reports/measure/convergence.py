@@ -12,7 +12,7 @@ _LEAST_ORDER = 0.5  # a sequence that converges more slowly is noise, or has not
 
 
 @dataclass(frozen=True)
-class Limit:
+class RichardsonLimit:
     """Extrapolated limit of a sequence.
 
     Attributes
@@ -46,7 +46,7 @@ def observed_orders(values: Sequence[np.ndarray]) -> list[float]:
     return [float(np.log2(a / b)) if a > 0 and b > 0 else np.nan for a, b in pairwise(moves)]
 
 
-def extrapolate(values: Sequence[np.ndarray]) -> Limit:
+def extrapolate(values: Sequence[np.ndarray]) -> RichardsonLimit:
     """Richardson's extrapolation of a sequence with halved steps.
 
     Each column of the table removes the power that its own last three entries show, rounded to an integer
@@ -64,7 +64,7 @@ def extrapolate(values: Sequence[np.ndarray]) -> Limit:
     Limit
     """
     column = [np.asarray(value, float) for value in values]
-    best = Limit(column[-1], _size(column[-1] - column[-2]))
+    best = RichardsonLimit(column[-1], _size(column[-1] - column[-2]))
     power = 0
     while len(column) > 1:
         seen = observed_orders(column[-3:])
@@ -77,7 +77,7 @@ def extrapolate(values: Sequence[np.ndarray]) -> Limit:
         moved = _size(column[-1] - (column[-2] if len(column) > 1 else best.value))
         if moved >= best.uncertainty:
             break
-        best = Limit(column[-1], moved)
+        best = RichardsonLimit(column[-1], moved)
     return best
 
 

@@ -1,7 +1,7 @@
 """When a bicycle falls, and the ride up to there: nothing but wheels touches the ground, so no ride comes after.
 
-All of it looks at the rear frame's position: give it rides as `velodrome.reports.measure.consistency.follow` does, or
-the engine says itself whether it fell.
+All of it looks at the rear frame's position: give it rides as `velodrome.reports.measure.consistency.evaluate_ride`
+does, or the engine says itself whether it fell.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def until_fall(trajectory: Trajectory, bicycle: Bicycle, surface: Surface, beyon
     return trajectory if len(low) == 0 else trajectory.first(max(1, int(low[0]) + beyond))
 
 
-def as_shown(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> Trajectory:
+def cut_at_fall(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> Trajectory:
     """The ride up to its fall and one sample more than what is measured: there it lies."""
     shown = until_fall(trajectory, bicycle, surface, 1)
     return shown if len(shown.time) == len(trajectory.time) else replace(shown, ended="the bicycle fell")

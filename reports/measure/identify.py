@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import logm
 
-from ...engines.admission import ride
+from ...engines.admission import ride_engine
 from ...engines.engine import Engine, EngineError, Problem, Settings
 from ...reference.dae import consistent_state
 from ...reference.kinematics import PITCH, YAW
@@ -31,7 +31,7 @@ INTERVAL = 0.2  # short enough that the fastest oscillation known, 7 rad/s, turn
 DISTURBANCES = np.array([5e-3, 5e-3, 1e-3, 1e-3, 5e-3, 5e-3, 1e-2])
 _STENCIL = ((1, 45 / 60), (-1, -45 / 60), (2, -9 / 60), (-2, 9 / 60), (3, 1 / 60), (-3, -1 / 60))
 STENCIL_WEIGHT = sum(abs(weight) for _, weight in _STENCIL)
-LEVELS = 3
+IDENTIFY_LEVELS = 3
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def identify(
     settings: Settings,
     problem: Problem,
     progress: Callable[[float], None] = lambda _: None,
-    levels: int = LEVELS,
+    levels: int = IDENTIFY_LEVELS,
 ) -> Identified:
     """Measure an engine's reduced Jacobian about the state that a problem starts from.
 
@@ -140,7 +140,7 @@ def _ride(
     state = consistent_state(problem.bicycle, problem.surface, position, v[2], v[3], rates, yaw, guess)
     disturbed = Problem(problem.bicycle, problem.surface, *state, 0.5 * interval * np.arange(4))
     engine.check(disturbed, settings)
-    trajectory = ride(engine, disturbed, settings, lambda _: None)
+    trajectory = ride_engine(engine, disturbed, settings, lambda _: None)
     if len(trajectory.time) < 4:
         raise EngineError(f"{engine.name} did not ride through {1.5 * interval:g} s: {trajectory.ended}")
     return independent(trajectory.q[[1, 3]], trajectory.qd[[1, 3]])

@@ -7,7 +7,7 @@ import numpy as np
 from ...engines.engine import Trajectory
 from .consistency import coordinate_differences
 from .limits import Scale
-from .metrics import SETTLED
+from .metrics import SETTLED_SHARE
 
 
 def state_error(trajectory: Trajectory, exact: Trajectory, scale: Scale) -> float:
@@ -45,7 +45,7 @@ def rms_force_error(trajectory: Trajectory, exact: Trajectory) -> float | None:
     A largest difference would hide what changes in any sample but the worst. Samples before contacts have settled are
     left out; None where there are no others, or no forces.
     """
-    settled = trajectory.time >= SETTLED
+    settled = trajectory.time >= SETTLED_SHARE
     if trajectory.contact_force is None or exact.contact_force is None or not settled.any():
         return None
     force = exact.contact_force[: len(trajectory.time)]

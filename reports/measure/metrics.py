@@ -14,15 +14,15 @@ from ...engines.engine import Trajectory
 from ...reference.bicycle import Bicycle
 from ...reference.kinematics import REAR_ANGLE, YAW
 from ...reference.surface import Surface
-from .consistency import follow, largest_speed, mismatches
+from .consistency import evaluate_ride, find_mismatches, largest_speed
 from .fall import fell_at, until_fall
 from .friction import cone_is_left, normal_force, required_friction
 from .limits import ROUND_OFF
 
-SETTLED = 0.2  # from here on contacts that start unsettled have settled, of any model here [s]
+SETTLED_SHARE = 0.2  # from here on contacts that start unsettled have settled, of any model here [s]
 
 
-def metrics(
+def compute_metrics(
     trajectory: Trajectory,
     reference: Trajectory | None,
     bicycle: Bicycle,
@@ -53,7 +53,7 @@ def metrics(
     step_noise : float
         Relative error that a step of the engine may add beyond its method.
     followed : Trajectory, optional
-        The trajectory as `velodrome.reports.measure.consistency.follow` gives it, where that is at hand.
+        The trajectory as `velodrome.reports.measure.consistency.evaluate_ride` gives it, where that is at hand.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def metrics(
     """
     reported = trajectory
     simulated = float(reported.time[-1] - reported.time[0])
-    trajectory = follow(reported, bicycle, surface) if followed is None else followed
+    trajectory = evaluate_ride(reported, bicycle, surface) if followed is None else followed
     fall = fell_at(trajectory, bicycle, surface)
     trajectory = until_fall(trajectory, bicycle, surface)
     reported = reported.first(len(trajectory.time))
@@ -73,7 +73,7 @@ def metrics(
     result |= _energy(trajectory)
     result |= _constraints(trajectory)
     result["not_finite"] = reported.not_finite()
-    found = mismatches(reported, trajectory, reference, size, step_noise)
+    found = find_mismatches(reported, trajectory, reference, size, step_noise)
     result["inconsistent_reports"] = [mismatch.as_json() for mismatch in found if not mismatch.holds]
     result |= _friction(trajectory, trajectory if reference is None else reference, surface)
     result |= {
@@ -86,11 +86,11 @@ def metrics(
         "fell_at": fall,
         "ended": trajectory.ended,
     }
-    result["horizon"] = None if reference is None else horizon(trajectory, reference, growth_rate, size)
+    result["horizon"] = None if reference is None else find_horizon(trajectory, reference, growth_rate, size)
     return {name: _finite(value) for name, value in result.items()}
 
 
-def number(value: float) -> float | None:
+def to_number(value: float) -> float | None:
     """What JSON can carry of a number: None if it is none."""
     return float(value) if np.isfinite(value) else None
 
@@ -101,7 +101,7 @@ def _finite(value: Any) -> Any:
         return {name: _finite(part) for name, part in value.items()}
     if isinstance(value, list):
         return [_finite(part) for part in value]
-    return number(value) if isinstance(value, float) else value
+    return to_number(value) if isinstance(value, float) else value
 
 
 def position_errors(trajectory: Trajectory, reference: Trajectory) -> np.ndarray:
@@ -149,7 +149,7 @@ def least_normal_force(trajectory: Trajectory, surface: Surface) -> float | None
     return None if normal is None else float(normal.min())
 
 
-def horizon(trajectory: Trajectory, reference: Trajectory, growth_rate: float, size: float) -> float | None:
+def find_horizon(trajectory: Trajectory, reference: Trajectory, growth_rate: float, size: float) -> float | None:
     """Time up to which the comparison means anything [s]; None where the motion amplifies no error.
 
     An error grows like e0 exp(growth_rate t), e0 = C h^p. e0 is the largest that the samples allow while
@@ -201,7 +201,7 @@ def _errors(trajectory: Trajectory, reference: Trajectory | None) -> dict[str, A
         # Contacts that start unsettled are worst in the first sample, which says little of the ride.
         if difference.max() > 0:
             result["contact_force_error_at"] = float(trajectory.time[difference.max(axis=1).argmax()])
-        settled = trajectory.time[:n] >= SETTLED
+        settled = trajectory.time[:n] >= SETTLED_SHARE
         if settled.any():
             result["settled_force_error"] = float(difference[settled].max() / largest)
     return result

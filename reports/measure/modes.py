@@ -80,7 +80,7 @@ class Modes:
         return np.abs((independent(ride.q, ride.qd) - self.motion) @ mode.left)
 
 
-def modes_of(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> Modes:
+def find_modes(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> Modes:
     """Modes of a circular motion, or of a straight upright one.
 
     Parameters

@@ -12,7 +12,7 @@ import numpy as np
 from ...engines.engine import Trajectory
 from .convergence import extrapolate, observed_orders
 from .identify import Identified
-from .metrics import number, position_errors
+from .metrics import position_errors, to_number
 
 SMALL = 0.1  # of the motion's size: what nonlinearity adds to an error up to here, the next powers of the step take
 
@@ -29,7 +29,7 @@ class Level:
 
 
 @dataclass(frozen=True)
-class Convergence:
+class StepConvergence:
     """How a sequence of levels converges.
 
     Attributes
@@ -61,7 +61,7 @@ def compared_time(document: Mapping[str, Any]) -> float:
     return duration if horizon is None else min(horizon, duration)
 
 
-def convergence(levels: Sequence[Level], reference: Trajectory, size: float) -> Convergence | None:
+def measure_convergence(levels: Sequence[Level], reference: Trajectory, size: float) -> StepConvergence | None:
     """Order and limit of levels with halved steps.
 
     Parameters
@@ -89,7 +89,7 @@ def convergence(levels: Sequence[Level], reference: Trajectory, size: float) -> 
     limit = extrapolate(paths)
     distance = np.linalg.norm(limit.value - reference.q[:samples, :3], axis=1)
     window = float(reference.time[samples - 1])
-    return Convergence(window, observed_orders(paths), float(distance.max()), limit.uncertainty)
+    return StepConvergence(window, observed_orders(paths), float(distance.max()), limit.uncertainty)
 
 
 def step_changes_nothing(levels: Sequence[Level]) -> bool:
@@ -117,14 +117,14 @@ def engine_document(
     horizon : float or None
         Errors are taken up to here [s]; None for the whole run.
     """
-    found = convergence(levels, reference, size)
+    found = measure_convergence(levels, reference, size)
     orders = [] if found is None else found.orders
     unseen = [{"step": None, "reason": SAME_BITS}] if step_changes_nothing(levels) else []
     return {
         "points": [_point(level, reference, horizon) for level in levels],
         "failures": [*failures, *unseen],
-        "observed_order": number(orders[-1]) if orders else None,
-        "orders": [number(order) for order in orders],
+        "observed_order": to_number(orders[-1]) if orders else None,
+        "orders": [to_number(order) for order in orders],
         "richardson_error": None if found is None else found.limit_error,
         "richardson_uncertainty": None if found is None else found.uncertainty,
         "window": None if found is None else found.window,
@@ -162,19 +162,19 @@ def eigenvalue_document(identified: Identified, reference: np.ndarray) -> dict[s
         ``values`` and ``reference`` in the same order, ``errors`` per pair, the largest ``error``,
         ``order`` in the step, ``uncertainty`` of the Jacobian's extrapolation.
     """
-    matched = match(reference, identified.eigenvalues)
+    matched = eigenvalue_pairs(reference, identified.eigenvalues)
     errors = np.abs(matched - reference)
     return {
         "values": [[value.real, value.imag] for value in matched],
         "reference": [[value.real, value.imag] for value in reference],
         "errors": errors.tolist(),
         "error": float(errors.max()),
-        "order": number(identified.order),
+        "order": to_number(identified.order),
         "uncertainty": identified.uncertainty,
     }
 
 
-def match(reference: np.ndarray, values: np.ndarray) -> np.ndarray:
+def eigenvalue_pairs(reference: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Order values so that as a whole they lie nearest to the reference's."""
     # Imported here: scipy's optimisers take a third of a second, and only this needs one of them.
     from scipy.optimize import linear_sum_assignment

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..drawing import PLOTS, RADIUS, Plot, Ride, drawable
+from ..drawing import PLOTS, RADIUS, Plot, RideData, drawable_values
 
-MOST = 1000  # points of a curve: as many as pixels side by side
-ALL = 40_000  # points of all curves together: under a megabyte of page
+MOST_CURVE_POINTS = 1000  # points of a curve: as many as pixels side by side
+ALL_CURVE_POINTS = 40_000  # points of all curves together: under a megabyte of page
 _DIGITS = 7
 
 
@@ -125,7 +125,7 @@ GROUPS: tuple[tuple[str, tuple[Panel, ...]], ...] = (
 )
 
 
-def kept(values: np.ndarray, most: int) -> np.ndarray:
+def choose_samples(values: np.ndarray, most: int) -> np.ndarray:
     """Choose samples that draw a curve: the least and the largest of each of equal parts, the first, the last.
 
     No extreme of the curve is lost, however short.
@@ -152,37 +152,37 @@ def kept(values: np.ndarray, most: int) -> np.ndarray:
     return np.unique(chosen)
 
 
-def curve(time: np.ndarray, values: np.ndarray, most: int) -> dict[str, list[float | None]]:
+def make_curve(time: np.ndarray, values: np.ndarray, most: int) -> dict[str, list[float | None]]:
     """Points of a curve as JSON: times ``t`` and values ``v``, a None between points that nothing joins."""
-    chosen = kept(values, most)
+    chosen = choose_samples(values, most)
     absent = np.cumsum(~np.isfinite(values))
     t: list[float | None] = []
     v: list[float | None] = []
     before = None
     for index in chosen.tolist():
         if before is not None and absent[index] > absent[before]:
-            t.append(rounded(time.item(index)))
+            t.append(round_values(time.item(index)))
             v.append(None)
-        t.append(rounded(time.item(index)))
-        v.append(rounded(values.item(index)))
+        t.append(round_values(time.item(index)))
+        v.append(round_values(values.item(index)))
         before = index
     return {"t": t, "v": v}
 
 
-def rounded(value: float, digits: int = _DIGITS) -> float:
+def round_values(value: float, digits: int = _DIGITS) -> float:
     """A number with fewer digits."""
     return float(f"{value:.{digits}g}")
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnCurve:
     """A panel with its values.
 
     Attributes
     ----------
     panel : Panel
     curves : dict
-        Engine to points, as `curve` gives them.
+        Engine to points, as `make_curve` gives them.
     extremes : dict
         Engine to the least and the largest value and the last, of all samples.
     """
@@ -192,7 +192,7 @@ class Drawn:
     extremes: dict[str, tuple[float, float, float]]
 
 
-def drawn(ride: Ride, circular: bool) -> list[tuple[str, list[Drawn]]]:
+def draw_curves(ride: RideData, circular: bool) -> list[tuple[str, list[DrawnCurve]]]:
     """All panels that any engine has values for, in groups.
 
     Parameters
@@ -207,20 +207,20 @@ def drawn(ride: Ride, circular: bool) -> list[tuple[str, list[Drawn]]]:
         Title of the group and its panels; groups without a panel are left out.
     """
     found = [
-        (title, panel, drawable(ride, panel.plot))
+        (title, panel, drawable_values(ride, panel.plot))
         for title, panels in GROUPS
         for panel in panels
         if circular or panel.key != RADIUS.key
     ]
     count = sum(len(values) for _, _, values in found)
-    most = max(4, min(MOST, ALL // max(1, count)))
-    groups: dict[str, list[Drawn]] = {}
+    most = max(4, min(MOST_CURVE_POINTS, ALL_CURVE_POINTS // max(1, count)))
+    groups: dict[str, list[DrawnCurve]] = {}
     for title, panel, values in found:
         if not values:
             continue
-        curves = {name: curve(ride.trajectories[name].time, series, most) for name, series in values.items()}
+        curves = {name: make_curve(ride.trajectories[name].time, series, most) for name, series in values.items()}
         extremes = {name: _extremes(series, panel.log) for name, series in values.items()}
-        groups.setdefault(title, []).append(Drawn(panel, curves, extremes))
+        groups.setdefault(title, []).append(DrawnCurve(panel, curves, extremes))
     return list(groups.items())
 
 
@@ -230,7 +230,7 @@ def _extremes(values: np.ndarray, log: bool) -> tuple[float, float, float]:
     return (10 ** three[0], 10 ** three[1], 10 ** three[2]) if log else three
 
 
-def panel_data(shown: Drawn, names: Sequence[str], measured: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+def panel_data(shown: DrawnCurve, names: Sequence[str], measured: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """A panel as JSON for the page's script; engines by their number in ``names``."""
     marks = []
     if shown.panel.key == "log_position_error":

@@ -13,14 +13,14 @@ from markupsafe import Markup
 
 from ...engines.engine import Trajectory
 from ...reference.surface import Surface, SurfaceOfRevolution
-from ..drawing import COLUMNS, Ride, cell, colours, remarks, stability, verdict_line
+from ..drawing import COLUMNS, RideData, assign_colours, describe_stability, format_cell, format_verdict, make_remarks
 from . import curves, plan, trust, words
-from .ink import css, dashes, on_paper
+from .ink import line_dashes, make_css, paper_colour
 
 _PARTS = Path(__file__).parent
 
 
-def page(
+def make_page(
     manifest: Mapping[str, Any],
     scenario: Mapping[str, Any],
     measured: Mapping[str, Mapping[str, Any]],
@@ -39,7 +39,7 @@ def page(
     measured : mapping
         Metrics by engine name, as in ``metrics.json``.
     verdicts : sequence of mapping
-        As `velodrome.scenarios.run.runner.judge` gives them.
+        As `velodrome.scenarios.run.runner.judge_run` gives them.
     trajectories : mapping of str to Trajectory
         By engine name, in the order of display; may be empty.
     surface : Surface
@@ -50,27 +50,27 @@ def page(
         An HTML document with everything in it: style, script, data. Whatever comes from the run is escaped.
     """
     names, script = list(trajectories), _text("page.js")
-    ride = Ride(surface, trajectories)
-    groups = curves.drawn(ride, scenario["motion"].get("kind") != "upright") if names else []
-    seen = plan.plan(ride, names) if names else None
+    ride = RideData(surface, trajectories)
+    groups = curves.draw_curves(ride, scenario["motion"].get("kind") != "upright") if names else []
+    seen = plan.draw_plan(ride, names) if names else None
     steady = isinstance(surface, SurfaceOfRevolution)
     duration, rate = scenario["simulation"]["duration"], manifest["start"]["growth_rate"]
     ends = {name: float(run.time[-1]) for name, run in trajectories.items()}
     return _template().render(
         _results(measured, rate, duration, ends),
         manifest=manifest,
-        facts=words.facts(manifest, scenario),
-        stability=stability(rate, steady),
+        facts=words.list_facts(manifest, scenario),
+        stability=describe_stability(rate, steady),
         engines=_inks(names),
         failures={name: entry["failed"] for name, entry in manifest["engines"].items() if "failed" in entry},
         left_out=manifest.get("left_out", {}),
-        verdicts=[{"holds": verdict["holds"], "line": verdict_line(verdict)} for verdict in verdicts],
+        verdicts=[{"holds": verdict["holds"], "line": format_verdict(verdict)} for verdict in verdicts],
         criterion=scenario.get("criterion") is not None,
         steady=steady,
         duration=duration,
         groups=groups,
         has_plan=seen is not None,
-        most=curves.MOST,
+        most=curves.MOST_CURVE_POINTS,
         data={
             "duration": max(ends.values(), default=duration),
             "engines": names,
@@ -89,14 +89,15 @@ def _results(
     """What the template says of the metrics; ``ends`` are the times of the engines' last samples [s]."""
     return {
         "columns": COLUMNS,
-        "meanings": trust.MEANINGS,
+        "meanings": trust.COLUMN_MEANINGS,
         "horizon_meaning": trust.HORIZON,
         "rows": {name: _row(values) for name, values in measured.items()},
         "trust": {
-            name: trust.trust(name, values, growth_rate, duration, ends.get(name)) for name, values in measured.items()
+            name: trust.explain_columns(name, values, growth_rate, duration, ends.get(name))
+            for name, values in measured.items()
         },
         "fallen": [name for name, values in measured.items() if values.get("fell_at") is not None],
-        "remarks": [line for name, values in measured.items() for line in remarks(name, values, duration)],
+        "remarks": [line for name, values in measured.items() for line in make_remarks(name, values, duration)],
     }
 
 
@@ -106,7 +107,7 @@ def _template() -> Template:
         autoescape=True, loader=FunctionLoader(_text), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
-    environment.filters["setting"] = words.setting
+    environment.filters["setting"] = words.describe_setting
     return environment.get_template("page.html")
 
 
@@ -121,15 +122,20 @@ def _hash(script: str) -> str:
 
 def _inks(names: list[str]) -> list[dict[str, str]]:
     """How each engine is drawn."""
-    paint, dash = colours(names), dashes(names)
+    paint, dash = assign_colours(names), line_dashes(names)
     return [
-        {"name": name, "screen": css(paint[name]), "paper": css(on_paper(name, paint[name])), "dash": dash[name]}
+        {
+            "name": name,
+            "screen": make_css(paint[name]),
+            "paper": make_css(paper_colour(name, paint[name])),
+            "dash": dash[name],
+        }
         for name in names
     ]
 
 
 def _row(values: Mapping[str, Any]) -> list[str]:
     horizon = values.get("horizon")
-    return [cell(values, metric, part) for _, _, metric, part in COLUMNS] + [
+    return [format_cell(values, metric, part) for _, _, metric, part in COLUMNS] + [
         "–" if horizon is None else f"{horizon:.3g}"
     ]

@@ -20,7 +20,7 @@ def luminance(colour: Colour) -> float:
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
-def on_paper(name: str, colour: Colour) -> Colour:
+def paper_colour(name: str, colour: Colour) -> Colour:
     """The colour of an engine on white: darkened, hue and saturation kept, until it stands out."""
     if name == REFERENCE:
         return REFERENCE_ON_PAPER
@@ -31,12 +31,12 @@ def on_paper(name: str, colour: Colour) -> Colour:
     return (0, 0, 0)
 
 
-def css(colour: Colour) -> str:
+def make_css(colour: Colour) -> str:
     """A colour as CSS writes it."""
     return "#{:02x}{:02x}{:02x}".format(*colour)
 
 
-def dashes(names: list[str]) -> dict[str, str]:
+def line_dashes(names: list[str]) -> dict[str, str]:
     """Dash pattern of each engine's line, as SVG writes it; the reference's is solid."""
     others = [name for name in names if name != REFERENCE]
     return dict.fromkeys(names, "") | {name: DASHES[k % len(DASHES)] for k, name in enumerate(others)}

@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 
 from ...engines.engine import Trajectory
-from ..drawing import Ride, ground_of_ride
-from .curves import rounded
+from ..drawing import RideData, make_ground
+from .curves import round_values
 
-MOST = 1200  # points of a trail: some hundred a turn
-ALL = 12_000  # points of all trails together: a quarter of a megabyte of page
+MOST_TRAIL_POINTS = 1200  # points of a trail: some hundred a turn
+ALL_TRAIL_POINTS = 12_000  # points of all trails together: a quarter of a megabyte of page
 _DIGITS = 5  # a millimetre in a hundred metres
 
 
-def trail(run: Trajectory) -> np.ndarray:
+def draw_trail(run: Trajectory) -> np.ndarray:
     """Where the rear wheel touches the ground, seen from above, shape (n, 2) [m]; D where there is no contact."""
     return run.q[:, :2] if run.contact_point is None else run.contact_point[:, 0, :2]
 
 
-def plan(ride: Ride, names: Sequence[str]) -> dict[str, Any] | None:
+def draw_plan(ride: RideData, names: Sequence[str]) -> dict[str, Any] | None:
     """Trails and the ground's lines as JSON for the page's script; None where there is nothing to draw.
 
     Parameters
@@ -36,15 +36,15 @@ def plan(ride: Ride, names: Sequence[str]) -> dict[str, Any] | None:
         ``edge`` and ``lines`` as lists of [x, y]; ``trails`` as ``{t, x, y}`` by engine; ``box`` as
         [x, y, width, height], the part to show, y up [m].
     """
-    paths = {name: trail(run) for name, run in ride.trajectories.items()}
+    paths = {name: draw_trail(run) for name, run in ride.trajectories.items()}
     places = [path[np.isfinite(path).all(axis=1)] for path in paths.values()]
     if not any(len(path) for path in places):
         return None
-    ground = ground_of_ride(ride.surface, np.concatenate(places))
+    ground = make_ground(ride.surface, np.concatenate(places))
     low, high = ground.edge[:, :2].min(axis=0), ground.edge[:, :2].max(axis=0)
-    most = max(4, min(MOST, ALL // len(paths)))
+    most = max(4, min(MOST_TRAIL_POINTS, ALL_TRAIL_POINTS // len(paths)))
     return {
-        "box": [rounded(v, _DIGITS) for v in (*low, *(high - low))],
+        "box": [round_values(v, _DIGITS) for v in (*low, *(high - low))],
         "edge": _points(ground.edge),
         "lines": [_points(line) for line in ground.lines],
         "trails": {
@@ -60,7 +60,7 @@ def _points(line: np.ndarray) -> list[list[float]]:
     off = (flat - flat[0]) @ np.array([-along[1], along[0]])
     # Round-off of a cross product is that of the squares of its terms.
     straight = np.linalg.norm(along) > 0 and np.abs(off).max() < 1e-12 * np.square(flat).sum(axis=1).max()
-    return [[rounded(x, _DIGITS), rounded(y, _DIGITS)] for x, y in (flat[[0, -1]] if straight else flat)]
+    return [[round_values(x, _DIGITS), round_values(y, _DIGITS)] for x, y in (flat[[0, -1]] if straight else flat)]
 
 
 def _trail(time: np.ndarray, path: np.ndarray, most: int) -> dict[str, list[float]]:
@@ -73,7 +73,7 @@ def _trail(time: np.ndarray, path: np.ndarray, most: int) -> dict[str, list[floa
         outermost += [finite[path[finite, k].argmax()] for k in (0, 1)]
         chosen = np.unique([*chosen, finite[-1], *outermost])
     return {
-        "t": [rounded(v) for v in time[chosen]],
-        "x": [rounded(v, _DIGITS) for v in path[chosen, 0]],
-        "y": [rounded(v, _DIGITS) for v in path[chosen, 1]],
+        "t": [round_values(v) for v in time[chosen]],
+        "x": [round_values(v, _DIGITS) for v in path[chosen, 0]],
+        "y": [round_values(v, _DIGITS) for v in path[chosen, 1]],
     }

@@ -9,7 +9,7 @@ from typing import Any
 from ...engines.engine import REFERENCE
 
 # One a column of `velodrome.reports.drawing.summary.COLUMNS`.
-MEANINGS = {
+COLUMN_MEANINGS = {
     "position_error": "Largest distance of the point D, on the steering axis, from where the reference has it at the "
     "same time.",
     "orientation_error": "Largest angle between the rear frame and the reference's.",
@@ -29,7 +29,9 @@ HORIZON = (
 )
 
 
-def trust(name: str, values: Mapping[str, Any], growth_rate: float, duration: float, end: float | None = None) -> str:
+def explain_columns(
+    name: str, values: Mapping[str, Any], growth_rate: float, duration: float, end: float | None = None
+) -> str:
     """How far to trust an engine's row.
 
     Parameters

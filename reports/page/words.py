@@ -18,7 +18,7 @@ _UNITS = {
 }
 
 
-def facts(manifest: Mapping[str, Any], scenario: Mapping[str, Any]) -> list[tuple[str, str]]:
+def list_facts(manifest: Mapping[str, Any], scenario: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Terms and what they are in this run.
 
     Parameters
@@ -35,23 +35,23 @@ def facts(manifest: Mapping[str, Any], scenario: Mapping[str, Any]) -> list[tupl
     simulation, start = scenario["simulation"], manifest["start"]
     rows = [
         ("Scenario", str(manifest["scenario"])),
-        ("Ground", ground(scenario["surface"])),
-        ("Motion", motion(scenario["motion"])),
+        ("Ground", describe_ground(scenario["surface"])),
+        ("Motion", describe_motion(scenario["motion"])),
     ]
     if start["family"] is not None:
         rows.append(("Family", f"{start['family']} of the circular motions"))
     return [
         *rows,
-        ("Disturbed by", disturbance(scenario.get("perturbation", {}))),
+        ("Disturbed by", describe_disturbance(scenario.get("perturbation", {}))),
         ("Growth rate", f"{start['growth_rate']:.4g} 1/s"),
         ("Duration", f"{simulation['duration']:g} s, {simulation['output_rate']:g} samples a second"),
-        ("Bicycle", bicycle(scenario.get("bicycle", {}))),
+        ("Bicycle", describe_bicycle(scenario.get("bicycle", {}))),
         ("Run on", f"{datetime.fromisoformat(manifest['created']):%Y-%m-%d, %H:%M:%S %Z}"),
         ("State", "complete" if manifest["complete"] else "interrupted: the engines that had finished are shown"),
     ]
 
 
-def ground(surface: Mapping[str, Any]) -> str:
+def describe_ground(surface: Mapping[str, Any]) -> str:
     """A surface in words."""
     if surface["kind"] == "plane":
         return "level plane"
@@ -61,34 +61,34 @@ def ground(surface: Mapping[str, Any]) -> str:
     return ", ".join([str(surface["kind"]), *fields])
 
 
-def motion(table: Mapping[str, Any]) -> str:
+def describe_motion(table: Mapping[str, Any]) -> str:
     """A motion to start from in words."""
     if table.get("kind") == "upright":
         return f"straight and upright, {table['speed']:g} m/s"
     return f"circle with the rear wheel at {table['rear_rate']:g} rad/s"
 
 
-def disturbance(table: Mapping[str, float]) -> str:
+def describe_disturbance(table: Mapping[str, float]) -> str:
     """What was added to the motion's start, in words."""
     added = (f"{name.replace('_', ' ')} {value:+g} {_UNITS[name]}" for name, value in table.items() if value != 0)
     return ", ".join(added) or "nothing"
 
 
-def bicycle(changes: Mapping[str, float]) -> str:
+def describe_bicycle(changes: Mapping[str, float]) -> str:
     """The bicycle in words."""
     name = "benchmark bicycle (Meijaard et al. 2007)"
     changed = ", ".join(f"{key.replace('_', ' ')} {value:g}" for key, value in changes.items())
     return f"{name} with {changed}" if changed else name
 
 
-def setting(value: Any) -> str:
+def describe_setting(value: Any) -> str:
     """A setting's value as the scenario file writes it."""
     if value is None:
         return "not set"
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list | tuple):
-        return ", ".join(setting(item) for item in value)
+        return ", ".join(describe_setting(item) for item in value)
     return f"{value!r}" if isinstance(value, float) else str(value)
 
 

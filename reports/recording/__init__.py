@@ -1,5 +1,5 @@
 """A run as a recording for the rerun viewer."""
 
-from .rerun_file import bright, write_recording
+from .rerun_file import brighten, write_recording
 
-__all__ = ["bright", "write_recording"]
+__all__ = ["brighten", "write_recording"]

@@ -10,7 +10,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from ...engines.engine import REFERENCE
-from ..drawing import CHANGE, CONSTRAINTS, ENERGY, ERROR, FORCES, LOG_ENERGY, RADIUS, STATES, Ground, Plot
+from ..drawing import CHANGE, CONSTRAINTS, ENERGY, ERROR, FORCES, LOG_ENERGY, RADIUS, STATES, GroundMesh, Plot
 
 BACKGROUND = (17, 19, 24)
 NEWTONS_PER_METRE = 500.0
@@ -34,7 +34,7 @@ def _trails(engines: Sequence[str], seconds: float | None) -> dict[Any, rrb.Visi
     return {f"{world(engine)}/trail/{part}": visible for engine in engines for part in ("rear", "front", "D")}
 
 
-def overview(engines: Sequence[str], ground: Ground) -> rrb.Spatial3DView:
+def overview(engines: Sequence[str], ground: GroundMesh) -> rrb.Spatial3DView:
     """All engines on the whole ground; on a long strip the camera follows the first engine."""
     if ground.disc:
         # Twice the rim's height on top lets the eye see over the near rim down to the bottom.
@@ -112,7 +112,7 @@ def _plot_tab(name: str, plots: Sequence[Plot], curves: Curves, columns: int) ->
     return rrb.Grid(*views, grid_columns=columns, name=name)
 
 
-def blueprint(engines: Sequence[str], ground: Ground, curves: Curves, modes: Sequence[Plot] = ()) -> rrb.Blueprint:
+def blueprint(engines: Sequence[str], ground: GroundMesh, curves: Curves, modes: Sequence[Plot] = ()) -> rrb.Blueprint:
     """Layout of a recording: the ride left, curves and summary right, paused at the start.
 
     Parameters

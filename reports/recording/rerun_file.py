@@ -10,7 +10,7 @@ import numpy as np
 import rerun as rr
 
 from ...engines.engine import REFERENCE, Trajectory
-from ...engines.files import whole
+from ...engines.files import write_whole
 from ...reference.bicycle import BODIES, Bicycle
 from ...reference.kinematics import WHEELS, YAW
 from ...reference.surface import Surface, unit_normals
@@ -18,19 +18,19 @@ from ..drawing import (
     LINE_LIFT,
     PLOTS,
     Colour,
-    Curve,
-    Ground,
+    GroundMesh,
     Mesh,
     Plot,
-    Ride,
+    PlotCurve,
+    RideData,
+    assign_colours,
     body_meshes,
-    colours,
-    drawable,
-    ground_of_ride,
+    drawable_values,
+    make_ground,
     mode_plots,
-    nanoseconds,
+    to_nanoseconds,
 )
-from ..measure import modes_of
+from ..measure import find_modes
 from .blueprint import NEWTONS_PER_METRE, blueprint, world
 
 APPLICATION = "velodrome"
@@ -61,18 +61,18 @@ class _Clock:
     """Timelines of a recording: ``time`` and ``step``, the sample's number among all engines' samples."""
 
     def __init__(self, trajectories: Mapping[str, Trajectory]) -> None:
-        self._all = np.unique(np.concatenate([nanoseconds(run.time) for run in trajectories.values()]))
+        self._all = np.unique(np.concatenate([to_nanoseconds(run.time) for run in trajectories.values()]))
 
     def columns(self, time: np.ndarray) -> list[rr.TimeColumn]:
         """Index columns of samples at times [s]."""
-        exact = nanoseconds(time)
+        exact = to_nanoseconds(time)
         return [
             rr.TimeColumn("time", duration=exact.astype("timedelta64[ns]")),
             rr.TimeColumn("step", sequence=np.searchsorted(self._all, exact)),
         ]
 
 
-def bright(colour: Colour) -> Colour:
+def brighten(colour: Colour) -> Colour:
     """Half way to white, to stand out from a bicycle of the same colour."""
     red, green, blue = ((c + 255) // 2 for c in colour)
     return red, green, blue
@@ -88,7 +88,7 @@ def _log_mesh(stream: rr.RecordingStream, path: str, mesh: Mesh, colour: Colour)
     stream.log(path, shape, static=True)
 
 
-def _log_ground(stream: rr.RecordingStream, ground: Ground) -> None:
+def _log_ground(stream: rr.RecordingStream, ground: GroundMesh) -> None:
     shade = ground.brightness[:, None]
     mesh = rr.Mesh3D(
         vertex_positions=ground.vertices,
@@ -149,7 +149,7 @@ def _send_contacts(
         _send_trail(stream, f"{root}/trail/{wheel}", above, run, clock)
         if run.contact_force is not None:
             vector = run.contact_force[:, k] / NEWTONS_PER_METRE
-            arrow = rr.Arrows3D.from_fields(radii=ARROW_RADIUS, colors=bright(colour))
+            arrow = rr.Arrows3D.from_fields(radii=ARROW_RADIUS, colors=brighten(colour))
             stream.log(f"{root}/force/{wheel}", arrow, static=True)
             stream.send_columns(f"{root}/force/{wheel}", index, rr.Arrows3D.columns(origins=point, vectors=vector))
 
@@ -169,12 +169,12 @@ def _send_name(
         stream.send_columns(f"{root}/ended", clock.columns(run.time[-1:]), columns)
 
 
-def _curves(ride: Ride, plots: Iterable[Plot]) -> dict[str, dict[str, Curve]]:
+def _curves(ride: RideData, plots: Iterable[Plot]) -> dict[str, dict[str, PlotCurve]]:
     """Finite samples of every plot: key -> engine -> (times, values); what is absent has no entry."""
-    curves: dict[str, dict[str, Curve]] = {}
+    curves: dict[str, dict[str, PlotCurve]] = {}
     for plot in plots:
-        found: dict[str, Curve] = {}
-        for name, values in drawable(ride, plot).items():
+        found: dict[str, PlotCurve] = {}
+        for name, values in drawable_values(ride, plot).items():
             kept = np.isfinite(values)
             found[name] = ride.trajectories[name].time[kept], values[kept]
         law = plot.expected(ride)
@@ -229,18 +229,18 @@ def write_recording(
     """
     if not trajectories or any(len(run.time) == 0 for run in trajectories.values()):
         raise ValueError("a recording needs at least one trajectory, and each at least one sample")
-    modes = None if undisturbed is None else modes_of(bicycle, surface, *undisturbed)
-    ride = Ride(surface, trajectories, before or {}, modes)
-    with whole(path) as partial, _strict():
-        _write(partial, title, bicycle, ride, summary, paint or colours(trajectories))
+    modes = None if undisturbed is None else find_modes(bicycle, surface, *undisturbed)
+    ride = RideData(surface, trajectories, before or {}, modes)
+    with write_whole(path) as partial, _strict():
+        _write(partial, title, bicycle, ride, summary, paint or assign_colours(trajectories))
 
 
-def _write(path: Path, title: str, bicycle: Bicycle, ride: Ride, summary: str, paint: Mapping[str, Colour]) -> None:
+def _write(path: Path, title: str, bicycle: Bicycle, ride: RideData, summary: str, paint: Mapping[str, Colour]) -> None:
     """Write the whole recording to a path."""
     own = mode_plots(ride.modes)
     curves = _curves(ride, (*PLOTS, *own))
     places = np.concatenate([run.q[:, :2] for run in ride.trajectories.values()])
-    ground = ground_of_ride(ride.surface, places[np.isfinite(places).all(axis=1)])
+    ground = make_ground(ride.surface, places[np.isfinite(places).all(axis=1)])
     layout = blueprint(
         tuple(ride.trajectories), ground, {key: {e: v for e, (_, v) in by.items()} for key, by in curves.items()}, own
     )
@@ -267,7 +267,7 @@ def _write(path: Path, title: str, bicycle: Bicycle, ride: Ride, summary: str, p
 
 
 def _send_curve(
-    stream: rr.RecordingStream, key: str, name: str, curve: Curve, paint: Mapping[str, Colour], clock: _Clock
+    stream: rr.RecordingStream, key: str, name: str, curve: PlotCurve, paint: Mapping[str, Colour], clock: _Clock
 ) -> None:
     """One engine's curve of a plot, or the one that theory expects."""
     if name == EXPECTED:

@@ -1,4 +1,4 @@
-"""The drift gate: `check`."""
+"""The drift gate: `check_gate`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from ..error import ScenarioError
-from .options import Json, ShowTraceback, ending_with, print_json, print_traceback, showing_traceback
+from .options import JsonOption, TracebackOption, ending_with, print_json, print_traceback, showing_traceback
 
 
 def check_command(
@@ -38,8 +38,8 @@ def check_command(
     ] = False,
     junit: Annotated[Path | None, typer.Option(help="Write the verdicts as JUnit XML.")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Write the verdicts as Markdown, worst first.")] = None,
-    traceback: ShowTraceback = False,
-    as_json: Json = False,
+    traceback: TracebackOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """The drift gate: run the gated scenarios and hold them against the committed baselines."""
     from rich.console import Console
@@ -48,13 +48,13 @@ def check_command(
     from ..gate import (
         UNFINISHED_JUNIT,
         UNFINISHED_MARKDOWN,
-        check,
+        check_gate,
         junit_xml,
         markdown_page,
         refused_verdicts,
         update_baselines,
     )
-    from ..run import configure, installed
+    from ..run import configure_engine, installed_engines
     from . import present
 
     if reason is not None and not update:
@@ -65,16 +65,16 @@ def check_command(
             _check_path(option, path)
     files = [(junit, junit_xml), (markdown, markdown_page)]
     unfinished = _unfinished({junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN})
-    with showing_traceback(traceback), unfinished, present.Progress() as progress:
+    with showing_traceback(traceback), unfinished, present.ProgressBars() as progress:
         trace = print_traceback if traceback else None
-        verdicts, fresh = check(progress.watch, scenario, engine, baselines, configure, trace, hold_cpu)
+        verdicts, fresh = check_gate(progress.watch, scenario, engine, baselines, configure_engine, trace, hold_cpu)
     for path, page in files:
         if path is not None:
             write_text(path, page(verdicts))
     written = []
     if update:
         # An engine that is not installed any more leaves the baselines; one that broke must not.
-        there = installed()
+        there = installed_engines()
         absent = [
             verdict
             for _, verdict in verdicts

@@ -7,24 +7,33 @@ from typing import Annotated
 
 import typer
 
-from .options import STARTING, Alpha, Ground, Json, angles_of, ending_with, ground_of, print_json
+from .options import (
+    STARTING,
+    AlphaOption,
+    GroundOption,
+    JsonOption,
+    ending_with,
+    parse_angles,
+    parse_ground,
+    print_json,
+)
 
 
 def circular_command(
     rear_rate: Annotated[float, typer.Option(max=1e4, help="Rear-wheel rate [rad/s].")],
-    alpha: Alpha = None,
-    surface: Ground = None,
+    alpha: AlphaOption = None,
+    surface: GroundOption = None,
     family: Annotated[int | None, typer.Option(help="Solution family, 1 to 4.")] = None,
     near: Annotated[str | None, typer.Option(metavar="LEAN,STEER", help="Angles it is near to [rad].")] = None,
-    as_json: Json = False,
+    as_json: JsonOption = False,
 ) -> None:
     """One circular motion: its 21 constants, contact forces, eigenvalues, verdict on stability."""
     from rich.console import Console
 
     from . import present
 
-    angles, ground = angles_of(near), ground_of(alpha, surface)
-    with present.working(STARTING):
+    angles, ground = parse_angles(near), parse_ground(alpha, surface)
+    with present.show_working(STARTING):
         found = present.circular(ground, rear_rate, family, angles)
     with ending_with(0):
         if as_json:
@@ -34,10 +43,10 @@ def circular_command(
 
 
 def families_command(
-    alpha: Alpha = None,
-    surface: Ground = None,
+    alpha: AlphaOption = None,
+    surface: GroundOption = None,
     out: Annotated[Path | None, typer.Option(help="Folder for families.json and the figure families.png.")] = None,
-    as_json: Json = False,
+    as_json: JsonOption = False,
 ) -> None:
     """The four solution families by continuation: special points, stable sections."""
     from rich.console import Console
@@ -45,8 +54,8 @@ def families_command(
     from ..motions import families_document, write_families
     from . import present
 
-    ground = ground_of(alpha, surface)
-    with present.working(STARTING):
+    ground = parse_ground(alpha, surface)
+    with present.show_working(STARTING):
         document = families_document(ground)
     if out is not None:
         write_families(document, out)
@@ -57,14 +66,14 @@ def families_command(
             present.show_families(Console(), document)
 
 
-def critical_command(as_json: Json = False) -> None:
+def critical_command(as_json: JsonOption = False) -> None:
     """The critical α: cusps collide, families merge, their last stable sections vanish."""
     from rich.console import Console
 
     from ..motions import critical_document
     from . import present
 
-    with present.Progress() as progress:
+    with present.ProgressBars() as progress:
         document = critical_document(progress.watch)
     with ending_with(0):
         if as_json:
@@ -79,7 +88,7 @@ def atlas_command(
     ] = Path("atlas"),
     size: Annotated[int, typer.Option(help="Number of motions, roughly.")] = 400_000,
     largest: Annotated[float, typer.Option(help="Largest alpha [1/m], at most 1.")] = 1.0,
-    as_json: Json = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Stability of all circular motions over alpha and rear rate: data, boundaries, figures (half a minute)."""
     from rich.console import Console
@@ -87,7 +96,7 @@ def atlas_command(
     from ..motions import make_atlas
     from . import present
 
-    with present.Progress() as progress:
+    with present.ProgressBars() as progress:
         document = make_atlas(out, size, largest, lambda done: progress.watch("atlas", done, 1.0))
     with ending_with(0):
         if as_json:

@@ -21,24 +21,24 @@ if TYPE_CHECKING:
 
 STARTING = "computing the motion (the first time on a machine, kernels are compiled: half a minute)"
 
-Alpha = Annotated[
+AlphaOption = Annotated[
     float | None, typer.Option("--alpha", help="Shape of the bowl z = alpha (x² + y²) [1/m]; 0 is the plane.")
 ]
-Ground = Annotated[
+GroundOption = Annotated[
     str | None,
     typer.Option("--surface", metavar="KIND:KEY=VALUE,...", help="Another bowl instead, e.g. sphere:radius=20."),
 ]
-Changes = Annotated[
+ChangesOption = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a field, e.g. simulation.duration=5.")
 ]
-Duration = Annotated[float | None, typer.Option(help="Simulated time [s].")]
-ShowTraceback = Annotated[
+DurationOption = Annotated[float | None, typer.Option(help="Simulated time [s].")]
+TracebackOption = Annotated[
     bool, typer.Option("--traceback", help="Show on stderr the whole traceback of an engine that failed.")
 ]
-Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else.")]
 
 
-def changed(change: list[str] | None, duration: float | None) -> dict[str, Any]:
+def parse_changes(change: list[str] | None, duration: float | None) -> dict[str, Any]:
     """Fields that --set and --duration override."""
     changes = dict(_assignment(text) for text in change or [])
     if duration is not None:
@@ -48,36 +48,38 @@ def changed(change: list[str] | None, duration: float | None) -> dict[str, Any]:
 
 def _assignment(text: str) -> tuple[str, Any]:
     """Split KEY=VALUE; the value is TOML, or a plain word."""
-    from ..scenario import read_toml, shown
+    from ..scenario import read_toml, show_value
 
     key, equals, value = text.partition("=")
     key = key.strip()
     if not equals or not key or not all(key.split(".")):
-        raise ScenarioError(f"--set {shown(text)}: must be KEY=VALUE, e.g. simulation.duration=5")
+        raise ScenarioError(f"--set {show_value(text)}: must be KEY=VALUE, e.g. simulation.duration=5")
     try:
         found = read_toml(f"value = {value}")
     except tomllib.TOMLDecodeError:
         return key, value
     except ValueError as error:
-        raise ScenarioError(f"--set {shown(text)}: {error}") from None
+        raise ScenarioError(f"--set {show_value(text)}: {error}") from None
     # A second line would be a second statement.
     return key, found["value"] if len(found) == 1 else value
 
 
-def angles_of(text: str | None) -> tuple[float, float] | None:
+def parse_angles(text: str | None) -> tuple[float, float] | None:
     """Lean and steer that ``--near`` gives [rad]."""
     if text is None:
         return None
     try:
         lean, steer = (float(part) for part in text.split(","))
     except ValueError:
-        from ..scenario import shown
+        from ..scenario import show_value
 
-        raise ScenarioError(f"--near {shown(text)}: must be two angles LEAN,STEER in rad, e.g. 0.74,2.84") from None
+        raise ScenarioError(
+            f"--near {show_value(text)}: must be two angles LEAN,STEER in rad, e.g. 0.74,2.84"
+        ) from None
     return lean, steer
 
 
-def ground_of(alpha: float | None, surface: str | None) -> Surface | float:
+def parse_ground(alpha: float | None, surface: str | None) -> Surface | float:
     """What a motion rides on: one of --alpha and --surface."""
     if (alpha is None) == (surface is None):
         raise ScenarioError("give the bowl by one of --alpha and --surface, e.g. --alpha 0.005")

@@ -22,17 +22,17 @@ from ...reference.families import find_motion
 from ...reference.kinematics import YAW
 from ...reference.stability import growth_rate, linearise
 from ...reference.surface import Surface
-from ...reports.drawing import COLUMNS, cell, remarks, verdict_line
+from ...reports.drawing import COLUMNS, format_cell, format_verdict, make_remarks
 from ..error import ScenarioError
 from ..gate import SHOWN
-from ..scenario import bowl, named
+from ..scenario import make_bowl, name_surface
 
 if TYPE_CHECKING:
     from ..gate import Verdict
-    from ..run import Outcome, Plan
+    from ..run import RunOutcome, RunPlan
 
 
-class Progress:
+class ProgressBars:
     """A bar an engine, on stderr; quiet where stderr is no terminal."""
 
     def __init__(self) -> None:
@@ -46,7 +46,7 @@ class Progress:
         self._bars = bars.Progress(*columns, console=self._console, transient=True)
         self._tasks: dict[str, bars.TaskID] = {}
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> ProgressBars:
         if self._console.is_terminal:
             self._bars.start()
         return self
@@ -68,7 +68,7 @@ class Progress:
 
 
 @contextmanager
-def working(line: str) -> Iterator[None]:
+def show_working(line: str) -> Iterator[None]:
     """Show on a terminal's stderr that something is under way."""
     console = Console(stderr=True)
     if not console.is_terminal:
@@ -78,18 +78,19 @@ def working(line: str) -> Iterator[None]:
         yield
 
 
-def show_outcome(console: Console, plan: Plan, outcome: Outcome) -> None:
+def show_outcome(console: Console, plan: RunPlan, outcome: RunOutcome) -> None:
     """Print the table of a run and where its folder is."""
     duration = plan.scenario.simulation.duration
     console.print()
     console.print(f"{plan.name}: {plan.scenario.title}, {duration:g} s", style="bold", markup=False)
     cells = {
-        name: [cell(values, metric, part) for _, _, metric, part in COLUMNS] for name, values in outcome.metrics.items()
+        name: [format_cell(values, metric, part) for _, _, metric, part in COLUMNS]
+        for name, values in outcome.metrics.items()
     }
     for table in _metric_tables(cells, console.width):
         console.print(table)
     for name, values in outcome.metrics.items():
-        for line in remarks(name, values, duration):
+        for line in make_remarks(name, values, duration):
             console.print(line, style="yellow", markup=False, soft_wrap=True)
     for name, reason in plan.left_out.items():
         console.print(f"{name} left out: {reason}", style="dim", markup=False, highlight=False, soft_wrap=True)
@@ -97,7 +98,7 @@ def show_outcome(console: Console, plan: Plan, outcome: Outcome) -> None:
         console.print(f"{name} did not run: {reason}", style="red", markup=False, soft_wrap=True)
     for verdict in outcome.verdicts:
         style = "green" if verdict["holds"] else "red"
-        console.print(verdict_line(verdict), style=style, markup=False, soft_wrap=True)
+        console.print(format_verdict(verdict), style=style, markup=False, soft_wrap=True)
     command = Path(sys.executable).with_name("velodrome")
     if command.is_relative_to(Path.cwd()):
         command = command.relative_to(Path.cwd())
@@ -132,7 +133,7 @@ def _metric_tables(cells: Mapping[str, list[str]], width: int) -> Iterator[Table
         yield table
 
 
-def outcome_json(plan: Plan, outcome: Outcome) -> dict[str, Any]:
+def outcome_json(plan: RunPlan, outcome: RunOutcome) -> dict[str, Any]:
     """JSON of one run."""
     return {
         "scenario": plan.name,
@@ -165,7 +166,7 @@ def circular(
     ScenarioError
         If there is none.
     """
-    bicycle, surface = Bicycle(), bowl(ground)
+    bicycle, surface = Bicycle(), make_bowl(ground)
     try:
         number, motion = find_motion(bicycle, surface, rear_rate, family, near)
         q, qd = motion.state()
@@ -176,7 +177,7 @@ def circular(
     normal_force = np.einsum("wi,wi->w", motion.force, seen.normal[0])
     growth = growth_rate(surface, reduced.eigenvalues, float(qd[YAW]))
     return {
-        **named(surface),
+        **name_surface(surface),
         "family": number,
         **_constants(motion),
         "contact_point": _by_wheel(seen.point[0].tolist()),

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ..compare import DIFFERS, TO_THE_BIT, WITHIN_ROUND_OFF, remarks
+from ..compare import DIFFERS, TO_THE_BIT, WITHIN_ROUND_OFF, diff_remarks
 
 _COLUMNS = (
     ("largest", "apart", "m"),
@@ -63,7 +63,7 @@ def _lines(document: Mapping[str, Any]) -> list[tuple[str, str]]:
         lines += [(f"{part}: {name} {before} -> {after}", "dim") for name, (before, after) in changes.items()]
     lines += [(note, "yellow") for note in document["notes"]]
     for name, entry in document["engines"].items():
-        lines += [(f"{name}: {line}", "cyan") for line in remarks(entry)]
+        lines += [(f"{name}: {line}", "cyan") for line in diff_remarks(entry)]
         lines += [(f"{name}: {line}", "red") for line in entry["reasons"]]
     for when in ("before", "after"):
         names = document[f"only_{when}"]

@@ -1,4 +1,4 @@
-"""What there is, and the main job: `list` and `run`."""
+"""What there is, and the main job: `list` and `run_plan`."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ import typer
 from ..error import ScenarioError
 from .options import (
     STARTING,
-    Changes,
-    Duration,
-    Json,
-    ShowTraceback,
-    changed,
+    ChangesOption,
+    DurationOption,
+    JsonOption,
+    TracebackOption,
     ending_with,
+    parse_changes,
     print_json,
     print_traceback,
     showing_traceback,
 )
 
 if TYPE_CHECKING:
-    from ..run import Outcome, Plan
+    from ..run import RunOutcome, RunPlan
 
 
-def list_command(as_json: Json = False) -> None:
+def list_command(as_json: JsonOption = False) -> None:
     """Scenarios of the library and installed engines."""
     from ...engines.engine import load_engine
-    from ..run import installed
+    from ..run import installed_engines
     from ..scenario import library_names, load_scenario
 
     scenarios = []
@@ -37,7 +37,7 @@ def list_command(as_json: Json = False) -> None:
         _, scenario = load_scenario(name)
         scenarios.append({"name": name, "title": scenario.title, "tags": list(scenario.tags)})
     engines = []
-    for name in installed():
+    for name in installed_engines():
         try:
             engine = load_engine(name)
             engines.append({"name": name, "version": engine.version, "gives": list(engine.gives)})
@@ -75,30 +75,30 @@ def run_command(
         typer.Option(help="Run only this engine, beside the reference; may be given several times."),
     ] = None,
     tag: Annotated[str | None, typer.Option(help="Run all library scenarios with this tag.")] = None,
-    change: Changes = None,
-    duration: Duration = None,
+    change: ChangesOption = None,
+    duration: DurationOption = None,
     out: Annotated[Path, typer.Option(help="Folder for the run folders.")] = Path("runs"),
-    traceback: ShowTraceback = False,
-    as_json: Json = False,
+    traceback: TracebackOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Run scenarios in every engine from the same computed start and compare with the reference."""
     from rich.console import Console
 
-    from ..run import installed, run
+    from ..run import installed_engines, run_plan
     from . import present
 
     sources = [*(scenario or []), *(_tagged(tag) if tag is not None else [])]
     if not sources:
         raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
-    changes = changed(change, duration)
-    installed()  # an engine that two packages announce is no scenario's fault
-    with showing_traceback(traceback), present.working(STARTING):
+    changes = parse_changes(change, duration)
+    installed_engines()  # an engine that two packages announce is no scenario's fault
+    with showing_traceback(traceback), present.show_working(STARTING):
         plans = [_plan(source, changes, engine) for source in dict.fromkeys(sources)]
     console = Console(stderr=as_json)
     outcomes = []
     for plan in plans:
-        with present.Progress() as progress:
-            outcome = run(plan, out, progress.watch, progress.note, print_traceback if traceback else None)
+        with present.ProgressBars() as progress:
+            outcome = run_plan(plan, out, progress.watch, progress.note, print_traceback if traceback else None)
         outcomes.append((plan, outcome))
         with ending_with(0):  # the next run does not depend on a reader of this one's table
             present.show_outcome(console, plan, outcome)
@@ -109,7 +109,7 @@ def run_command(
             print_json({"runs": [present.outcome_json(plan, outcome) for plan, outcome in outcomes]})
 
 
-def _status_of(outcomes: Sequence[Outcome]) -> int:
+def _status_of(outcomes: Sequence[RunOutcome]) -> int:
     """Exit status: 130 after Ctrl-C, 1 if an engine did not run or a verdict falls short."""
     if any(outcome.interrupted for outcome in outcomes):
         return 130
@@ -117,7 +117,7 @@ def _status_of(outcomes: Sequence[Outcome]) -> int:
     return 0 if all(holds) else 1
 
 
-def _plan(source: str, changes: dict[str, Any], wanted: list[str] | None) -> Plan:
+def _plan(source: str, changes: dict[str, Any], wanted: list[str] | None) -> RunPlan:
     from ..run import plan_run
     from ..scenario import load_scenario
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from ..error import ScenarioError
-from ..scenario import shown
+from ..scenario import show_value
 from ..sweep import (
     STATUSES,
     SweepView,
@@ -20,15 +20,15 @@ from ..sweep import (
     run_sweep,
     show_summary,
     status_of,
-    summary,
+    summarise_sweep,
 )
 from .options import ending_with, print_json
-from .present import working
+from .present import show_working
 
 FOLDER = Path("sweeps")
 
 
-def sweep(
+def run_sweep_command(
     path: Path,
     scheduler: str | None,
     workers: int | None,
@@ -72,13 +72,17 @@ def sweep(
         raise ScenarioError("--retry: it belongs to --resume, which goes on with a sweep")
     for status in retry:
         if status not in STATUSES:
-            raise ScenarioError(f"--retry {shown(status)}: no row has such a status; there are {', '.join(STATUSES)}")
-    with working("checking every run of the sweep (the first time on a machine, kernels are compiled: half a minute)"):
+            raise ScenarioError(
+                f"--retry {show_value(status)}: no row has such a status; there are {', '.join(STATUSES)}"
+            )
+    with show_working(
+        "checking every run of the sweep (the first time on a machine, kernels are compiled: half a minute)"
+    ):
         plan = plan_sweep(path)
     work = _work(scheduler, workers)
     with SweepView(len(plan.tasks)) as view:
         outcome = run_sweep(plan, FOLDER / plan.name if out is None else out, work, resume, view.watch, retry)
-    document = summary(plan, outcome)
+    document = summarise_sweep(plan, outcome)
     with ending_with(0):
         show_summary(Console(stderr=as_json), document, resume_command(plan, outcome, retry))
         if as_json:

@@ -1,4 +1,4 @@
-"""Stored runs: `diff` and `view`."""
+"""Stored runs: `diff_runs` and `view`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..error import ScenarioError
-from .options import Json, ending_with, print_json, show_written
+from .options import JsonOption, ending_with, print_json, show_written
 
 
 def diff_command(
@@ -19,18 +19,18 @@ def diff_command(
         typer.Option(help="Compare only this engine, beside the reference; may be given several times."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for diff.json, diff.md and the recording diff.rrd.")] = None,
-    as_json: Json = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Two stored runs of one scenario against each other: what moved by more than round-off."""
     from rich.console import Console
 
-    from ..compare import diff, read_pair, write_diff
-    from ..run import installed
+    from ..compare import diff_runs, read_pair, write_diff
+    from ..run import installed_engines
     from .present_diff import show_diff
 
-    installed()  # an engine that two packages announce is no fault of either run
+    installed_engines()  # an engine that two packages announce is no fault of either run
     pair = read_pair(before, after, engine)
-    found = diff(pair)
+    found = diff_runs(pair)
     written = [] if out is None else write_diff(pair, found, out)
     with ending_with(0 if found["same"] else 1):
         if as_json:

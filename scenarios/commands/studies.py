@@ -1,4 +1,4 @@
-"""What takes its time: `paper` and `precision`."""
+"""What takes its time: `paper` and `study_precision`."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 
 from .options import (
-    Changes,
-    Duration,
-    Json,
-    ShowTraceback,
-    changed,
+    ChangesOption,
+    DurationOption,
+    JsonOption,
+    TracebackOption,
     ending_with,
+    parse_changes,
     print_json,
     print_traceback,
     show_written,
@@ -23,21 +23,21 @@ from .options import (
 
 def paper_command(
     out: Annotated[Path | None, typer.Option(help="Folder for the figures, tables and ledger.")] = None,
-    as_json: Json = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Every figure and printed number of Xiong et al. (2020), computed and held against the print."""
     from rich.console import Console
 
     from ..files import make_folder
-    from ..paper import document, make_ledger, show_ledger, write_paper
+    from ..paper import ledger_document, make_ledger, show_ledger, write_paper
     from . import present
 
     if out is not None:
         make_folder(out)  # before the work: half a minute of it would be for nothing
-    with present.Progress() as progress:
+    with present.ProgressBars() as progress:
         lines = make_ledger(lambda part, done, parts: progress.watch(part, done, parts))
         written = [] if out is None else write_paper(out, lines, progress.watch)
-    found = document(lines)
+    found = ledger_document(lines)
     with ending_with(0 if found["holds"] else 1):
         if as_json:
             print_json(found)
@@ -52,8 +52,8 @@ def precision_command(
         list[str] | None,
         typer.Option(help="Study only this engine, beside the reference; may be given several times."),
     ] = None,
-    change: Changes = None,
-    duration: Duration = None,
+    change: ChangesOption = None,
+    duration: DurationOption = None,
     levels: Annotated[
         int,
         typer.Option(
@@ -62,24 +62,24 @@ def precision_command(
     ] = 5,
     eigenvalues: Annotated[bool, typer.Option(help="Measure each engine's own eigenvalues too.")] = True,
     out: Annotated[Path | None, typer.Option(help="Folder for the document and its figure.")] = None,
-    traceback: ShowTraceback = False,
-    as_json: Json = False,
+    traceback: TracebackOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Work-precision: error and CPU time over step sizes, observed order, limit, the engine's own eigenvalues."""
     from rich.console import Console
 
     from ..files import make_folder
     from ..scenario import load_scenario
-    from ..studies import all_ran, precision, write_precision
+    from ..studies import all_ran, study_precision, write_precision
     from . import present
 
-    changes = changed(change, duration)
+    changes = parse_changes(change, duration)
     name, loaded = load_scenario(scenario, changes)
     if out is not None:
         make_folder(out)  # before the work
-    with showing_traceback(traceback), present.Progress() as progress:
+    with showing_traceback(traceback), present.ProgressBars() as progress:
         trace = print_traceback if traceback else None
-        document = precision(name, loaded, engine, levels, eigenvalues, progress.watch, trace)
+        document = study_precision(name, loaded, engine, levels, eigenvalues, progress.watch, trace)
     written = [] if out is None else write_precision(document, out)
     with ending_with(0 if all_ran(document) else 1):
         if as_json:

@@ -1,4 +1,4 @@
-"""Many runs: `sweep`."""
+"""Many runs: `run_sweep_command`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Json
+from .options import JsonOption
 
 
 def sweep_command(
@@ -29,11 +29,11 @@ def sweep_command(
             help="With --resume: do rows of this status again, such as timeout or failed; may be given several times.",
         ),
     ] = None,
-    as_json: Json = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Many runs over a grid, a list or a Latin hypercube, on local processes or a Dask cluster."""
-    from .run_sweep import sweep
+    from .run_sweep import run_sweep_command
 
-    status = sweep(file, scheduler, workers, out, resume, as_json, retry or [])
+    status = run_sweep_command(file, scheduler, workers, out, resume, as_json, retry or [])
     if status:
         raise typer.Exit(status)

@@ -1,6 +1,6 @@
 """Two stored runs of one scenario against each other."""
 
-from .differences import DIFFERS, TO_THE_BIT, WITHIN_ROUND_OFF, remarks
-from .folders import diff, read_pair, write_diff
+from .differences import DIFFERS, TO_THE_BIT, WITHIN_ROUND_OFF, diff_remarks
+from .folders import diff_runs, read_pair, write_diff
 
-__all__ = ["DIFFERS", "TO_THE_BIT", "WITHIN_ROUND_OFF", "diff", "read_pair", "remarks", "write_diff"]
+__all__ = ["DIFFERS", "TO_THE_BIT", "WITHIN_ROUND_OFF", "diff_remarks", "diff_runs", "read_pair", "write_diff"]

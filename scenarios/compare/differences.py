@@ -24,8 +24,8 @@ import numpy as np
 from ...engines.engine import Trajectory
 from ...reference.bicycle import Bicycle
 from ...reference.surface import Surface
-from ...reports.drawing import escaped
-from ...reports.measure import Scale, follow, noise, number, position_errors, ride_limits, until_fall
+from ...reports.drawing import escape_markdown
+from ...reports.measure import Scale, evaluate_ride, noise, position_errors, ride_limits, to_number, until_fall
 from .fields import field_differences
 
 TO_THE_BIT, WITHIN_ROUND_OFF, DIFFERS = "same to the bit", "same within round-off", "differs"
@@ -54,7 +54,7 @@ class StoredRun:
 
 
 @dataclass(frozen=True)
-class Ground:
+class StoredGround:
     """What both runs ride on and with, and the sizes of the ride.
 
     Attributes
@@ -71,7 +71,7 @@ class Ground:
 
 
 def diff_document(
-    before: StoredRun, after: StoredRun, ground: Ground, step_noise: Mapping[str, float]
+    before: StoredRun, after: StoredRun, ground: StoredGround, step_noise: Mapping[str, float]
 ) -> dict[str, Any]:
     """Compare two runs of one scenario from one start.
 
@@ -117,7 +117,7 @@ def _changed(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, l
     return {name: [before.get(name), after.get(name)] for name in names if before.get(name) != after.get(name)}
 
 
-def _engine(name: str, before: StoredRun, after: StoredRun, ground: Ground, step_noise: float) -> dict[str, Any]:
+def _engine(name: str, before: StoredRun, after: StoredRun, ground: StoredGround, step_noise: float) -> dict[str, Any]:
     """One engine's part of the document."""
     facts = [run.manifest["engines"][name] for run in (before, after)]
     entry: dict[str, Any] = {
@@ -160,9 +160,9 @@ def _engine(name: str, before: StoredRun, after: StoredRun, ground: Ground, step
     }
 
 
-def _until_fall(ride: Trajectory, ground: Ground) -> Trajectory:
+def _until_fall(ride: Trajectory, ground: StoredGround) -> Trajectory:
     """The ride as stored, up to the fall that its coordinates show."""
-    followed = follow(ride, ground.bicycle, ground.surface)
+    followed = evaluate_ride(ride, ground.bicycle, ground.surface)
     return ride.first(len(until_fall(followed, ground.bicycle, ground.surface).time))
 
 
@@ -218,9 +218,9 @@ def _position_difference(rides: Sequence[Trajectory], radius: float, reach: Call
     most = int(distance.argmax())
     return {
         "samples": telling,
-        "max": number(distance[most]),
+        "max": to_number(distance[most]),
         "max_at": float(time[most]),
-        "end": number(distance[-1]),
+        "end": to_number(distance[-1]),
         "end_limit": float(allowed[-1]),
         "compared_until": float(time[-1]),
         "horizon": float(time[-1]) if cut else None,
@@ -316,16 +316,18 @@ def diff_markdown(document: Mapping[str, Any]) -> str:
     """The document, with its ``notes``, as a page: the verdict, then a part an engine."""
     names = [run["name"] for run in document["runs"]]
     word = "the same within round-off" if document["same"] else "not the same"
-    title = escaped(f"{document['title']}: {names[0]} against {names[1]}")
+    title = escape_markdown(f"{document['title']}: {names[0]} against {names[1]}")
     lines = [f"# {title}", "", f"The engines in both runs are {word}.", ""]
     for part, changes in document["differs"].items():
-        lines += [f"- {part}: {escaped(f'{name} {_shown(a)} -> {_shown(b)}')}" for name, (a, b) in changes.items()]
-    lines += [f"- {escaped(note)}" for note in document["notes"]]
+        lines += [
+            f"- {part}: {escape_markdown(f'{name} {_shown(a)} -> {_shown(b)}')}" for name, (a, b) in changes.items()
+        ]
+    lines += [f"- {escape_markdown(note)}" for note in document["notes"]]
     for when, names in (("before", document["only_before"]), ("after", document["only_after"])):
-        lines += [f"- only in the run {when}: {escaped(', '.join(names))}"] if names else []
+        lines += [f"- only in the run {when}: {escape_markdown(', '.join(names))}"] if names else []
     for name, entry in document["engines"].items():
-        said = [f"- {escaped(line)}" for line in [*remarks(entry), *entry["reasons"]]]
-        lines += ["", f"## {escaped(name)}: {entry['verdict']}", "", *said]
+        said = [f"- {escape_markdown(line)}" for line in [*diff_remarks(entry), *entry["reasons"]]]
+        lines += ["", f"## {escape_markdown(name)}: {entry['verdict']}", "", *said]
         if entry["fields"]:
             lines += [*([""] if said else []), *_field_table(entry["fields"])]
             said = ["a table"]
@@ -351,7 +353,7 @@ def _field_table(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
     return rows
 
 
-def remarks(entry: Mapping[str, Any]) -> list[str]:
+def diff_remarks(entry: Mapping[str, Any]) -> list[str]:
     """What a reader must know of an engine's part: version and settings that differ, and how far it was compared."""
     before, after = entry["version"]
     lines = [f"version {before} -> {after}"] if before != after else []

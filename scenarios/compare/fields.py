@@ -23,10 +23,10 @@ from typing import Any
 import numpy as np
 
 from ...engines.engine import Trajectory
-from ...engines.storage import columns
+from ...engines.storage import trajectory_columns
 from ...reference.bicycle import BODIES
 from ...reference.kinematics import FRONT_ANGLE, REAR_ANGLE
-from ...reports.measure import TURNING, Scale, number
+from ...reports.measure import TURNING, Scale, to_number
 
 Growth = Callable[[float], float]
 
@@ -61,7 +61,7 @@ def field_differences(
     before, after = (ride.first(samples) for ride in rides)
     growth = np.array([[noise(t), reach(t)] for t in before.time.tolist()])
     found = {}
-    for field, names in columns():
+    for field, names in trajectory_columns():
         a, b = getattr(before, field), getattr(after, field)
         if a is None or b is None:
             if a is not b:
@@ -148,7 +148,7 @@ def _worst(names: list[tuple[str, str]], time: np.ndarray, apart: np.ndarray, al
     return {
         "column": names[column][0],
         "unit": names[column][1],
-        "max": number(most),
+        "max": to_number(most),
         "max_at": float(time[sample]),
         "allowed": float(allowed[sample, column]),
         "exceeds_at": float(time[first]) if len(begin) else None,

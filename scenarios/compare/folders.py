@@ -12,13 +12,13 @@ import numpy as np
 
 from ...engines.engine import REFERENCE, Trajectory, load_engine, why_failed
 from ...reference.surface import SurfaceOfRevolution
-from ...reports.drawing import colours
-from ...reports.measure import ROUND_OFF, START_ERROR, Scale, as_shown, follow
+from ...reports.drawing import assign_colours
+from ...reports.measure import ROUND_OFF, START_ERROR, Scale, cut_at_fall, evaluate_ride
 from ..error import ScenarioError
 from ..files import make_folder, write_json, write_text
-from ..run import configure, document, installed, part, ride
+from ..run import configure_engine, find_part, installed_engines, read_document, read_ride
 from ..scenario import OF_THE_MOTION, CircularTable, Scenario, load_scenario, make_start
-from .differences import DIFFERS, Ground, StoredRun, diff_document, diff_markdown
+from .differences import DIFFERS, StoredGround, StoredRun, diff_document, diff_markdown
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Pair:
     scenario: Scenario
     before: StoredRun
     after: StoredRun
-    ground: Ground
+    ground: StoredGround
 
 
 def read_pair(first: Path, second: Path, engines: Sequence[str] | None = None) -> Pair:
@@ -56,7 +56,7 @@ def read_pair(first: Path, second: Path, engines: Sequence[str] | None = None) -
     names = (first.resolve().name, second.resolve().name)
     if names[0] == names[1]:
         names = (str(first), str(second))
-    scenarios = [load_scenario(str(part(folder, "scenario.toml")))[1] for folder in (first, second)]
+    scenarios = [load_scenario(str(find_part(folder, "scenario.toml")))[1] for folder in (first, second)]
     _same_scenario(scenarios[0], scenarios[1], first, second)
     runs = [_read(folder, name, engines) for folder, name in zip((first, second), names, strict=True)]
     _same_start(runs[0], runs[1], first, second)
@@ -82,13 +82,13 @@ def _same_scenario(before: Scenario, after: Scenario, first: Path, second: Path)
 
 
 def _read(folder: Path, name: str, engines: Sequence[str] | None) -> StoredRun:
-    manifest, metrics = document(folder, "manifest.json"), document(folder, "metrics.json")
+    manifest, metrics = read_document(folder, "manifest.json"), read_document(folder, "metrics.json")
     try:
         entries = {engine: manifest["engines"][engine] for engine in manifest["engines"] if _chosen(engine, engines)}
         _ = [manifest[key] for key in ("title", "scenario", "created", "complete", "libraries", "platform")]
         _ = [(entry["version"], dict(entry["settings"])) for entry in entries.values()]
         _ = [float(manifest["start"]["growth_rate"]), *_state(manifest)]
-        rides = {engine: ride(folder, manifest, metrics, engine) for engine in entries if engine in metrics}
+        rides = {engine: read_ride(folder, manifest, metrics, engine) for engine in entries if engine in metrics}
     except ScenarioError:
         raise
     except (KeyError, TypeError, AttributeError, ValueError) as error:
@@ -125,16 +125,16 @@ def _same_start(before: StoredRun, after: StoredRun, first: Path, second: Path) 
             raise ScenarioError(f"{first} and {second}: different output times of {engine}")
 
 
-def _ground(scenario: Scenario, run: StoredRun) -> Ground:
+def _ground(scenario: Scenario, run: StoredRun) -> StoredGround:
     bicycle, (q, qd) = scenario.make_bicycle(), _state(run.manifest)
     circular = isinstance(scenario.motion, CircularTable)
     radius = float(np.hypot(q[0], q[1])) if circular else bicycle.wheelbase
     growth_rate = float(run.manifest["start"]["growth_rate"])
     scale = Scale.of(bicycle, qd, radius, growth_rate, scenario.simulation.duration)
-    return Ground(bicycle, scenario.surface.make(), scale)
+    return StoredGround(bicycle, scenario.surface.make(), scale)
 
 
-def diff(pair: Pair) -> dict[str, Any]:
+def diff_runs(pair: Pair) -> dict[str, Any]:
     """The JSON document of `velodrome diff`; ``notes`` say where a limit is not the engine's own."""
     noises, notes = {}, []
     for name, entry in pair.after.manifest["engines"].items():
@@ -150,11 +150,11 @@ def diff(pair: Pair) -> dict[str, Any]:
 
 def _step_noise(name: str, settings: Mapping[str, Any]) -> float | str:
     """Relative error that a step of an engine may add, or why the engine here does not tell it for such settings."""
-    if name not in installed():
+    if name not in installed_engines():
         return "is not installed here"
     try:
         load_engine(name)
-        engine, chosen = configure(name, settings)
+        engine, chosen = configure_engine(name, settings)
         return float(engine.step_noise(chosen))
     except ScenarioError:
         return "is not installed here with such settings"
@@ -183,20 +183,20 @@ def write_diff(pair: Pair, found: Mapping[str, Any], out: Path) -> list[Path]:
 
 def _record(path: Path, pair: Pair, found: Mapping[str, Any], page: str) -> None:
     # rerun takes a second to load; only this needs it.
-    from ...reports.recording import bright, write_recording
+    from ...reports.recording import brighten, write_recording
 
-    ground, hues = pair.ground, colours(found["engines"])
+    ground, hues = pair.ground, assign_colours(found["engines"])
     rides: dict[str, Trajectory] = {}
     paint, earlier = {}, {}
     for engine, entry in found["engines"].items():
         labels = _labels(pair, engine, entry)
         # The later run has the engine's own colour, the earlier one a pale one.
         for run, label, hue in zip(
-            (pair.before, pair.after), labels, (bright(hues[engine]), hues[engine]), strict=True
+            (pair.before, pair.after), labels, (brighten(hues[engine]), hues[engine]), strict=True
         ):
             if engine in run.trajectories:
-                followed = follow(run.trajectories[engine], ground.bicycle, ground.surface)
-                rides[label] = as_shown(followed, ground.bicycle, ground.surface)
+                followed = evaluate_ride(run.trajectories[engine], ground.bicycle, ground.surface)
+                rides[label] = cut_at_fall(followed, ground.bicycle, ground.surface)
                 paint[label] = hue
         if labels[0] != labels[1] and all(label in rides for label in labels):
             earlier[labels[1]] = labels[0]

@@ -1,6 +1,6 @@
 """The drift gate: gated scenarios in every engine, held against committed baselines."""
 
-from .checks import check, refused_verdicts, update_baselines
+from .checks import check_gate, refused_verdicts, update_baselines
 from .ci_files import UNFINISHED_JUNIT, UNFINISHED_MARKDOWN, junit_xml, markdown_page
 from .verdict import SHOWN, Verdict
 
@@ -9,7 +9,7 @@ __all__ = [
     "UNFINISHED_JUNIT",
     "UNFINISHED_MARKDOWN",
     "Verdict",
-    "check",
+    "check_gate",
     "junit_xml",
     "markdown_page",
     "refused_verdicts",

@@ -15,22 +15,22 @@ from ...engines.engine import Engine, Settings, UnsuitableProblem, why_failed
 from ...engines.guard import call_engine
 from ..error import ScenarioError
 from ..files import make_folder, write_json
-from ..run import Trace, Watch, configure, installed, library_versions, read_json
+from ..run import RunWatch, Trace, configure_engine, installed_engines, library_versions, read_json
 from ..scenario import (
     OF_THE_MOTION,
     Gate,
     Scenario,
     Simulation,
+    format_validation_error,
     library_names,
     load_scenario,
     make_start,
-    one_line,
     read_toml,
-    shown,
+    show_value,
 )
 from .exact import find_exact
-from .sample import SHORT_HORIZON, sample
-from .verdict import ABSOLUTE, CHANGES, Verdict, judge, missing
+from .sample import SHORT_HORIZON, take_sample
+from .verdict import ABSOLUTE, CHANGES, Verdict, judge_sample, missing_verdict
 
 BASELINES = Path(__file__).parent / "baselines"
 GATED_TAG = "gated"
@@ -76,12 +76,12 @@ def gate_settings() -> dict[str, dict[str, Any]]:
     return read_toml(_SETTINGS.read_text(encoding="utf-8"))["engines"]
 
 
-def check(
-    watch: Watch,
+def check_gate(
+    watch: RunWatch,
     sources: Sequence[str] | None = None,
     engines: Sequence[str] | None = None,
     baselines: Path | None = None,
-    chosen: Chosen = configure,
+    chosen: Chosen = configure_engine,
     trace: Trace | None = None,
     hold_cpu: bool = False,
 ) -> tuple[list[tuple[str, Verdict]], dict[str, dict[str, Any]]]:
@@ -119,7 +119,7 @@ def check(
         If a scenario or a baseline is none, or an engine is neither installed nor in a baseline.
     """
     folder = BASELINES if baselines is None else baselines
-    scenarios = [as_gated(source) for source in (sources or gated_names())]
+    scenarios = [load_gated(source) for source in (sources or gated_names())]
     known = {name: read_baseline(name, folder, scenario) for name, scenario in scenarios}
     judged = _to_judge(engines, known)
     verdicts: list[tuple[str, Verdict]] = []
@@ -130,7 +130,7 @@ def check(
         fresh[name] = {
             "scenario": name,
             **_ride(scenario),
-            "content": content(scenario),
+            "content": gated_content(scenario),
             "libraries": library_versions(),
             "exact_error": held.exact_error,
             "engines": held.entries,
@@ -140,7 +140,7 @@ def check(
     return verdicts, fresh
 
 
-def as_gated(source: str) -> tuple[str, Scenario]:
+def load_gated(source: str) -> tuple[str, Scenario]:
     """Name of a scenario, and the scenario as the gate rides it."""
     name, scenario = load_scenario(source)
     gate = scenario.gate or Gate()
@@ -160,7 +160,7 @@ def _ride(scenario: Scenario) -> dict[str, float]:
 
 def _to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Names of the engines to judge; those of a baseline count too: one that is gone did not run."""
-    there = installed()
+    there = installed_engines()
     names = [*there, *sorted({name for entries in known.values() for name in entries} - set(there))]
     for engine in wanted or []:
         if engine not in names:
@@ -186,7 +186,7 @@ def _hold(
     scenario: Scenario,
     engines: Sequence[str],
     baseline: Mapping[str, Any],
-    watch: Watch,
+    watch: RunWatch,
     chosen: Chosen,
     trace: Trace | None,
     asked: bool,
@@ -208,7 +208,7 @@ def _hold(
             values = gate_settings().get(engine_name, {}) | scenario.engines.get(engine_name, {})
             engine, settings = chosen(engine_name, values)
             found = call_engine(
-                sample,
+                take_sample,
                 start,
                 exact,
                 scenario.gate or Gate(),
@@ -224,7 +224,7 @@ def _hold(
                 continue
             own_words = isinstance(error, ScenarioError | UnsuitableProblem)
             why = " ".join(str(error).split()) if own_words else why_failed(error)
-            held.verdicts.append(missing(engine_name, f"did not run: {why}"))
+            held.verdicts.append(missing_verdict(engine_name, f"did not run: {why}"))
             if trace is not None:
                 trace(engine_name, error)
             continue
@@ -237,11 +237,11 @@ def _hold(
             "quantities": found.values,
         }
         run = (found.settings, found.version, found.reasons)
-        held.verdicts.extend(judge(engine_name, found.values, entry, found.limits, *run))
+        held.verdicts.extend(judge_sample(engine_name, found.values, entry, found.limits, *run))
     return held
 
 
-def _report(watch: Watch, engine: str, duration: float, time: float) -> None:
+def _report(watch: RunWatch, engine: str, duration: float, time: float) -> None:
     watch(engine, time, duration)
 
 
@@ -249,10 +249,14 @@ def _without_verdict(engines: Sequence[str], held: _Held) -> list[Verdict]:
     """Verdicts on engines that should have been judged and were not: nothing that is known of them holds."""
     judged = {verdict.engine for verdict in held.verdicts if verdict.quantity != CHANGES}
     expected = [name for name in engines if name not in held.passed_over]
-    return [missing(name, "did not run: none of its quantities was judged") for name in expected if name not in judged]
+    return [
+        missing_verdict(name, "did not run: none of its quantities was judged")
+        for name in expected
+        if name not in judged
+    ]
 
 
-def content(scenario: Scenario) -> dict[str, Any]:
+def gated_content(scenario: Scenario) -> dict[str, Any]:
     """What of a scenario its motion depends on, as JSON values."""
     return scenario.model_dump(mode="json", exclude_none=True, include={*OF_THE_MOTION})
 
@@ -285,16 +289,16 @@ def read_baseline(name: str, folder: Path | None = None, scenario: Scenario | No
     except OSError as error:
         raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from error
     except ValueError as error:
-        why = one_line(error) if isinstance(error, ValidationError) else " ".join(str(error).split())
+        why = format_validation_error(error) if isinstance(error, ValidationError) else " ".join(str(error).split())
         raise ScenarioError(f"{path}: not a baseline: {why}") from error
     if found.scenario not in (None, name):
-        raise ScenarioError(f"{path}: not the baseline of {name} but of {shown(repr(found.scenario))}")
+        raise ScenarioError(f"{path}: not the baseline of {name} but of {show_value(repr(found.scenario))}")
     if scenario is None:
         return data["engines"]
     for field, value in _ride(scenario).items():
         if (came := getattr(found, field)) != value:
             raise ScenarioError(f"{path}: not a baseline of this ride: its {field} is {came!r}, not {value!r}")
-    if found.content not in (None, content(scenario)):
+    if found.content not in (None, gated_content(scenario)):
         raise ScenarioError(f"{path}: not the baseline of this {name}: its motion, ground or bicycle is another")
     return data["engines"]
 
@@ -332,7 +336,7 @@ def update_baselines(
     """
     folder = BASELINES if baselines is None else baselines
     make_folder(folder)
-    paths, there = [], installed()
+    paths, there = [], installed_engines()
     out = {(scenario, verdict.engine) for scenario, verdict in refused_verdicts(verdicts)}
     for name, baseline in fresh.items():
         entries = {engine: entry for engine, entry in baseline["engines"].items() if (name, engine) not in out}

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from xml.etree import ElementTree
 
-from ...reports.drawing import escaped, printable
+from ...reports.drawing import escape_markdown, make_printable
 from .verdict import Verdict
 
 Verdicts = Sequence[tuple[str, Verdict]]
@@ -48,7 +48,7 @@ def junit_xml(verdicts: Verdicts) -> str:
                 suite, "testcase", classname=f"{name}.{verdict.engine}", name=verdict.quantity
             )
             if not verdict.passes:
-                ElementTree.SubElement(case, "failure", type=verdict.status, message=printable(verdict.reason))
+                ElementTree.SubElement(case, "failure", type=verdict.status, message=make_printable(verdict.reason))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 
@@ -76,8 +76,8 @@ def markdown_page(verdicts: Verdicts) -> str:
     ordered = sorted(verdicts, key=lambda item: _WORST_FIRST.index(item[1].status))
     moved = [(name, one) for name, one in ordered if one.told]
     for name, verdict in moved:
-        reason = escaped(verdict.reason)
-        who = escaped(f"{name}, {verdict.engine}")
+        reason = escape_markdown(verdict.reason)
+        who = escape_markdown(f"{name}, {verdict.engine}")
         lines.append(f"- **{verdict.status}** {who}, {verdict.quantity}: {reason}")
     lines += [""] if moved else []
     lines += [
@@ -86,7 +86,7 @@ def markdown_page(verdicts: Verdicts) -> str:
     ]
     for name, verdict in ordered:
         numbers = (_number(value) for value in (verdict.value, verdict.baseline, verdict.limit))
-        cells = (escaped(name), escaped(verdict.engine), verdict.quantity, *numbers, verdict.status)
+        cells = (escape_markdown(name), escape_markdown(verdict.engine), verdict.quantity, *numbers, verdict.status)
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...engines.admission import ride
+from ...engines.admission import ride_engine
 from ...engines.engine import REFERENCE, Problem, Settings, Trajectory, load_engine
 from ...reference.height_field import HeightField
 from ...reference.profile import SplineProfile
@@ -115,7 +115,7 @@ def scale_of(start: Start) -> Scale:
 
 
 def _precise(problem: Problem, settings: Settings) -> Trajectory:
-    trajectory = ride(load_engine(REFERENCE), problem, settings, lambda _: None)
+    trajectory = ride_engine(load_engine(REFERENCE), problem, settings, lambda _: None)
     if trajectory.ended is not None:
         raise ScenarioError(f"the reference ends at {trajectory.time[-1]:.6g} s: {trajectory.ended}")
     return trajectory

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...engines.admission import ride
+from ...engines.admission import ride_engine
 from ...engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory, load_engine, why_failed
 from ...reference.kinematics import YAW
 from ...reference.stability import growth_rate, linearise, sorted_eigenvalues
@@ -22,14 +22,14 @@ from ...reports.measure import (
     STENCIL_WEIGHT,
     Mismatch,
     Scale,
-    describe,
+    describe_mismatch,
     eigenvalue_limits,
+    eigenvalue_pairs,
+    evaluate_ride,
     fell_at,
-    follow,
+    find_mismatches,
     interval_of,
     jacobian_at,
-    match,
-    mismatches,
     noise,
     observed_orders,
     order_limit,
@@ -46,8 +46,8 @@ from ..scenario import Gate, Start
 from .exact import Exact, scale_of
 from .verdict import BELOW_NOISE, HELD_CPU, RIDE_QUANTITIES, SHOWN
 
-Found = dict[str, tuple[float | None, float | None]]  # value and limit by quantity
-Measured = tuple[Found, dict[str, str]]  # and why there is no value
+FoundEigenvalues = dict[str, tuple[float | None, float | None]]  # value and limit by quantity
+Measured = tuple[FoundEigenvalues, dict[str, str]]  # and why there is no value
 
 EIGENVALUE_QUANTITIES = ("eigenvalue_error", "growth_rate_error")
 SHORT_HORIZON = 1.0  # of the first error and of the order [s]
@@ -90,7 +90,7 @@ class Sample:
     settings: dict[str, Any]
 
 
-def sample(
+def take_sample(
     start: Start,
     exact: Exact,
     gate: Gate,
@@ -135,8 +135,8 @@ def sample(
     if not 0 <= own_noise <= LARGEST_NOISE:
         raise EngineError(f"its step_noise is {own_noise!r}; it must be from 0 to {LARGEST_NOISE:g}")
     step_noise = own_noise if known_noise is None else min(own_noise, known_noise)
-    trajectory = ride(engine, problem, settings, watch)
-    followed = follow(trajectory, problem.bicycle, problem.surface)
+    trajectory = ride_engine(engine, problem, settings, watch)
+    followed = evaluate_ride(trajectory, problem.bicycle, problem.surface)
     fall = fell_at(followed, problem.bicycle, problem.surface)
     if trajectory.ended is not None and fall is None:
         raise EngineError(trajectory.ended)
@@ -153,7 +153,7 @@ def sample(
         raise EngineError("it returned the reference's own trajectory")
     # As many steps as the part that is measured took.
     steps = trajectory.steps * scale.duration / float(trajectory.time[-1])
-    reports = mismatches(reported, standing, exact.trajectory, start.size, step_noise)
+    reports = find_mismatches(reported, standing, exact.trajectory, start.size, step_noise)
     values = _ride_values(start, reported, standing, exact.trajectory, scale) | {
         "report_mismatch": max(report.share for report in reports),
         "fell_at": fall,
@@ -187,7 +187,7 @@ def sample(
 
 def _disagreement(reports: Sequence[Mismatch]) -> dict[str, str]:
     """Why the reports of an engine do not agree with its coordinates; none where they do."""
-    lines = [describe(report.as_json()) for report in reports if not report.holds]
+    lines = [describe_mismatch(report.as_json()) for report in reports if not report.holds]
     return {"report_mismatch": "; ".join(lines)} if lines else {}
 
 
@@ -225,8 +225,8 @@ def _cpu_ratio(engine: Engine, problem: Problem, settings: Settings) -> float | 
     reference = load_engine(REFERENCE)
     pairs = []
     for _ in range(_CPU_PAIRS):
-        ours = ride(reference, problem, reference.settings(), lambda _: None).cpu_time
-        pairs.append(_ratio(ride(engine, problem, settings, lambda _: None).cpu_time, ours))
+        ours = ride_engine(reference, problem, reference.settings(), lambda _: None).cpu_time
+        pairs.append(_ratio(ride_engine(engine, problem, settings, lambda _: None).cpu_time, ours))
     ratios = [ratio for ratio in pairs if ratio is not None]
     return float(np.median(ratios)) if ratios else None
 
@@ -238,10 +238,10 @@ def _ratio(time: float, reference: float) -> float | None:
 def _order(start: Start, engine: Engine, settings: Settings, step_noise: float) -> Measured:
     """Order of convergence over the short horizon with its limit, or why there is none."""
     short = replace(start.problem, times=ORDER_INTERVAL * np.arange(round(SHORT_HORIZON / ORDER_INTERVAL) + 1))
-    none: Found = {"observed_order": (None, None)}
+    none: FoundEigenvalues = {"observed_order": (None, None)}
     try:
         ladder = [settings.refined(factor) for factor in FACTORS]
-        rides = [ride(engine, short, refined, lambda _: None) for refined in ladder]
+        rides = [ride_engine(engine, short, refined, lambda _: None) for refined in ladder]
     except ValueError as error:  # settings without a step, or of a step at the end of its range or beside the interval
         return none, {"observed_order": " ".join(str(error).split())}
     for one, factor in zip(rides, FACTORS, strict=True):
@@ -261,7 +261,7 @@ def _order(start: Start, engine: Engine, settings: Settings, step_noise: float) 
     return {"observed_order": (observed_orders(paths)[-1], limit)}, {}
 
 
-def _eigenvalues(start: Start, engine: Engine, settings: Settings, rate: float, step_noise: float) -> Found:
+def _eigenvalues(start: Start, engine: Engine, settings: Settings, rate: float, step_noise: float) -> FoundEigenvalues:
     """How far the engine's own eigenvalues are from the reference's, at ``rate`` steps a second.
 
     Those that decay within the interval of the flow from which they are measured are left out: little is left of
@@ -275,7 +275,7 @@ def _eigenvalues(start: Start, engine: Engine, settings: Settings, rate: float, 
     scale = replace(scale_of(start), duration=1.5 * interval)
     error = noise(scale, step_noise, ceil(rate * scale.duration))
     allowed = eigenvalue_limits(exact.jacobian, scale, error, DISTURBANCES, STENCIL_WEIGHT, interval)
-    found = match(exact.eigenvalues, sorted_eigenvalues(jacobian))
+    found = eigenvalue_pairs(exact.eigenvalues, sorted_eigenvalues(jacobian))
     slow = np.real(exact.eigenvalues) > -1 / interval
     yaw_rate = float(start.undisturbed[1][YAW])
     growth = [growth_rate(problem.surface, values, yaw_rate) for values in (found, exact.eigenvalues)]

@@ -105,7 +105,7 @@ class Verdict:
         return asdict(self) | {"passes": self.passes}
 
 
-def judge(
+def judge_sample(
     engine: str,
     values: Mapping[str, float | None],
     baseline: Mapping[str, Any] | None,
@@ -136,7 +136,7 @@ def judge(
     """
     absolute = [_absolute(engine, name, values, allowed, reasons or {}) for name in ABSOLUTE if name in allowed]
     if baseline is None:
-        without = missing(engine, "no baseline; velodrome check --update writes one")
+        without = missing_verdict(engine, "no baseline; velodrome check --update writes one")
         return [without, *(verdict for verdict in absolute if not verdict.passes)]
     changes = _changes(baseline, settings, version)
     stored = " ".join(["the baseline", *(["of " + baseline["created"]] if "created" in baseline else [])])
@@ -217,7 +217,7 @@ def _status(quantity: str, value: float, before: float, limit: float, excused: b
     return "better" if excused and growth < -limit else "changed"
 
 
-def missing(engine: str, reason: str) -> Verdict:
+def missing_verdict(engine: str, reason: str) -> Verdict:
     """Verdict on an engine that gives nothing to judge: it fails."""
     return Verdict(engine, "run", None, None, None, "missing", reason)
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...engines.storage import write_columns
-from ...reference.atlas import SIZE, Atlas, Boundary, atlas, spacing
+from ...reference.atlas import ATLAS_SIZE, Atlas, Boundary, compute_atlas, spacing
 from ...reference.bicycle import Bicycle
 from ...reference.stability import VARIABLES
 from ..error import ScenarioError
@@ -36,7 +36,7 @@ _SEEN = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "radiu
 
 
 def make_atlas(
-    out: Path, size: int = SIZE, largest: float = 1.0, progress: Callable[[float], None] = lambda _: None
+    out: Path, size: int = ATLAS_SIZE, largest: float = 1.0, progress: Callable[[float], None] = lambda _: None
 ) -> dict[str, Any]:
     """Compute the atlas and write ``atlas.parquet``, ``boundaries.json`` and the figures into a folder.
 
@@ -69,7 +69,7 @@ def make_atlas(
         raise ScenarioError(f"--largest {largest!r}: it must lie above 0 and not above 1, in 1/m")
     make_folder(out)
     alphas, longest = spacing(size, largest)
-    found = atlas(Bicycle(), alphas, longest, lambda fraction: progress(0.9 * fraction))
+    found = compute_atlas(Bicycle(), alphas, longest, lambda fraction: progress(0.9 * fraction))
     columns, document = atlas_columns(found), atlas_document(found)
     write_atlas(columns, out / "atlas.parquet", {"longest_step": longest, "bicycle": asdict(found.bicycle)})
     write_json(out / "boundaries.json", document)

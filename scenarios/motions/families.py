@@ -11,15 +11,15 @@ import numpy as np
 from ...reference.bicycle import Bicycle
 from ...reference.critical import CriticalPoint, last_stable, reconnections
 from ...reference.families import FAMILIES, Family, trace_all
-from ...reference.modes import MODES, modes
+from ...reference.modes import MODES, follow_modes
 from ...reference.sections import SectionEnd, sample_family, stable_sections
 from ...reference.special import special_points
 from ...reference.standing import motion_stands, stands
 from ...reference.surface import Surface
 from ..files import make_folder, write_json
-from ..scenario import bowl, named
+from ..scenario import make_bowl, name_surface
 
-LONGEST_STEP = 0.05  # of the arc: some 100 to 300 points a family, no stable section known is shorter than three
+LONGEST_DRAWN_STEP = 0.05  # of the arc: some 100 to 300 points a family, no stable section known is shorter than three
 
 
 def families_document(ground: Surface | float) -> dict[str, Any]:
@@ -41,11 +41,11 @@ def families_document(ground: Surface | float) -> dict[str, Any]:
     ScenarioError
         If it is none.
     """
-    surface = bowl(ground)
-    curves, absent = trace_all(Bicycle(), surface, LONGEST_STEP)
+    surface = make_bowl(ground)
+    curves, absent = trace_all(Bicycle(), surface, LONGEST_DRAWN_STEP)
     families = [family_document(curve) for curve in curves]
     return {
-        **named(surface),
+        **name_surface(surface),
         "modes": list(MODES),  # what the columns of eigenvalues are
         "families": families,
         "absent": {str(number): reason for number, reason in absent.items()},
@@ -133,7 +133,7 @@ def _points(family: Family) -> dict[str, list[Any]]:
     """Quantities along the curve, equal-length lists."""
     seen = sample_family(family)
     names = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "radius", "energy")
-    values = modes(family)
+    values = follow_modes(family)
     return {
         **{name: getattr(seen, name).tolist() for name in names},
         "lyapunov_stable": seen.stable.tolist(),

@@ -2,7 +2,7 @@
 
 from .claims import make_ledger
 from .figures.folder import write_paper
-from .ledger import document
+from .ledger import ledger_document
 from .table import show_ledger
 
-__all__ = ["document", "make_ledger", "show_ledger", "write_paper"]
+__all__ = ["ledger_document", "make_ledger", "show_ledger", "write_paper"]

@@ -10,10 +10,10 @@ from ...reference.circular import REAR_SPEED, STEER
 from ...reference.critical import reconnections
 from ...reference.families import FAMILIES, trace
 from ...reference.special import SpecialPoint, special_points
-from .evidence import Evidence, families_command
-from .ledger import Check, Line, above, below, equals, source, words
-from .profile import abscissa, apart, figure_coordinates, nearest
-from .search import search
+from .evidence import Evidence, families_command_line
+from .ledger import Check, LedgerLine, above, below, claim_line, equals, source
+from .profile import abscissa, curve_distance, figure_coordinates, nearest_point
+from .search import search_motions
 
 _PLANE, _SMALL, _AFTER, _DEEP = 0.0, 0.005, 0.05, 0.2
 _ALIKE = 0.2  # rad: curves of the paper's figures, pi/2 wide and pi high, that one would call alike
@@ -25,7 +25,7 @@ _TOUCHING = source(
 _FINE = 0.02  # step of the arc where two curves are near
 
 
-def bowl_lines(evidence: Evidence) -> Iterator[Line]:
+def bowl_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     """Lines on section 3.3."""
     yield from _small_curvature(evidence)
     yield from _collision(evidence)
@@ -38,7 +38,7 @@ def profiles(evidence: Evidence, one: float, other: float, numbers: tuple[int, .
 
     def compute(number: int) -> float:
         curves = (figure_coordinates(evidence.bicycle, evidence.samples(alpha, number)) for alpha in (one, other))
-        return apart(*curves)
+        return curve_distance(*curves)
 
     return [evidence.once(("profiles", number, one, other), lambda n=number: compute(n)) for number in numbers]
 
@@ -47,12 +47,12 @@ def _numbers(values: list[float]) -> str:
     return ", ".join(f"{value:.3f}" for value in values)
 
 
-def _alike(evidence: Evidence, claim: str, one: float, other: float, numbers: tuple[int, ...]) -> Line:
+def _alike(evidence: Evidence, claim: str, one: float, other: float, numbers: tuple[int, ...]) -> LedgerLine:
     """Curves are alike if they end alike and lie near each other in the paper's figures."""
     apart_by = profiles(evidence, one, other, numbers)
     alike = sum(evidence.family(one, n).ends == evidence.family(other, n).ends for n in numbers)
     what = f"families {', '.join(map(str, numbers))}"
-    return words(
+    return claim_line(
         section="3.3",
         claim=claim,
         thresholds=[
@@ -63,32 +63,32 @@ def _alike(evidence: Evidence, claim: str, one: float, other: float, numbers: tu
         f"coordinates and end {'alike' if alike == len(numbers) else 'differently'}; a fifth of a radian counts as "
         "alike",
         source=source(
-            "the families' curves and their largest distance", profiles, command=families_command(one, other)
+            "the families' curves and their largest distance", profiles, command=families_command_line(one, other)
         ),
         checks=[evidence.residual((one, other))],
     )
 
 
-def _small_curvature(evidence: Evidence) -> Iterator[Line]:
+def _small_curvature(evidence: Evidence) -> Iterator[LedgerLine]:
     found = evidence.found(_SMALL)
     static, pivoting = len(found.static), len(found.pivoting)
     whole = [evidence.residual((_PLANE, _SMALL)), evidence.searched_again(_SMALL)]
-    yield words(
+    yield claim_line(
         section="3.3",
         claim="at alpha = 1/200 there is one static equilibrium A and one pivoting motion",
         thresholds=[equals("static equilibria", static, 1), equals("pivoting motions", pivoting, 1)],
         measured=f"a grid of starts finds {static} static equilibrium and {pivoting} pivoting motion",
-        source=source("static equilibria and pivoting motions", search, search=found.described),
+        source=source("static equilibria and pivoting motions", search_motions, search=found.described),
         checks=whole,
     )
     ends = [evidence.family(_SMALL, number).points[0].unknowns for number in (3, 4)]
     off = float(np.abs(np.abs(ends[0]) - np.abs(ends[1])).max())
-    yield words(
+    yield claim_line(
         section="3.3",
         claim="at alpha = 1/200 G of family 3 and H of family 4 are one motion",
         thresholds=[below("largest difference of their constants", off, 1e-12)],
         measured=f"their constants differ by {off:.0e}",
-        source=source("the ends of families 3 and 4", trace, command=families_command(_SMALL)),
+        source=source("the ends of families 3 and 4", trace, command=families_command_line(_SMALL)),
         checks=[_pivots(ends)],
     )
     before = evidence.found(_PLANE)
@@ -96,13 +96,13 @@ def _small_curvature(evidence: Evidence) -> Iterator[Line]:
     changes += [abs(float(found.pivoting[0][k] - before.pivoting[0][k])) for k in (3, STEER)]
     rates = [abs(one.equations.motion(one.pivoting[0]).front_rate) for one in (before, found)]
     changes.append(float(np.ptp(abscissa(evidence.bicycle, np.array(rates)))))
-    yield words(
+    yield claim_line(
         section="3.3",
         claim="at alpha = 1/200 A and G have changed little from the plane",
         thresholds=[below("largest change in the figures' coordinates", max(changes), _LITTLE, "rad")],
         measured=f"A: steer by {changes[0]:.4f} rad; G: lean by {changes[1]:.5f}, steer by {changes[2]:.5f}, front "
         f"rate from {rates[0]:.4f} to {rates[1]:.4f}: all within {_LITTLE} rad in the figure",
-        source=source("the static equilibria and pivoting motions of both", search, search=found.described),
+        source=source("the static equilibria and pivoting motions of both", search_motions, search=found.described),
         checks=whole,
     )
     yield _alike(evidence, "at alpha = 1/200 the curves are very similar to the plane's", _PLANE, _SMALL, FAMILIES)
@@ -127,20 +127,20 @@ def _between(evidence: Evidence, alpha: float) -> np.ndarray:
     return np.subtract(*np.array(rows, float))
 
 
-def _collision(evidence: Evidence) -> Iterator[Line]:
+def _collision(evidence: Evidence) -> Iterator[LedgerLine]:
     touch, claim = (
         evidence.touching((2, 4)),
         "at a right value of alpha cusp D of family 2 and cusp I of family 4 merge",
     )
     if touch is None:
-        yield words("3.3", claim, [equals("touching points", 0, 1)], "no touching point is found", _TOUCHING, [])
+        yield claim_line("3.3", claim, [equals("touching points", 0, 1)], "no touching point is found", _TOUCHING, [])
         return
     near = [float(np.linalg.norm(_between(evidence, touch.alpha * (1 - share)))) for share in _NEAR]
     # The distance of two turning points that merge falls like the root of what alpha is short of it.
     order = float(np.log(near[0] / near[1]) / np.log(_NEAR[0] / _NEAR[1]))
     after = _cusps(evidence, touch.alpha * (1 + _NEAR[0]))
     touching = [Check("residual of the touching point's equations", touch.residual, 1e-12)]
-    yield words(
+    yield claim_line(
         section="3.3",
         claim=claim,
         thresholds=[
@@ -154,28 +154,30 @@ def _collision(evidence: Evidence) -> Iterator[Line]:
     )
     alphas = [_PLANE, _SMALL, 0.01, 0.015]
     distances = [float(np.linalg.norm(_between(evidence, alpha))) for alpha in alphas]
-    yield words(
+    yield claim_line(
         section="3.3",
         claim="before that alpha families 2 and 4 approach each other as alpha grows",
         thresholds=[below("largest change of the distance from D to I", np.diff(distances).max(), 0.0, "rad")],
         measured=f"D and I are {_numbers(distances)} rad apart at alpha = 0, 0.005, 0.01, 0.015",
-        source=source("cusps D and I in the figures' coordinates", special_points, command=families_command(*alphas)),
+        source=source(
+            "cusps D and I in the figures' coordinates", special_points, command=families_command_line(*alphas)
+        ),
         checks=touching,
     )
     yield _separation(evidence, touching)
 
 
-def _separation(evidence: Evidence, touching: list[Check]) -> Line:
+def _separation(evidence: Evidence, touching: list[Check]) -> LedgerLine:
     gaps, direction = [], np.zeros(3)
     for alpha in (_AFTER, 0.03, 0.02):
         one, other = (figure_coordinates(evidence.bicycle, evidence.samples(alpha, number)) for number in (2, 4))
-        distances, feet = nearest(one, other)
+        distances, feet = nearest_point(one, other)
         i = int(distances.argmin())
         gaps.append(float(distances[i]))
         direction = one[i] - feet[i]
     before = _between(evidence, 0.015)
     angle = float(np.degrees(np.arccos(abs(direction @ before) / np.linalg.norm(direction) / np.linalg.norm(before))))
-    return words(
+    return claim_line(
         section="3.3",
         claim="beyond that alpha they separate in another direction",
         thresholds=[
@@ -185,46 +187,49 @@ def _separation(evidence: Evidence, touching: list[Check]) -> Line:
         measured=f"their least distance is {_numbers(gaps[::-1])} rad at alpha = 0.02, 0.03, 0.05; at 0.02 across the "
         f"line from D to I before, at {angle:.0f} degrees to it",
         source=source(
-            "least distance of families 2 and 4", trace, nearest, command=families_command(0.02, 0.03, _AFTER)
+            "least distance of families 2 and 4",
+            trace,
+            nearest_point,
+            command=families_command_line(0.02, 0.03, _AFTER),
         ),
         checks=touching,
     )
 
 
-def _split(evidence: Evidence) -> Iterator[Line]:
+def _split(evidence: Evidence) -> Iterator[LedgerLine]:
     ends = {alpha: {n: evidence.family(alpha, n).ends for n in (2, 4)} for alpha in (_SMALL, _AFTER)}
     old, new = ends[_SMALL], ends[_AFTER]
     exchanged = [old[2][0] == new[4][1] != new[2][0], old[4][1] == new[2][0] != new[4][1]]
     whole = [evidence.residual((_SMALL, _AFTER))]
-    yield words(
+    yield claim_line(
         section="3.3",
         claim="collision and split: families 2 and 4 take new profiles by alpha = 1/20",
         thresholds=[equals("ends that have passed to the other family", sum(exchanged), 2)],
         measured=f"they have exchanged an end: 2 ran to a {old[2][0]}, runs to a {new[2][0]}; 4 ran to a {old[4][1]}, "
         f"runs to a {new[4][1]}",
-        source=source("ends of families 2 and 4", trace, command=families_command(_SMALL, _AFTER)),
+        source=source("ends of families 2 and 4", trace, command=families_command_line(_SMALL, _AFTER)),
         checks=whole,
     )
     claim = "at alpha = 1/20 the profiles of families 1 and 3 have changed little from the plane"
     yield _alike(evidence, claim, _PLANE, _AFTER, (1, 3))
     there = {a: [evidence.special(a, 2, "D"), evidence.special(a, 4, "I")] for a in (_SMALL, _AFTER)}
     left = {alpha: sum(point is not None for point in points) for alpha, points in there.items()}
-    yield words(
+    yield claim_line(
         section="3.3",
         claim="at alpha = 1/20 the cusps D and I have disappeared",
         thresholds=[equals("cusps D and I at 1/200", left[_SMALL], 2), equals("at 1/20", left[_AFTER], 0)],
         measured="neither is found; both are at 1/200" if left[_AFTER] == 0 else "one is still there",
-        source=source("extrema of the front rate", special_points, command=families_command(_SMALL, _AFTER)),
+        source=source("extrema of the front rate", special_points, command=families_command_line(_SMALL, _AFTER)),
         checks=whole,
     )
     claim = "at alpha = 1/5 the curves are very similar to those at 1/20"
     yield _alike(evidence, claim, _AFTER, _DEEP, FAMILIES)
 
 
-def _role(evidence: Evidence) -> Line:
+def _role(evidence: Evidence) -> LedgerLine:
     touches = [touch for pair in ((2, 4), (1, 3)) if (touch := evidence.touching(pair)) is not None]
     residual = max((t.residual for t in touches), default=np.inf)
-    return words(
+    return claim_line(
         section="1",
         claim="the surface parameter merges and separates families",
         thresholds=[above("alphas at which families touch", len(touches), 0)],

@@ -14,12 +14,12 @@ from ...reference.bicycle import Bicycle
 from .bowl import bowl_lines
 from .configurations import configuration_lines
 from .evidence import Evidence
-from .ledger import Line, tested
+from .ledger import LedgerLine, tested
 from .model import model_check
 from .named import plane_lines
 from .orbits import orbit_lines
 from .points import point_lines
-from .printed import printed
+from .printed import read_printed
 from .rates import rate_lines
 from .reduction import reduction_lines
 from .rides import ride_lines
@@ -28,7 +28,7 @@ from .steep import steep_lines
 from .structure import structure_lines
 from .unseen import unseen_lines
 
-PARTS: dict[str, Callable[[Evidence], Iterator[Line]]] = {
+PARTS: dict[str, Callable[[Evidence], Iterator[LedgerLine]]] = {
     "equations": structure_lines,
     "orbits": orbit_lines,
     "plane": plane_lines,
@@ -48,7 +48,7 @@ def make_ledger(
     progress: Callable[[str, float, float], None] = lambda *_: None,
     figures: Mapping[str, Any] | None = None,
     bicycle: Bicycle | None = None,
-) -> list[Line]:
+) -> list[LedgerLine]:
     """Compute the ledger, in the order of the paper's sections (a minute).
 
     Parameters
@@ -56,7 +56,7 @@ def make_ledger(
     progress : callable
         Called with the part under way, the parts done and their number.
     figures : mapping, optional
-        Printed figures, by default the paper's (`velodrome.scenarios.paper.printed.printed`).
+        Printed figures, by default the paper's (`velodrome.scenarios.paper.printed.read_printed`).
     bicycle : Bicycle, optional
         By default the benchmark's.
 
@@ -64,8 +64,8 @@ def make_ledger(
     -------
     list of Line
     """
-    evidence = Evidence(figures or printed(), bicycle or Bicycle())
-    lines: list[Line] = []
+    evidence = Evidence(figures or read_printed(), bicycle or Bicycle())
+    lines: list[LedgerLine] = []
     for done, (part, lines_of) in enumerate(PARTS.items()):
         progress(part, float(done), float(len(PARTS)))
         lines += lines_of(evidence)

@@ -7,16 +7,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...reference.circular import LEAN, STEER, CircularMotion, newton, rear_rate_condition
-from ...reference.families import motions
+from ...reference.families import find_motions
 from .evidence import Evidence
-from .ledger import Check, Line, Source, Threshold, above, below, figure, source, words
+from .ledger import Check, LedgerLine, Source, Threshold, above, below, claim_line, figure_line, source
 
 NAMES = ("P1", "P2", "P3", "P4")
 _ROUND_OFF = 1e-14  # of numbers of order ten
 _LARGE = 1.5  # times another lean: what one would call large beside small
 
 
-def configuration_lines(evidence: Evidence) -> Iterator[Line]:
+def configuration_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     """Lines on Figure 6."""
     for name in NAMES:
         point, motion = evidence.figures[name], named_motion(evidence, name)
@@ -24,7 +24,7 @@ def configuration_lines(evidence: Evidence) -> Iterator[Line]:
         for field, what in (("lean", "lean"), ("steer", "steer"), ("front_rate", "front rate")):
             claim = f"{name} of family {point['family']}: {what}"
             solved = solved_point(evidence, name)
-            yield figure("3.3", claim, point[field], getattr(motion, field), errors[field], solved)
+            yield figure_line("3.3", claim, point[field], getattr(motion, field), errors[field], solved)
     yield from _descriptions(evidence)
 
 
@@ -32,13 +32,13 @@ def solved_point(evidence: Evidence, name: str) -> Source:
     """Return the source of a printed point's motion."""
     return source(
         "the motion of the family at the rear rate, and again on the curves of a grid of starts",
-        motions,
+        find_motions,
         own_errors,
-        command=circular_command(evidence, name),
+        command=circular_command_line(evidence, name),
     )
 
 
-def circular_command(evidence: Evidence, name: str) -> str:
+def circular_command_line(evidence: Evidence, name: str) -> str:
     """Return the command that shows a printed point's motion."""
     point, motion = evidence.figures[name], named_motion(evidence, name)
     where = f"--alpha {point['alpha']:g} --rear-rate {motion.rear_rate:g} --family {point['family']}"
@@ -73,11 +73,11 @@ def own_errors(evidence: Evidence, name: str, motion: CircularMotion) -> dict[st
     return {field: abs(float(value)) + _ROUND_OFF for field, value in off.items()}
 
 
-def _descriptions(evidence: Evidence) -> Iterator[Line]:
+def _descriptions(evidence: Evidence) -> Iterator[LedgerLine]:
     one, two, three, four = (named_motion(evidence, name) for name in NAMES)
     solved = [Check("largest residual", max(m.residual for m in (one, two, three, four)), 1e-12)]
-    command = " && ".join(circular_command(evidence, name) for name in NAMES)
-    told = source("the motions P1 to P4", motions, command=command)
+    command = " && ".join(circular_command_line(evidence, name) for name in NAMES)
+    told = source("the motions P1 to P4", find_motions, command=command)
 
     def turns(motion: CircularMotion, left: bool) -> list[Threshold]:
         half = np.pi / 2
@@ -85,8 +85,8 @@ def _descriptions(evidence: Evidence) -> Iterator[Line]:
             return [above("yaw rate", motion.yaw_rate, 0.0, "rad/s"), below("steer", motion.steer, half, "rad")]
         return [below("yaw rate", motion.yaw_rate, 0.0, "rad/s"), above("steer", motion.steer, half, "rad")]
 
-    def line(claim: str, thresholds: list[Threshold], measured: str) -> Line:
-        return words("3.3", claim, thresholds, measured, told, solved)
+    def line(claim: str, thresholds: list[Threshold], measured: str) -> LedgerLine:
+        return claim_line("3.3", claim, thresholds, measured, told, solved)
 
     leans = [abs(m.lean) for m in (one, two, three, four)]
     yield line(

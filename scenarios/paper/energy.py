@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...reference.circular import LEAN, CircularMotion
 from ...reference.continuation import Point, roots_along
-from ...reference.curve import sample
+from ...reference.curve import sample_curve
 from ...reference.families import Family
 from ...reference.sections import sample_family
 
@@ -19,7 +19,7 @@ def motion_of_energy(family: Family, energy: float, near: CircularMotion) -> Cir
     """
 
     def excess(point: Point) -> float:
-        return float(sample(family.equations, point.unknowns[None]).energy[0]) - energy
+        return float(sample_curve(family.equations, point.unknowns[None]).energy[0]) - energy
 
     values = sample_family(family).energy - energy
     roots = [root for _, root in roots_along(family.equations, family.points, excess, values)]

@@ -12,22 +12,22 @@ from ...reference.bicycle import Bicycle
 from ...reference.circular import LARGEST_RESIDUAL, SIGMA, CircularMotion, Steady
 from ...reference.critical import CriticalPoint, reconnections
 from ...reference.curve import Samples
-from ...reference.families import FAMILIES, Family, motions, trace
+from ...reference.families import FAMILIES, Family, find_motions, trace
 from ...reference.sections import SectionEnd, sample_family, stable_sections
 from ...reference.special import SpecialPoint, special_points
 from ...reference.surface import Paraboloid
 from .ledger import Check
-from .printed import printed
-from .search import OTHER_GRID, Found, missing, search
+from .printed import read_printed
+from .search import OTHER_GRID, FoundMotion, find_missing, search_motions
 
-LONGEST_STEP = 0.05  # of the arc: some 100 to 300 points a family, no stable section known is shorter than three
+LONGEST_PAPER_STEP = 0.05  # of the arc: some 100 to 300 points a family, no stable section known is shorter than three
 OTHER_STEP = 0.03  # a second tracing, whose points lie elsewhere: what it finds tells the error of the first
 LARGEST_TOUCHING = 0.4  # alpha up to which touching points are looked for: two are known below
 
 Thing = TypeVar("Thing")
 
 
-def families_command(*alphas: float) -> str:
+def families_command_line(*alphas: float) -> str:
     """Return the command that follows the families at some alphas and tells their special points and sections."""
     return " && ".join(f"velodrome families --alpha {alpha:g}" for alpha in alphas)
 
@@ -39,11 +39,11 @@ class Evidence:
     Attributes
     ----------
     figures : mapping
-        The printed figures, see `velodrome.scenarios.paper.printed.printed`.
+        The printed figures, see `velodrome.scenarios.paper.printed.read_printed`.
     bicycle : Bicycle
     """
 
-    figures: Mapping[str, Any] = field(default_factory=printed)
+    figures: Mapping[str, Any] = field(default_factory=read_printed)
     bicycle: Bicycle = field(default_factory=Bicycle)
     _known: dict[tuple, Any] = field(default_factory=dict, repr=False)
 
@@ -58,7 +58,7 @@ class Evidence:
         """The paper's five alphas."""
         return tuple(self.figures["cases"])
 
-    def family(self, alpha: float, number: int, longest: float = LONGEST_STEP) -> Family:
+    def family(self, alpha: float, number: int, longest: float = LONGEST_PAPER_STEP) -> Family:
         """A family from end to end."""
         return self.once(
             ("family", number, "alpha", alpha, "step", longest),
@@ -69,14 +69,16 @@ class Evidence:
         """All its points."""
         return self.once(("points", number, "alpha", alpha), lambda: sample_family(self.family(alpha, number)))
 
-    def sections(self, alpha: float, number: int, longest: float = LONGEST_STEP) -> list[tuple[SectionEnd, SectionEnd]]:
+    def sections(
+        self, alpha: float, number: int, longest: float = LONGEST_PAPER_STEP
+    ) -> list[tuple[SectionEnd, SectionEnd]]:
         """Its stable sections."""
         return self.once(
             ("stable sections", number, "alpha", alpha, "step", longest),
             lambda: stable_sections(self.family(alpha, number, longest)),
         )
 
-    def special(self, alpha: float, number: int, name: str, longest: float = LONGEST_STEP) -> SpecialPoint | None:
+    def special(self, alpha: float, number: int, name: str, longest: float = LONGEST_PAPER_STEP) -> SpecialPoint | None:
         """A special point of it by name; None where there is none."""
         points = self.once(
             ("special points", number, "alpha", alpha, "step", longest),
@@ -84,9 +86,9 @@ class Evidence:
         )
         return next((point for point in points if point.name == name), None)
 
-    def found(self, alpha: float) -> Found:
+    def found(self, alpha: float) -> FoundMotion:
         """Static equilibria, pivoting motions and whole curves, from a grid of starts."""
-        return self.once(("search", "alpha", alpha), lambda: search(Steady(self.bicycle, Paraboloid(alpha))))
+        return self.once(("search", "alpha", alpha), lambda: search_motions(Steady(self.bicycle, Paraboloid(alpha))))
 
     def searched_again(self, *alphas: float) -> Check:
         """Whether a search from other starts finds the same: what is counted must not be a grid's chance."""
@@ -94,16 +96,16 @@ class Evidence:
         for alpha in alphas:
             again = self.once(
                 ("second search", "alpha", alpha),
-                lambda a=alpha: search(Steady(self.bicycle, Paraboloid(a)), OTHER_GRID),
+                lambda a=alpha: search_motions(Steady(self.bicycle, Paraboloid(a)), OTHER_GRID),
             )
-            lone += missing(self.found(alpha), again)
+            lone += find_missing(self.found(alpha), again)
         return Check("what one of two searches from different starts has found alone", float(lone), 0.0)
 
     def motions(self, alpha: float, number: int, rear_rate: float) -> list[CircularMotion]:
         """Motions of a family at a rear rate."""
         return self.once(
             ("motions", number, "alpha", alpha, "rear rate", rear_rate),
-            lambda: motions(self.bicycle, Paraboloid(alpha), number, rear_rate),
+            lambda: find_motions(self.bicycle, Paraboloid(alpha), number, rear_rate),
         )
 
     def touching(self, families: tuple[int, int]) -> CriticalPoint | None:

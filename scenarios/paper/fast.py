@@ -29,10 +29,10 @@ _ITERATIONS = 40  # of the secant method
 _SETTLED = 1e-13  # a step of Newton's method, relative: what is left is round-off
 # Round-off of rows of order one is 1e-14; near a flat bicycle the equations' condition grows like 1 over the lean's
 # distance from pi/2 and multiplies what is left of the steps, not of the rows.
-LARGEST_RESIDUAL = 1e-11
+LARGEST_FLAT_RESIDUAL = 1e-11
 
 
-class Expansion(NamedTuple):
+class FlatExpansion(NamedTuple):
     """The equations at geometry and angle, shape (9,), to first order: rows (8,), their Jacobian (8, 9) in them.
 
     The rear wheel's share of the speeds and its gradient (9,) come with them.
@@ -44,7 +44,7 @@ class Expansion(NamedTuple):
     gradient: np.ndarray
 
 
-Condition = Callable[[np.ndarray, Expansion], tuple[float, np.ndarray]]
+FlatCondition = Callable[[np.ndarray, FlatExpansion], tuple[float, np.ndarray]]
 
 
 def with_angle(unknowns: np.ndarray) -> np.ndarray:
@@ -59,7 +59,7 @@ def squared_rates(chosen: np.ndarray) -> float:
     return float(SIGMA_UNIT * np.tan(chosen[_ANGLE]))
 
 
-def expand(equations: Steady, chosen: np.ndarray) -> Expansion:
+def expand_flat(equations: Steady, chosen: np.ndarray) -> FlatExpansion:
     """Evaluate the equations at geometry and angle, shape (9,)."""
     at = chosen.copy()
     cosine, sine = np.cos(chosen[_ANGLE]), np.sin(chosen[_ANGLE])
@@ -75,25 +75,25 @@ def expand(equations: Steady, chosen: np.ndarray) -> Expansion:
     jacobian[6:, _ANGLE] = cosine * inertia - sine * weight
     gradient = moving.basis[REAR_SPEED].copy()
     gradient[_ANGLE] = 0.0
-    return Expansion(rows, jacobian, float(moving.full[REAR_SPEED]), gradient)
+    return FlatExpansion(rows, jacobian, float(moving.full[REAR_SPEED]), gradient)
 
 
-def pivoting(chosen: np.ndarray, here: Expansion) -> tuple[float, np.ndarray]:
+def pivoting(chosen: np.ndarray, here: FlatExpansion) -> tuple[float, np.ndarray]:
     """Condition that the rear wheel stands."""
     return here.rear_speed, here.gradient
 
 
-def at_lean(lean: float) -> Condition:
+def at_lean(lean: float) -> FlatCondition:
     """Condition of a given lean [rad]."""
     return lambda chosen, here: (float(chosen[LEAN]) - lean, np.eye(len(chosen))[LEAN])
 
 
-def at_angle(angle: float) -> Condition:
+def at_angle(angle: float) -> FlatCondition:
     """Condition of a given speed's angle [rad]."""
     return lambda chosen, here: (float(chosen[_ANGLE]) - angle, np.eye(len(chosen))[_ANGLE])
 
 
-def solve(equations: Steady, guess: np.ndarray, condition: Condition) -> np.ndarray:
+def solve_flat(equations: Steady, guess: np.ndarray, condition: FlatCondition) -> np.ndarray:
     """Solve the equations and a condition for geometry and angle, shape (9,), by Newton's method.
 
     Raises
@@ -103,7 +103,7 @@ def solve(equations: Steady, guess: np.ndarray, condition: Condition) -> np.ndar
     """
     chosen = guess.copy()
     for _ in range(_MOST):
-        here = expand(equations, chosen)
+        here = expand_flat(equations, chosen)
         value, gradient = condition(chosen, here)
         matrix = np.vstack([here.jacobian, gradient])
         if not np.all(np.isfinite(matrix)):
@@ -113,8 +113,8 @@ def solve(equations: Steady, guess: np.ndarray, condition: Condition) -> np.ndar
         chosen = chosen + step * min(1.0, 0.3 / size if size > 0 else 1.0)
         if size < _SETTLED:
             break
-    left = float(np.abs(expand(equations, chosen).rows).max())
-    if not left < LARGEST_RESIDUAL:
+    left = float(np.abs(expand_flat(equations, chosen).rows).max())
+    if not left < LARGEST_FLAT_RESIDUAL:
         raise ValueError(f"no circular motion up to infinite speed is found there: a residual of {left:.1e} is left")
     return chosen
 
@@ -156,8 +156,8 @@ def follow_flat_end(equations: Steady, unknowns: np.ndarray, nearest: float) -> 
     distance, constants, rate = float(np.pi / 2 - side * chosen[LEAN]), [], 0.0
     while distance > nearest or len(constants) < 2:
         distance /= 4
-        chosen = solve(equations, chosen, at_lean(side * (np.pi / 2 - distance)))
-        rate = float(np.sqrt(squared_rates(chosen)) * abs(expand(equations, chosen).rear_speed))
+        chosen = solve_flat(equations, chosen, at_lean(side * (np.pi / 2 - distance)))
+        rate = float(np.sqrt(squared_rates(chosen)) * abs(expand_flat(equations, chosen).rear_speed))
         constants.append(rate**2 * distance)
     change = abs(constants[-1] / constants[-2] - 1)
     return FlatEnd(distance, rate, float(np.hypot(*chosen[:2])), constants[-1], change)
@@ -188,7 +188,7 @@ def pivot_at(
         slope = (here[1][_ANGLE] - last[1][_ANGLE]) / (here[0] - last[0])
         step = (angle - here[1][_ANGLE]) / slope
         shape = float(here[0] + step)
-        last, here = here, (shape, solve(Steady(bicycle, Paraboloid(shape)), here[1], pivoting))
+        last, here = here, (shape, solve_flat(Steady(bicycle, Paraboloid(shape)), here[1], pivoting))
         if abs(step) < 1e-13 or here[1][_ANGLE] == last[1][_ANGLE]:
             return here
     raise ValueError(f"no alpha near {towards:g} is found at which the pivoting motion's speed is as wanted")
@@ -199,6 +199,6 @@ def carry_pivot(bicycle: Bicycle, start: np.ndarray, alpha: float, towards: floa
     many = max(2, int(np.ceil(abs(towards - alpha) / 0.01)) + 1)
     motions, chosen = [], start
     for shape in np.linspace(alpha, towards, many):
-        chosen = solve(Steady(bicycle, Paraboloid(float(shape))), chosen, pivoting)
+        chosen = solve_flat(Steady(bicycle, Paraboloid(float(shape))), chosen, pivoting)
         motions.append((float(shape), chosen))
     return motions

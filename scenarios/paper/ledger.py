@@ -129,7 +129,7 @@ def _finite(value: float) -> float | None:
 
 
 @dataclass(frozen=True)
-class Line:
+class LedgerLine:
     """One line of the ledger.
 
     Attributes
@@ -207,14 +207,14 @@ class Line:
         )
 
 
-def unit(printed: str) -> Decimal:
+def unit_of(printed: str) -> Decimal:
     """A unit of the last printed digit."""
     return Decimal((0, (1,), int(Decimal(printed).as_tuple().exponent)))
 
 
 def figure_thresholds(value: float, printed: str) -> tuple[Threshold, ...]:
     """Conditions behind the verdict on a measured figure: rounding, then, where it does not round, cutting off."""
-    exact, shown, last = Decimal(value), Decimal(printed), unit(printed)
+    exact, shown, last = Decimal(value), Decimal(printed), unit_of(printed)
     digits = f"last digit of {printed}"
     distance = float(abs(exact - shown))
     rounds = Threshold(f"distance from the print, to half a unit of the {digits},", distance, "<=", float(last / 2))
@@ -238,7 +238,7 @@ def figure_verdict(thresholds: Sequence[Threshold]) -> str:
     return TRUNCATED if all(threshold.met for threshold in cut) else FAILS
 
 
-def figure(
+def figure_line(
     section: str,
     claim: str,
     printed: str,
@@ -247,7 +247,7 @@ def figure(
     source: Source,
     checks: Iterable[Check] = (),
     kind: str = "number",
-) -> Line:
+) -> LedgerLine:
     """Line on a printed figure.
 
     Parameters
@@ -268,11 +268,11 @@ def figure(
     -------
     Line
     """
-    margin = abs(abs(Decimal(value) - Decimal(printed)) - unit(printed) / 2)
+    margin = abs(abs(Decimal(value) - Decimal(printed)) - unit_of(printed) / 2)
     tests = (Check("own error, against the distance from the limit of rounding", error, float(margin)), *checks)
     digits = max(3, -int(Decimal(printed).as_tuple().exponent) + 4)
     thresholds = figure_thresholds(value, printed)
-    line = Line(
+    line = LedgerLine(
         section=section,
         claim=claim,
         kind=kind,
@@ -287,7 +287,7 @@ def figure(
     return tested(line)
 
 
-def words(
+def claim_line(
     section: str,
     claim: str,
     thresholds: Iterable[Threshold],
@@ -296,10 +296,10 @@ def words(
     checks: Iterable[Check],
     kind: str = "structure",
     printed: str | None = None,
-) -> Line:
+) -> LedgerLine:
     """Line on a claim in words, which holds if every threshold is met; the checks test the measurement."""
     conditions = tuple(thresholds)
-    line = Line(
+    line = LedgerLine(
         section=section,
         claim=claim,
         kind=kind,
@@ -313,12 +313,12 @@ def words(
     return tested(line)
 
 
-def count(
+def count_line(
     section: str, claim: str, printed: int, value: int, measured: str, source: Source, checks: Iterable[Check] = ()
-) -> Line:
+) -> LedgerLine:
     """Line on a printed count."""
     condition = equals("count", value, printed)
-    line = Line(
+    line = LedgerLine(
         section=section,
         claim=claim,
         kind="structure",
@@ -341,11 +341,11 @@ def count_by_cut(
     measured: str,
     source: Source,
     checks: Iterable[Check] = (),
-) -> Line:
+) -> LedgerLine:
     """Line on a printed count of what can be cut into pieces in several ways: the count under each way."""
     conditions = tuple(equals(cut, value, printed) for cut, value in counts.items())
     met = [condition.met for condition in conditions]
-    line = Line(
+    line = LedgerLine(
         section=section,
         claim=claim,
         kind="structure",
@@ -359,25 +359,25 @@ def count_by_cut(
     return tested(line)
 
 
-def untestable(section: str, claim: str, why: str, kind: str = "structure") -> Line:
+def untestable_line(section: str, claim: str, why: str, kind: str = "structure") -> LedgerLine:
     """Line on a claim that nothing here can test."""
     nothing = Source("nothing", command=None)
-    return Line(section=section, claim=claim, kind=kind, measured=why, verdict=UNTESTABLE, source=nothing)
+    return LedgerLine(section=section, claim=claim, kind=kind, measured=why, verdict=UNTESTABLE, source=nothing)
 
 
-def tested(line: Line, *more: Check) -> Line:
+def tested(line: LedgerLine, *more: Check) -> LedgerLine:
     """The line with more tests: one whose measurement fails a test does not hold, whatever the figures say."""
     checks = (*line.checks, *more)
     passes = line.verdict == UNTESTABLE or all(check.passes for check in checks)
     return replace(line, checks=checks, verdict=line.verdict if passes else FAILS)
 
 
-def counts(lines: Sequence[Line]) -> dict[str, int]:
+def counts(lines: Sequence[LedgerLine]) -> dict[str, int]:
     """Number of lines by verdict."""
     return {verdict: sum(line.verdict == verdict for line in lines) for verdict in VERDICTS}
 
 
-def document(lines: Sequence[Line]) -> dict[str, Any]:
+def ledger_document(lines: Sequence[LedgerLine]) -> dict[str, Any]:
     """The ledger as a JSON document.
 
     ``holds``: every line does; ``faults``: lines that do not, by whose they are.

@@ -14,7 +14,7 @@ _MOST = 40
 
 
 @dataclass(frozen=True)
-class Limit:
+class FlatLimit:
     """The last of a sequence of motions whose leans' distances from +-pi/2 halve.
 
     Attributes
@@ -42,7 +42,7 @@ class Limit:
     residual: float
 
 
-def limit(equations: Steady, ends: Sequence[np.ndarray], side: int) -> Limit:
+def find_limit(equations: Steady, ends: Sequence[np.ndarray], side: int) -> FlatLimit:
     """Follow the flat one of a curve's two ends (22,) towards a lean of pi/2 (side 1) or -pi/2 (side -1).
 
     Raises
@@ -66,7 +66,7 @@ def limit(equations: Steady, ends: Sequence[np.ndarray], side: int) -> Limit:
     (_, _, s0, _), (_, r1, s1, _), (d2, r2, s2, radius) = rows[-3:]
     # Halving: an error of the first order leaves half of itself.
     steer = 2 * s2 - s1
-    return Limit(
+    return FlatLimit(
         distance=d2,
         front_rate=r2,
         rate_exponent=float(np.log2(abs(r1 / r2))),

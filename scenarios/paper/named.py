@@ -10,16 +10,16 @@ from ...reference.circular import LEAN, REAR_SPEED, STEER
 from ...reference.continuation import sign_changes
 from ...reference.families import FAMILIES, Family, front_rate_slope, trace
 from ...reference.special import SpecialPoint, special_points, straight_motion
-from .evidence import LONGEST_STEP, OTHER_STEP, Evidence, families_command
-from .ledger import Check, Line, above, below, count, figure, source, untestable, words
-from .limits import limit
+from .evidence import LONGEST_PAPER_STEP, OTHER_STEP, Evidence, families_command_line
+from .ledger import Check, LedgerLine, above, below, claim_line, count_line, figure_line, source, untestable_line
+from .limits import find_limit
 from .model import model_check
-from .search import search
+from .search import search_motions
 
 _SLOPE = 0.002  # of what a power law's exponent may be off by at the last lean: its correction is of the lean's size
 _LEVEL = 0.0
 _ROUND_OFF = 1e-14  # of numbers of order ten
-_COMMAND = families_command(_LEVEL)
+_COMMAND = families_command_line(_LEVEL)
 _FOLLOWED = source("the families on the plane, followed from end to end", trace, command=_COMMAND)
 _SPECIAL = source(
     "a special point, solved on the followed family and in a second way", special_points, command=_COMMAND
@@ -27,7 +27,7 @@ _SPECIAL = source(
 _BEYOND_CUSP = 0.1  # rad/s beyond the cusp D: where a front rate has several motions
 
 
-def plane_lines(evidence: Evidence) -> Iterator[Line]:
+def plane_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     """Lines on section 3.2."""
     yield from _four_families(evidence)
     yield _ranges(evidence)
@@ -36,12 +36,12 @@ def plane_lines(evidence: Evidence) -> Iterator[Line]:
     yield from _third(evidence)
 
 
-def point(evidence: Evidence, family: int, name: str) -> tuple[SpecialPoint, dict[str, float]]:
+def named_point(evidence: Evidence, family: int, name: str) -> tuple[SpecialPoint, dict[str, float]]:
     """A special point on the plane and its error: how far it is from the same found in another way.
 
     The other way is a second tracing; A and G, which end a curve, are solved from a grid of starts too.
     """
-    one, other = (evidence.special(_LEVEL, family, name, step) for step in (LONGEST_STEP, OTHER_STEP))
+    one, other = (evidence.special(_LEVEL, family, name, step) for step in (LONGEST_PAPER_STEP, OTHER_STEP))
     if one is None or other is None:
         raise ValueError(f"point {name} is not found on family {family}")
     names = ("lean", "steer", "front_rate", "rear_rate")
@@ -54,11 +54,11 @@ def point(evidence: Evidence, family: int, name: str) -> tuple[SpecialPoint, dic
     return one, {field: off + _ROUND_OFF for field, off in error.items()}
 
 
-def _four_families(evidence: Evidence) -> Iterator[Line]:
+def _four_families(evidence: Evidence) -> Iterator[LedgerLine]:
     found, printed = evidence.found(_LEVEL), evidence.figures["counts"]["families"]
     whole = [evidence.residual((_LEVEL,)), evidence.searched_again(_LEVEL)]
-    curves = source("all curves of circular motions, from a grid of starts", search, search=found.described)
-    yield count(
+    curves = source("all curves of circular motions, from a grid of starts", search_motions, search=found.described)
+    yield count_line(
         section="3.2",
         claim="on the plane there are four families",
         printed=printed,
@@ -68,7 +68,7 @@ def _four_families(evidence: Evidence) -> Iterator[Line]:
         source=curves,
         checks=whole,
     )
-    yield count(
+    yield count_line(
         section="1",
         claim="two of the four can be merged, leaving three (Basu-Mandal et al.)",
         printed=printed - 1,
@@ -77,13 +77,15 @@ def _four_families(evidence: Evidence) -> Iterator[Line]:
         source=curves,
         checks=whole,
     )
-    yield untestable("3.2", "their families, drawn as black dots, lie on ours", "the text lacks the dots", "number")
+    yield untestable_line(
+        "3.2", "their families, drawn as black dots, lie on ours", "the text lacks the dots", "number"
+    )
 
 
-def _ranges(evidence: Evidence) -> Line:
+def _ranges(evidence: Evidence) -> LedgerLine:
     steers = np.concatenate([evidence.samples(_LEVEL, number).steer for number in FAMILIES])
     rates = np.concatenate([evidence.samples(_LEVEL, number).rear_rate for number in FAMILIES])
-    return words(
+    return claim_line(
         section="3.2",
         claim="all four lie within a rear rate >= 0 and a steer in [0, pi]",
         thresholds=[
@@ -98,10 +100,10 @@ def _ranges(evidence: Evidence) -> Line:
     )
 
 
-def _first(evidence: Evidence) -> Iterator[Line]:
+def _first(evidence: Evidence) -> Iterator[LedgerLine]:
     printed, samples = evidence.figures, evidence.samples(_LEVEL, 1)
     steer = float(samples.steer.max())
-    yield words(
+    yield claim_line(
         section="3.2",
         claim="family 1 keeps its steer below pi/2",
         thresholds=[below("largest steer", steer, np.pi / 2, "rad")],
@@ -109,10 +111,10 @@ def _first(evidence: Evidence) -> Iterator[Line]:
         source=_FOLLOWED,
         checks=[evidence.residual()],
     )
-    static, error = point(evidence, 1, "A")
-    yield figure("3.2", "A: steer", printed["A"]["steer"], static.steer, error["steer"], _SPECIAL)
+    static, error = named_point(evidence, 1, "A")
+    yield figure_line("3.2", "A: steer", printed["A"]["steer"], static.steer, error["steer"], _SPECIAL)
     rest = max(abs(static.rear_rate), abs(static.front_rate))
-    yield words(
+    yield claim_line(
         section="3.2",
         claim="A is a static equilibrium",
         # The squared speed is zero to round-off: the speed to its root.
@@ -122,9 +124,9 @@ def _first(evidence: Evidence) -> Iterator[Line]:
         checks=[evidence.residual()],
     )
     yield from _straight(evidence, 1, "B")
-    speed = point(evidence, 1, "B")[0].rear_rate * evidence.bicycle.rear_wheel_radius
+    speed = named_point(evidence, 1, "B")[0].rear_rate * evidence.bicycle.rear_wheel_radius
     off = abs(speed - float(printed["meijaard"]["capsize_speed"]))
-    yield words(
+    yield claim_line(
         section="3.2",
         claim="B is the limit speed of upright straight motion",
         thresholds=[below("difference from the published capsize speed", off, 1e-12, "m/s")],
@@ -134,9 +136,9 @@ def _first(evidence: Evidence) -> Iterator[Line]:
     )
 
 
-def _straight(evidence: Evidence, number: int, name: str) -> Iterator[Line]:
+def _straight(evidence: Evidence, number: int, name: str) -> Iterator[LedgerLine]:
     """The straight motion that large circles tend to: their front rate is off by a constant over R^2."""
-    straight, error = point(evidence, number, name)
+    straight, error = named_point(evidence, number, name)
     samples = evidence.samples(_LEVEL, number)
     far = np.argsort(samples.radius)[[-1, -5]]
     weights = samples.radius[far] ** 2
@@ -150,12 +152,12 @@ def _straight(evidence: Evidence, number: int, name: str) -> Iterator[Line]:
         trace,
         command=_COMMAND,
     )
-    yield figure("3.2", claim, printed, straight.front_rate, error["front_rate"] + 1e-12, solved, [independent])
+    yield figure_line("3.2", claim, printed, straight.front_rate, error["front_rate"] + 1e-12, solved, [independent])
     turned = "reversed, steer pi" if number == 2 else "straight ahead"
     angles = np.stack([samples.lean, samples.steer - straight.steer])[:, far] * samples.radius[far]
     # Lean and steer are odd in the curvature 1/R: what they miss of their first order falls like 1/R^3.
     kept = float(np.abs(angles[:, 0] / angles[:, 1] - 1).max())
-    yield words(
+    yield claim_line(
         section="3.2",
         claim=f"{name} is upright straight motion, handlebar {turned}",
         thresholds=[below("departure of lean and steer from a law of 1/R, relative,", kept, 1e-4)],
@@ -167,11 +169,11 @@ def _straight(evidence: Evidence, number: int, name: str) -> Iterator[Line]:
     )
 
 
-def _second(evidence: Evidence) -> Iterator[Line]:
+def _second(evidence: Evidence) -> Iterator[LedgerLine]:
     printed, samples = evidence.figures["D"], evidence.samples(_LEVEL, 2)
     least, fastest = float(samples.steer.min()), float(samples.front_rate.max())
     whole = [evidence.residual()]
-    yield words(
+    yield claim_line(
         section="3.2",
         claim="family 2 keeps its steer above pi/2",
         thresholds=[above("least steer", least, np.pi / 2, "rad")],
@@ -179,7 +181,7 @@ def _second(evidence: Evidence) -> Iterator[Line]:
         source=_FOLLOWED,
         checks=whole,
     )
-    yield words(
+    yield claim_line(
         section="3.2",
         claim="front rates of family 2 are always negative",
         thresholds=[below("largest front rate", fastest, 0.0, "rad/s")],
@@ -188,12 +190,12 @@ def _second(evidence: Evidence) -> Iterator[Line]:
         checks=whole,
     )
     yield from _straight(evidence, 2, "C")
-    cusp, error = point(evidence, 2, "D")
+    cusp, error = named_point(evidence, 2, "D")
     for name, what in (("lean", "lean"), ("steer", "steer"), ("front_rate", "front rate")):
-        yield figure("3.2", f"D: {what}", printed[name], getattr(cusp, name), error[name], _SPECIAL)
+        yield figure_line("3.2", f"D: {what}", printed[name], getattr(cusp, name), error[name], _SPECIAL)
     rate = cusp.front_rate - _BEYOND_CUSP
     crossings = len(sign_changes(samples.front_rate - rate))
-    yield words(
+    yield claim_line(
         section="3.2",
         claim="around the cusp D lean and steer take several values at a front rate",
         thresholds=[above(f"motions of family 2 at a front rate of {rate:.4f}", crossings, 1)],
@@ -204,17 +206,19 @@ def _second(evidence: Evidence) -> Iterator[Line]:
     yield _limit_line(evidence.family(_LEVEL, 2), "E", 1, np.pi, -1)
 
 
-def _third(evidence: Evidence) -> Iterator[Line]:
+def _third(evidence: Evidence) -> Iterator[LedgerLine]:
     printed, family = evidence.figures["G"], evidence.family(_LEVEL, 3)
-    pivot, error = point(evidence, 3, "G")
+    pivot, error = named_point(evidence, 3, "G")
     for name, what in (("lean", "lean"), ("steer", "steer")):
-        yield figure("3.2", f"G: {what}", printed[name], getattr(pivot, name), error[name], _SPECIAL)
-    yield figure("3.2", "G: front rate", printed["front_rate"], abs(pivot.front_rate), error["front_rate"], _SPECIAL)
+        yield figure_line("3.2", f"G: {what}", printed[name], getattr(pivot, name), error[name], _SPECIAL)
+    yield figure_line(
+        "3.2", "G: front rate", printed["front_rate"], abs(pivot.front_rate), error["front_rate"], _SPECIAL
+    )
     found = evidence.found(_LEVEL)
-    pivoting = source("the pivoting motion, from a grid of starts", search, search=found.described)
+    pivoting = source("the pivoting motion, from a grid of starts", search_motions, search=found.described)
     start = found.pivoting[0]
     contact = float(np.hypot(*start[10:12]))
-    yield words(
+    yield claim_line(
         section="3.2",
         claim="G turns about a vertical axis through the rear wheel's contact point",
         thresholds=[below("distance of the contact point from the axis", contact, 1e-12, "m")],
@@ -223,7 +227,7 @@ def _third(evidence: Evidence) -> Iterator[Line]:
         checks=[evidence.residual()],
     )
     spin = abs(float(start[REAR_SPEED]))
-    yield words(
+    yield claim_line(
         section="3.2",
         claim="at G the rear rate is nearly zero",
         thresholds=[below("share of the rear rate in all rates", spin, 1e-12)],
@@ -236,12 +240,12 @@ def _third(evidence: Evidence) -> Iterator[Line]:
     yield _agreement(evidence)
 
 
-def _monotone(evidence: Evidence, family: Family) -> Line:
+def _monotone(evidence: Evidence, family: Family) -> LedgerLine:
     """The tangents tell: no point where the front rate, the lean or the steer turns back."""
     slopes = np.array([[front_rate_slope(p), p.tangent[LEAN], p.tangent[STEER]] for p in family.points])
     # At the pivot itself a sign of the direction that is followed; all three must keep theirs.
     by_lean, by_steer = (slopes[:, [k]] * slopes[:, [0]] for k in (1, 2))
-    return words(
+    return claim_line(
         section="3.2",
         claim="on family 3 lean and steer fall monotonically with the front rate",
         thresholds=[
@@ -255,12 +259,12 @@ def _monotone(evidence: Evidence, family: Family) -> Line:
     )
 
 
-def _limit_line(family: Family, name: str, side: int, steer: float, sign: int) -> Line:
+def _limit_line(family: Family, name: str, side: int, steer: float, sign: int) -> LedgerLine:
     """E and F: the curve followed on at fixed leans, whose distances from +-pi/2 halve."""
-    far = limit(family.equations, [family.points[k].unknowns for k in (0, -1)], side)
+    far = find_limit(family.equations, [family.points[k].unknowns for k in (0, -1)], side)
     infinity = "-infinity" if sign < 0 else "infinity"
     corner = f"({'pi/2' if side > 0 else '-pi/2'}, {'pi' if steer else '0'}, {infinity})"
-    return words(
+    return claim_line(
         section="3.2",
         claim=f"{name} is a limit: lean, steer and front rate tend to {corner}",
         thresholds=[
@@ -272,14 +276,14 @@ def _limit_line(family: Family, name: str, side: int, steer: float, sign: int) -
         measured=f"with the lean's distance d from it down to {far.distance:.1e} the front rate grows like "
         f"d^{far.rate_exponent:.4f}, to {far.front_rate:.0f}, and the steer's distance falls like "
         f"d^{far.steer_exponent:.4f}; extrapolated steer {far.steer:.6f}, circle of D {far.radius:.4f} m",
-        source=source("the family followed on at fixed leans whose distance from pi/2 halves", limit),
+        source=source("the family followed on at fixed leans whose distance from pi/2 halves", find_limit),
         checks=[Check("largest residual on the way, relative", far.residual, 1e-12)],
     )
 
 
-def _agreement(evidence: Evidence) -> Line:
+def _agreement(evidence: Evidence) -> LedgerLine:
     model = model_check(evidence.bicycle, evidence.figures)
-    return words(
+    return claim_line(
         section="3.2",
         claim="the model agrees with Basu-Mandal et al.",
         thresholds=[below("largest difference of accelerations", model.value, model.limit, "m/s^2 or rad/s^2")],

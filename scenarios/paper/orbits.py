@@ -12,8 +12,8 @@ from ...reference.families import FAMILIES, trace
 from ...reference.kinematics import FRONT_ANGLE, LEAN, PITCH, REAR_ANGLE, STEER, YAW
 from ...reference.simulate import simulate
 from ...reference.surface import Paraboloid
-from .evidence import Evidence, families_command
-from .ledger import Check, Line, above, below, source, words
+from .evidence import Evidence, families_command_line
+from .ledger import Check, LedgerLine, above, below, claim_line, source
 from .search import mirrored
 
 _STEADY = (LEAN, PITCH, STEER)
@@ -23,7 +23,7 @@ _KEPT = 1e-9
 _KEPT_FORCE = 1e-7  # N: the same of forces of some 500 N
 
 
-def orbit_lines(evidence: Evidence) -> Iterator[Line]:
+def orbit_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     """Lines on Eqs. 9-11 and the symmetry of left and right."""
     constant, sinus, normal, turning = 0.0, 0.0, 0.0, np.inf
     for name in ("Q1", "Q2"):
@@ -34,7 +34,7 @@ def orbit_lines(evidence: Evidence) -> Iterator[Line]:
     turned = source(
         "one turn of Q1 and of Q2, integrated from the solved motion", simulate, command="velodrome run q1 q2"
     )
-    yield words(
+    yield claim_line(
         section="3.1",
         claim="z, lean, pitch, steer, wheel rates and rim angles are constant on a circular motion",
         thresholds=[below("largest change [m, rad, rad/s]", constant, _KEPT)],
@@ -42,7 +42,7 @@ def orbit_lines(evidence: Evidence) -> Iterator[Line]:
         source=turned,
         checks=[integrated],
     )
-    yield words(
+    yield claim_line(
         section="3.1",
         claim="x and y vary sinusoidally, the heading grows linearly",
         thresholds=[below("largest departure [m, rad]", sinus, _KEPT)],
@@ -50,7 +50,7 @@ def orbit_lines(evidence: Evidence) -> Iterator[Line]:
         source=turned,
         checks=[integrated],
     )
-    yield words(
+    yield claim_line(
         section="3.1",
         claim="normal multipliers are constant, the others periodic",
         thresholds=[
@@ -87,26 +87,28 @@ def _one_turn(evidence: Evidence, name: str) -> tuple[float, float, float, float
     )
 
 
-def _circles(evidence: Evidence) -> Line:
+def _circles(evidence: Evidence) -> LedgerLine:
     least = np.inf
     for alpha in evidence.cases:
         for number in FAMILIES:
             u = np.array([point.unknowns[CONTACT] for point in evidence.family(alpha, number).points])
             least = min(least, float((np.hypot(u[:, 3], u[:, 4]) - np.hypot(u[:, 0], u[:, 1])).min()))
-    return words(
+    return claim_line(
         section="3.1",
         claim="the wheels' contact points run on two different circles",
         thresholds=[above("least difference of the circles' radii", least, 0.0, "m")],
         measured=f"along all families the front wheel's is the larger, by {least:.1e} m at least (on the largest "
         "circles)",
         source=source(
-            "radii of the contact points' circles along all families", trace, command=families_command(*evidence.cases)
+            "radii of the contact points' circles along all families",
+            trace,
+            command=families_command_line(*evidence.cases),
         ),
         checks=[evidence.residual()],
     )
 
 
-def _mirror(evidence: Evidence) -> Line:
+def _mirror(evidence: Evidence) -> LedgerLine:
     worst = 0.0
     for alpha in evidence.cases:
         for number in FAMILIES:
@@ -115,7 +117,7 @@ def _mirror(evidence: Evidence) -> Line:
                 here, there = point.unknowns, mirrored(point.unknowns)
                 change = np.abs(family.equations.residual(there)).max() - np.abs(family.equations.residual(here)).max()
                 worst = max(worst, float(change) / (1 + float(np.abs(here).max())))
-    return words(
+    return claim_line(
         section="3.2",
         claim="left and right are alike: a steer in [0, pi] is enough",
         thresholds=[below("residual of mirrored motions beyond that of the motions", worst, 1e-12)],

@@ -10,30 +10,30 @@ from ...reference.circular import CircularMotion
 from ...reference.kinematics import rotations
 from ...reference.stability import Linearisation, linearise
 from ...reference.surface import Paraboloid
-from .configurations import circular_command, named_motion, own_errors, solved_point
+from .configurations import circular_command_line, named_motion, own_errors, solved_point
 from .evidence import Evidence
-from .ledger import Check, Line, above, below, figure, source, untestable, words
+from .ledger import Check, LedgerLine, above, below, claim_line, figure_line, source, untestable_line
 
 _STATES = (("x", "D's x in the heading frame"), ("y", "D's y"), ("lean", "lean"), ("steer", "steer"))
 
 
-def point_lines(evidence: Evidence) -> Iterator[Line]:
+def point_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     """Lines on Q1 and Q2."""
     for name in ("Q1", "Q2"):
         motion, printed = named_motion(evidence, name), evidence.figures[name]
         errors = own_errors(evidence, name, motion)
         values = {"x": motion.position[0], "y": motion.position[1], "lean": motion.lean, "steer": motion.steer}
         for (field, what), text in zip(_STATES, printed["v"], strict=False):
-            yield figure(
+            yield figure_line(
                 "4.2", f"{name}: {what}", text, float(values[field]), errors[field], solved_point(evidence, name)
             )
         yield from _spectrum(evidence, name, motion)
         why = "the text lacks the matrix; its eigenvalues are held above"
-        yield untestable("4.2", f"{name}: the 7 x 7 Jacobian as printed", why, "number")
+        yield untestable_line("4.2", f"{name}: the 7 x 7 Jacobian as printed", why, "number")
     yield from _meaning(evidence)
 
 
-def _spectrum(evidence: Evidence, name: str, motion: CircularMotion) -> Iterator[Line]:
+def _spectrum(evidence: Evidence, name: str, motion: CircularMotion) -> Iterator[LedgerLine]:
     surface = Paraboloid(evidence.figures[name]["alpha"])
     reduced = linearise(evidence.bicycle, surface, *motion.state())
     error = eigenvalue_errors(reduced)
@@ -41,14 +41,14 @@ def _spectrum(evidence: Evidence, name: str, motion: CircularMotion) -> Iterator
         "eigenvalues of the reduced Jacobian at the motion",
         linearise,
         eigenvalue_errors,
-        command=circular_command(evidence, name),
+        command=circular_command_line(evidence, name),
     )
     for real, imaginary in evidence.figures[name]["eigenvalues"]:
         target = complex(float(real), float(imaginary))
         i = int(np.abs(reduced.eigenvalues - target).argmin())
         value = complex(reduced.eigenvalues[i])
         if target == 0:
-            yield words(
+            yield claim_line(
                 section="4.2",
                 claim=f"{name}: an eigenvalue is zero",
                 thresholds=[below("smallest size of an eigenvalue", abs(value), 1e-9, "1/s")],
@@ -60,9 +60,9 @@ def _spectrum(evidence: Evidence, name: str, motion: CircularMotion) -> Iterator
             )
             continue
         claim = f"{name}: eigenvalue {_complex(real, imaginary)}"
-        yield figure("4.2", f"{claim}, real part", real, value.real, float(error[i]), told)
+        yield figure_line("4.2", f"{claim}, real part", real, value.real, float(error[i]), told)
         if target.imag:
-            yield figure("4.2", f"{claim}, imaginary part", imaginary, abs(value.imag), float(error[i]), told)
+            yield figure_line("4.2", f"{claim}, imaginary part", imaginary, abs(value.imag), float(error[i]), told)
 
 
 def _complex(real: str, imaginary: str) -> str:
@@ -78,7 +78,7 @@ def eigenvalue_errors(reduced: Linearisation) -> np.ndarray:
     return 1e-14 * np.linalg.norm(reduced.jacobian) * condition[order]
 
 
-def _meaning(evidence: Evidence) -> Iterator[Line]:
+def _meaning(evidence: Evidence) -> Iterator[LedgerLine]:
     for name, stable, forward in (("Q1", False, True), ("Q2", True, False)):
         motion, point = named_motion(evidence, name), evidence.figures[name]
         surface = Paraboloid(point["alpha"])
@@ -87,9 +87,9 @@ def _meaning(evidence: Evidence) -> Iterator[Line]:
         growth = float(np.real(rest).max())
         field = Check("largest of X at the motion", float(np.abs(reduced.field).max()), 1e-9)
         sense, bar = ("anticlockwise", "forward") if forward else ("clockwise", "reversed")
-        command = circular_command(evidence, name)
+        command = circular_command_line(evidence, name)
         half, than = np.pi / 2, (above, below) if forward else (below, above)
-        yield words(
+        yield claim_line(
             section="4.2",
             claim=f"{name} rides {sense}, handlebar {bar}",
             thresholds=[
@@ -101,7 +101,7 @@ def _meaning(evidence: Evidence) -> Iterator[Line]:
             checks=[field],
         )
         what = "largest real part of the six other eigenvalues"
-        yield words(
+        yield claim_line(
             section="4.2",
             claim=f"{name} is {'Lyapunov stable, not asymptotically' if stable else 'Lyapunov unstable'}",
             thresholds=[(below if stable else above)(what, growth, 0.0, "1/s")],
@@ -116,7 +116,7 @@ def _meaning(evidence: Evidence) -> Iterator[Line]:
     yield _reference_point(evidence)
 
 
-def _reference_point(evidence: Evidence) -> Line:
+def _reference_point(evidence: Evidence) -> LedgerLine:
     """D at another height of the steering axis would give other x and y: how the printed ones tell."""
     worst, other = 0.0, np.inf
     for name in ("Q1", "Q2"):
@@ -129,7 +129,7 @@ def _reference_point(evidence: Evidence) -> Line:
         rise = (bicycle.rear_wheel_radius - bicycle.front_wheel_radius) / bicycle.steer_axis[2]
         shift = rotations(bicycle, q[None])[0, 0] @ (rise * bicycle.steer_axis)
         other = min(other, float(np.abs(motion.position[:2] + shift[:2] - [float(t) for t in printed]).max()))
-    return words(
+    return claim_line(
         section="2.1",
         claim="D is the point of the steering axis at the height of the front axle",
         thresholds=[
@@ -142,7 +142,7 @@ def _reference_point(evidence: Evidence) -> Line:
             "D of Q1 and Q2 for two readings of its place",
             named_motion,
             rotations,
-            command=" && ".join(circular_command(evidence, name) for name in ("Q1", "Q2")),
+            command=" && ".join(circular_command_line(evidence, name) for name in ("Q1", "Q2")),
         ),
         checks=[Check("largest residual", max(named_motion(evidence, n).residual for n in ("Q1", "Q2")), 1e-12)],
     )

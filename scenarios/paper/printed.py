@@ -9,6 +9,6 @@ from typing import Any
 
 
 @cache
-def printed() -> dict[str, Any]:
+def read_printed() -> dict[str, Any]:
     """Figures as printed by Xiong et al. (2020) and by the papers it is validated against."""
     return tomllib.loads(Path(__file__).with_name("printed.toml").read_text(encoding="utf-8"))

@@ -20,12 +20,12 @@ def abscissa(bicycle: Bicycle, front_rate: np.ndarray | float) -> np.ndarray:
     return np.arctan(bicycle.front_wheel_radius * np.abs(front_rate) / SPEED)
 
 
-def apart(one: np.ndarray, other: np.ndarray) -> float:
+def curve_distance(one: np.ndarray, other: np.ndarray) -> float:
     """Largest distance of a point of either curve (n, 3) from the other curve (Hausdorff) [rad]."""
-    return max(float(nearest(a, b)[0].max()) for a, b in ((one, other), (other, one)))
+    return max(float(nearest_point(a, b)[0].max()) for a, b in ((one, other), (other, one)))
 
 
-def nearest(points: np.ndarray, curve: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def nearest_point(points: np.ndarray, curve: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Distances (n,) of points (n, k) from a polyline (m, k), and where on it they are nearest, (n, k)."""
     start, along = curve[:-1], np.diff(curve, axis=0)
     length = np.maximum(np.einsum("mk,mk->m", along, along), 1e-300)

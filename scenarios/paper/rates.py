@@ -9,8 +9,8 @@ import numpy as np
 from ...reference.circular import Steady
 from ...reference.families import FAMILIES, rear_rate_slope, trace
 from .evidence import Evidence
-from .fast import FlatEnd, at_angle, expand, follow_flat_end, solve, with_angle
-from .ledger import Check, Line, above, below, source, words
+from .fast import FlatEnd, at_angle, expand_flat, follow_flat_end, solve_flat, with_angle
+from .ledger import Check, LedgerLine, above, below, claim_line, source
 
 _NEAREST = 1e-7  # rad from a lean of pi/2: nearer, round-off over the distance is no longer small
 _FAR = 1e4  # rad/s: a hundred times where the families' curves are cut off
@@ -19,7 +19,7 @@ _FAR = 1e4  # rad/s: a hundred times where the families' curves are cut off
 _LAW = 1e-4
 
 
-def rate_lines(evidence: Evidence) -> Iterator[Line]:
+def rate_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     """Lines on the range of rear rates."""
     flat: list[FlatEnd] = []
     infinite: list[float] = []
@@ -41,7 +41,7 @@ def rate_lines(evidence: Evidence) -> Iterator[Line]:
     worst = max((end.change for end in flat), default=np.nan)
     nearest = max((end.distance for end in flat), default=np.nan)
     least = min(infinite, default=np.nan)
-    yield words(
+    yield claim_line(
         section="3.2",
         claim="rear rates of circular motions run over [0, infinity)",
         thresholds=[
@@ -60,7 +60,7 @@ def rate_lines(evidence: Evidence) -> Iterator[Line]:
             "flat ends followed at fixed leans, fast ends solved at infinite speed, by equations in which rest and "
             "infinite speed are regular points",
             follow_flat_end,
-            solve,
+            solve_flat,
             trace,
         ),
         checks=[
@@ -73,8 +73,8 @@ def rate_lines(evidence: Evidence) -> Iterator[Line]:
 def _infinitely_fast(equations: Steady, unknowns: np.ndarray) -> float:
     """Size of the rear wheel's share in the speeds at the infinitely fast motion in which a curve ends."""
     chosen = with_angle(unknowns)
-    chosen = solve(equations, chosen, at_angle(np.pi / 2))
-    return abs(expand(equations, chosen).rear_speed)
+    chosen = solve_flat(equations, chosen, at_angle(np.pi / 2))
+    return abs(expand_flat(equations, chosen).rear_speed)
 
 
 def _rising(evidence: Evidence, alpha: float) -> float:

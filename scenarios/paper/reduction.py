@@ -6,20 +6,20 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...reference.curve import sample
+from ...reference.curve import sample_curve
 from ...reference.families import FAMILIES, trace
 from ...reference.stability import linearise
 from ...reference.surface import Paraboloid
-from .configurations import circular_command, named_motion
-from .evidence import Evidence, families_command
-from .ledger import Check, Line, above, below, count, equals, source, words
+from .configurations import circular_command_line, named_motion
+from .evidence import Evidence, families_command_line
+from .ledger import Check, LedgerLine, above, below, claim_line, count_line, equals, source
 from .pencil import generalised_eigenvalues, linearised_dae, number_of_finite, spurious
 from .structure import GAP_ROWS, derivatives, rank
 
 _DOUBLE_ZERO = 1e-6  # relative: two zeros that meet split by the root of round-off, times the condition
 
 
-def reduction_lines(evidence: Evidence) -> Iterator[Line]:
+def reduction_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     """Lines on section 4.1."""
     printed = evidence.figures["counts"]
     motion = named_motion(evidence, "Q2")
@@ -30,9 +30,9 @@ def reduction_lines(evidence: Evidence) -> Iterator[Line]:
     dependent, smallest = rank(gaps[:, [2, 5]])
     independent = len(q) - dependent
     solvable = [Check("round-off over the smallest singular value", 1e-12 / smallest, 1e-6)]
-    command = circular_command(evidence, "Q2")
+    command = circular_command_line(evidence, "Q2")
     ranked = source("rank of the gaps' derivatives at Q2", derivatives, rank, command=command)
-    yield count(
+    yield count_line(
         section="4.1",
         claim="seven coordinates are independent",
         printed=printed["independent_coordinates"],
@@ -41,7 +41,7 @@ def reduction_lines(evidence: Evidence) -> Iterator[Line]:
         source=ranked,
         checks=solvable,
     )
-    yield count(
+    yield count_line(
         section="4.1",
         claim="of these four are not cyclic: x and y in the heading frame, lean and steer",
         printed=printed["independent_noncyclic"],
@@ -53,7 +53,7 @@ def reduction_lines(evidence: Evidence) -> Iterator[Line]:
     reduced = linearise(evidence.bicycle, surface, q, qd)
     field, states = float(np.abs(reduced.field).max()), len(reduced.field)
     linearised = source("the reduced system at Q2", linearise, command=command)
-    yield count(
+    yield count_line(
         section="4.1",
         claim="the reduced system has seven first-order equations",
         printed=printed["reduced_states"],
@@ -64,7 +64,7 @@ def reduction_lines(evidence: Evidence) -> Iterator[Line]:
     )
     yield _same_equilibria(evidence)
     singular, smallest = rank(slopes["qdd"])
-    yield words(
+    yield claim_line(
         section="4.1",
         claim="the linearised DAE's matrix E is structurally singular",
         thresholds=[below("rank of E's rows of the equations", singular, len(slopes["qdd"]))],
@@ -76,7 +76,7 @@ def reduction_lines(evidence: Evidence) -> Iterator[Line]:
     yield _zero_everywhere(evidence)
 
 
-def _same_equilibria(evidence: Evidence) -> Line:
+def _same_equilibria(evidence: Evidence) -> LedgerLine:
     """X at the motions that the steady equations give, along all families."""
     worst, many = 0.0, 0
     for alpha in evidence.cases:
@@ -87,7 +87,7 @@ def _same_equilibria(evidence: Evidence) -> Line:
                 x = linearise(evidence.bicycle, family.equations.surface, q, qd).field
                 # Accelerations are differences of terms of the size of the squared rates.
                 worst, many = max(worst, float(np.abs(x).max() / (1 + np.abs(qd).max() ** 2))), many + 1
-    return words(
+    return claim_line(
         section="4.1",
         claim="the reduced system's equilibria are the circular motions of the DAE",
         thresholds=[below("largest of X, relative to the squared rates", worst, 1e-9)],
@@ -97,7 +97,7 @@ def _same_equilibria(evidence: Evidence) -> Line:
     )
 
 
-def _spurious(evidence: Evidence) -> Line:
+def _spurious(evidence: Evidence) -> LedgerLine:
     """The pencil lambda E - H of the linearised DAE, untouched, against the seven of the reduced system."""
     largest, texts, extra, orders, falsely = 0.0, [], [], [], 0
     for name in ("Q1", "Q2"):
@@ -117,7 +117,7 @@ def _spurious(evidence: Evidence) -> Line:
             f"spurious: {len(finite)} returned as finite numbers{sizes}, {int(np.sum(np.real(finite) > 0))} of them as "
             "if the motion were unstable"
         )
-    return words(
+    return claim_line(
         section="4.1",
         claim="a generalised eigenanalysis of the linearised DAE brings spurious eigenvalues",
         thresholds=[
@@ -139,7 +139,7 @@ def _spurious(evidence: Evidence) -> Line:
     )
 
 
-def _zero_everywhere(evidence: Evidence) -> Line:
+def _zero_everywhere(evidence: Evidence) -> LedgerLine:
     worst = 0.0
     for alpha in evidence.cases:
         for number in FAMILIES:
@@ -147,12 +147,12 @@ def _zero_everywhere(evidence: Evidence) -> Line:
             # Where the bicycle is fast, eigenvalues are known relative to the largest only.
             size = 1 + np.abs(samples.eigenvalues).max(axis=1)
             worst = max(worst, float((np.abs(samples.eigenvalues).min(axis=1) / size).max()))
-    return words(
+    return claim_line(
         section="4.1",
         claim="the Jacobian has a zero eigenvalue everywhere: no stable motion is asymptotically stable",
         thresholds=[below("largest of the smallest eigenvalues, relative to the largest,", worst, _DOUBLE_ZERO)],
         measured=f"the smallest eigenvalue is nowhere above {worst:.0e}, relative to the largest",
-        source=source("eigenvalues along all families", sample, command=families_command(*evidence.cases)),
+        source=source("eigenvalues along all families", sample_curve, command=families_command_line(*evidence.cases)),
         checks=[evidence.residual()],
         kind="stability",
     )

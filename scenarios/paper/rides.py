@@ -12,13 +12,13 @@ from ...reference.circular import CircularMotion
 from ...reference.contact import observe
 from ...reference.dae import consistent_state
 from ...reference.kinematics import REAR_ANGLE
-from ...reference.simulate import Motion, simulate, simulate_modified_euler
+from ...reference.simulate import PreciseMotion, simulate, simulate_modified_euler
 from ...reference.stability import independent, linearise
 from ...reference.surface import Paraboloid
 from .configurations import named_motion
 from .energy import motion_of_energy
 from .evidence import Evidence
-from .ledger import Check, Line, above, below, source, words
+from .ledger import Check, LedgerLine, above, below, claim_line, source
 
 _OUTPUT = 0.05  # s
 _LEAVES = 0.01  # of the circle's radius
@@ -31,7 +31,7 @@ _TOLERANCE = 1e-12
 _SLIGHT, _SETTLES = 1e-3, 400.0  # rad/s, s
 
 
-def ride_lines(evidence: Evidence) -> Iterator[Line]:
+def ride_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     """Lines on the simulations of section 4.2, and on energy."""
     yield from _unstable(evidence)
     rides = {sign: _disturbed(evidence, sign) for sign in (1, -1)}
@@ -55,12 +55,12 @@ class Leaving:
     rate: float
 
 
-def radius(ride: Motion) -> np.ndarray:
+def radius(ride: PreciseMotion) -> np.ndarray:
     """Distance of D from the axis [m]."""
     return np.hypot(ride.q[:, 0], ride.q[:, 1])
 
 
-def leaving_time(ride: Motion, circle: float) -> float:
+def leaving_time(ride: PreciseMotion, circle: float) -> float:
     """When the radius is first off by a hundredth, between two outputs as if it grew exponentially [s]."""
     off = np.abs(radius(ride) - circle) / circle
     beyond = np.flatnonzero(off > _LEAVES)
@@ -73,7 +73,7 @@ def leaving_time(ride: Motion, circle: float) -> float:
     return float(ride.time[i - 1] + share * (ride.time[i] - ride.time[i - 1]))
 
 
-def _leave(evidence: Evidence, ride: Motion, motion: CircularMotion, window: tuple[float, float]) -> Leaving:
+def _leave(evidence: Evidence, ride: PreciseMotion, motion: CircularMotion, window: tuple[float, float]) -> Leaving:
     reduced = linearise(evidence.bicycle, Paraboloid(evidence.figures["Q1"]["alpha"]), *motion.state())
     values, right = np.linalg.eig(reduced.jacobian)
     unstable = np.real(np.linalg.inv(right)[int(np.real(values).argmax())])
@@ -83,7 +83,7 @@ def _leave(evidence: Evidence, ride: Motion, motion: CircularMotion, window: tup
     return Leaving(leaving_time(ride, float(np.hypot(*motion.position[:2]))), rate)
 
 
-def _unstable(evidence: Evidence) -> Iterator[Line]:
+def _unstable(evidence: Evidence) -> Iterator[LedgerLine]:
     motion, surface = named_motion(evidence, "Q1"), Paraboloid(evidence.figures["Q1"]["alpha"])
     step = evidence.figures["simulation"]["step"]
     reduced = linearise(evidence.bicycle, surface, *motion.state())
@@ -99,7 +99,7 @@ def _unstable(evidence: Evidence) -> Iterator[Line]:
     # An error of order two shrinks by four when the step is halved: the ride leaves ln 4 / growth later.
     delay, expected = half.at - one.at, np.log(4) / growth
     grown = Check("growth rate of the precise ride, relative to the eigenvalue", abs(precise.rate / growth - 1), 1e-2)
-    yield words(
+    yield claim_line(
         section="4.2",
         claim="even with just numerical errors Q1 does not keep its circle",
         thresholds=[below(f"time until the radius is off by {_LEAVES:.0%}", _or_never(one.at), _WATCHED["paper"], "s")],
@@ -118,7 +118,7 @@ def _or_never(time: float) -> float:
     return time if np.isfinite(time) else float("inf")
 
 
-def _rounded_start(evidence: Evidence, motion: CircularMotion, surface: Paraboloid, step: float) -> Line:
+def _rounded_start(evidence: Evidence, motion: CircularMotion, surface: Paraboloid, step: float) -> LedgerLine:
     """From v* as printed: rounding to two decimals outweighs the integrator's errors by far."""
     v = [float(text) for text in evidence.figures["Q1"]["v"]]
     guess = (float(motion.position[2]), motion.pitch)
@@ -130,7 +130,7 @@ def _rounded_start(evidence: Evidence, motion: CircularMotion, surface: Parabolo
         simulate(evidence.bicycle, surface, *start, times),
     ]
     leaves = [leaving_time(ride, circle) for ride in rides]
-    return words(
+    return claim_line(
         section="4.2",
         claim="Q1, started from v* as printed, leaves its circle",
         thresholds=[below(f"time until the radius is off by {_LEAVES:.0%}", _or_never(max(leaves)), times[-1], "s")],
@@ -142,8 +142,8 @@ def _rounded_start(evidence: Evidence, motion: CircularMotion, surface: Parabolo
     )
 
 
-def _disturbed(evidence: Evidence, sign: int) -> Motion:
-    def compute() -> Motion:
+def _disturbed(evidence: Evidence, sign: int) -> PreciseMotion:
+    def compute() -> PreciseMotion:
         motion, surface = named_motion(evidence, "Q2"), Paraboloid(evidence.figures["Q2"]["alpha"])
         x, y, z = (float(value) for value in motion.position)
         rates = (sign * evidence.figures["simulation"]["lean_rate"], 0.0, motion.rear_rate)
@@ -156,15 +156,15 @@ def _disturbed(evidence: Evidence, sign: int) -> Motion:
     return evidence.once(("ride of Q2", sign), compute)
 
 
-def _energies(evidence: Evidence, ride: Motion) -> np.ndarray:
+def _energies(evidence: Evidence, ride: PreciseMotion) -> np.ndarray:
     seen = observe(evidence.bicycle, Paraboloid(evidence.figures["Q2"]["alpha"]), ride.q, ride.qd)
     return seen.kinetic_energy + seen.potential_energy
 
 
-def _energy(evidence: Evidence, rides: dict[int, Motion]) -> Line:
+def _energy(evidence: Evidence, rides: dict[int, PreciseMotion]) -> LedgerLine:
     drift = max(float(np.ptp(e) / e[0]) for e in (_energies(evidence, ride) for ride in rides.values()))
     evaluations = sum(ride.evaluations for ride in rides.values())
-    return words(
+    return claim_line(
         section="2.3",
         claim="the uncontrolled bicycle conserves energy",
         thresholds=[below("change of the energy, relative,", drift, 1e-8)],
@@ -198,20 +198,20 @@ class Settling:
     decay: float
 
 
-def _settling(evidence: Evidence, ride: Motion, motion: CircularMotion) -> Settling:
+def _settling(evidence: Evidence, ride: PreciseMotion, motion: CircularMotion) -> Settling:
     late, rear = ride.time >= _LONG - _LATE, ride.qd[:, REAR_ANGLE]
     family = evidence.family(evidence.figures["Q2"]["alpha"], evidence.figures["Q2"]["family"])
     neighbour = motion_of_energy(family, float(_energies(evidence, ride)[0]), motion)
     return Settling(float(rear[late].mean()), float(np.ptp(rear[late])), neighbour.rear_rate, _decay(ride, rear))
 
 
-def _stable(evidence: Evidence, rides: dict[int, Motion]) -> Iterator[Line]:
+def _stable(evidence: Evidence, rides: dict[int, PreciseMotion]) -> Iterator[LedgerLine]:
     motion, surface = named_motion(evidence, "Q2"), Paraboloid(evidence.figures["Q2"]["alpha"])
     whole = [Check("rides that ended early", float(sum(ride.ended is not None for ride in rides.values())), 0.0)]
     circle = float(np.hypot(*motion.position[:2]))
     off = [float(np.abs(radius(ride) - circle).max()) for ride in rides.values()]
     ridden = source("rides from Q2, disturbed, over 1200 s", simulate)
-    yield words(
+    yield claim_line(
         section="4.2",
         claim="disturbed by a lean rate of +-0.1 rad/s Q2 stays close to its circle",
         thresholds=[below("largest departure of the radius, relative,", max(off) / circle, _CLOSE)],
@@ -225,7 +225,7 @@ def _stable(evidence: Evidence, rides: dict[int, Motion]) -> Iterator[Line]:
     error = max(abs(one.limit - one.predicted) for one in (plus, minus))
     apart = [abs(one.limit - motion.rear_rate) for one in (plus, minus)]
     left = max(plus.left, minus.left)
-    yield words(
+    yield claim_line(
         section="4.2",
         claim="the disturbed Q2's rear rate converges to a constant near, but not equal to, its own",
         thresholds=[
@@ -241,7 +241,7 @@ def _stable(evidence: Evidence, rides: dict[int, Motion]) -> Iterator[Line]:
     )
     slowest = float(np.sort(np.real(linearise(evidence.bicycle, surface, *motion.state()).eigenvalues))[-2])
     departs = abs((plus.decay + minus.decay) / 2 / slowest - 1)
-    yield words(
+    yield claim_line(
         section="4.2",
         claim="Q2 is stable but not asymptotically: a disturbance does not die out",
         thresholds=[
@@ -256,7 +256,7 @@ def _stable(evidence: Evidence, rides: dict[int, Motion]) -> Iterator[Line]:
     )
 
 
-def _decay(ride: Motion, rear: np.ndarray, end: float = 500.0) -> float:
+def _decay(ride: PreciseMotion, rear: np.ndarray, end: float = 500.0) -> float:
     """Slope of the logarithm of the rear rate's span over windows of 20 s, from 100 s on [1/s]."""
     starts = np.arange(100.0, end, 50.0)
     spans = [np.ptp(rear[(ride.time >= start) & (ride.time < start + 20)]) for start in starts]

@@ -19,7 +19,7 @@ from ...reference.circular import (
     rear_rate_condition,
     unknown_condition,
 )
-from ...reference.continuation import follow, sign_changes
+from ...reference.continuation import follow_curve, sign_changes
 from ...reference.kernels.steady import STANDING, UNKNOWNS
 
 _MOST = 25  # Newton steps
@@ -64,7 +64,7 @@ OTHER_GRID = Grid((-1.3, 1.3, 6), (0.02, 3.12, 6), (2.0, 7.0, 15.0, 30.0))
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundMotion:
     """What a search has found, with the steer in [0, pi].
 
     Attributes
@@ -90,7 +90,7 @@ class Found:
         return len(self.curves) + sum(_pivots(curve) for curve in self.curves)
 
 
-def search(equations: Steady, grid: Grid = GRID) -> Found:
+def search_motions(equations: Steady, grid: Grid = GRID) -> FoundMotion:
     """Look for all circular motions of a bicycle on a surface."""
     static = list(_distinct(_solutions(equations, unknown_condition(SIGMA, 0.0), grid)))
     pivoting = list(_distinct(_solutions(equations, unknown_condition(REAR_SPEED, 0.0), grid)))
@@ -101,16 +101,18 @@ def search(equations: Steady, grid: Grid = GRID) -> Found:
     for start in starts:
         if all(distance(curve, start) > _ON_CURVE for curve in curves):
             curves.append(_whole(equations, start))
-    return Found(equations, static, pivoting, curves, grid.described)
+    return FoundMotion(equations, static, pivoting, curves, grid.described)
 
 
-def missing(one: Found, other: Found) -> int:
+def find_missing(one: FoundMotion, other: FoundMotion) -> int:
     """Number of equilibria, pivoting motions and curves that one of two searches has and the other has not."""
     lone = sum(abs(len(getattr(one, what)) - len(getattr(other, what))) for what in ("static", "pivoting", "curves"))
     for first, second in ((one, other), (other, one)):
         for what in ("static", "pivoting"):
-            known = [coordinates(u) for u in getattr(second, what)]
-            lone += sum(all(np.abs(coordinates(u) - k).max() > _SAME for k in known) for u in getattr(first, what))
+            known = [search_coordinates(u) for u in getattr(second, what)]
+            lone += sum(
+                all(np.abs(search_coordinates(u) - k).max() > _SAME for k in known) for u in getattr(first, what)
+            )
         # In the middle of a curve: at their ends two followed curves may differ by a step.
         middles = [curve[len(curve) // 2] for curve in first.curves]
         lone += sum(all(distance(curve, u) > _ON_CURVE for curve in second.curves) for u in middles)
@@ -124,7 +126,7 @@ def mirrored(unknowns: np.ndarray) -> np.ndarray:
     return other
 
 
-def coordinates(unknowns: np.ndarray) -> np.ndarray:
+def search_coordinates(unknowns: np.ndarray) -> np.ndarray:
     """Where solutions (..., 22) lie: lean, steer, pitch, and angles of bounded size for radius and speed."""
     radius = np.hypot(unknowns[..., 0], unknowns[..., 1])
     parts = (*np.moveaxis(unknowns[..., [LEAN, STEER, PITCH]], -1, 0), np.arctan(radius / 5))
@@ -132,8 +134,8 @@ def coordinates(unknowns: np.ndarray) -> np.ndarray:
 
 
 def distance(curve: np.ndarray, unknowns: np.ndarray) -> float:
-    """Distance of a solution from the points of a curve (n, 22), in `coordinates`."""
-    return float(np.linalg.norm(coordinates(curve) - coordinates(unknowns), axis=1).min())
+    """Distance of a solution from the points of a curve (n, 22), in `search_coordinates`."""
+    return float(np.linalg.norm(search_coordinates(curve) - search_coordinates(unknowns), axis=1).min())
 
 
 def _pivots(curve: np.ndarray) -> int:
@@ -163,13 +165,13 @@ def _possible(equations: Steady, unknowns: np.ndarray) -> bool:
 def _distinct(solutions: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
     seen: list[np.ndarray] = []
     for unknowns in solutions:
-        if all(np.abs(coordinates(unknowns) - other).max() > _SAME for other in seen):
-            seen.append(coordinates(unknowns))
+        if all(np.abs(search_coordinates(unknowns) - other).max() > _SAME for other in seen):
+            seen.append(search_coordinates(unknowns))
             yield unknowns
 
 
 def _whole(equations: Steady, start: np.ndarray) -> np.ndarray:
     """The curve through a solution, followed both ways."""
     along = np.eye(UNKNOWNS)[STEER]
-    one, other = ([p.unknowns for p in follow(equations, start, s * along, _ON_CURVE)] for s in (1, -1))
+    one, other = ([p.unknowns for p in follow_curve(equations, start, s * along, _ON_CURVE)] for s in (1, -1))
     return np.array([*reversed(other), *one[1:]])

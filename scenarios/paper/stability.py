@@ -9,14 +9,14 @@ import numpy as np
 
 from ...reference.circular import SIGMA, CircularMotion
 from ...reference.critical import CriticalPoint, last_stable
-from ...reference.curve import sample
+from ...reference.curve import sample_curve
 from ...reference.families import FAMILIES
 from ...reference.sections import SectionEnd, stable_sections
 from ...reference.special import special_points
 from ...reference.stability import Linearisation, growth_rate, linearise
 from ...reference.surface import Paraboloid
-from .evidence import OTHER_STEP, Evidence, families_command
-from .ledger import Check, Line, Source, Threshold, above, below, equals, source, words
+from .evidence import OTHER_STEP, Evidence, families_command_line
+from .ledger import Check, LedgerLine, Source, Threshold, above, below, claim_line, equals, source
 from .profile import abscissa
 from .rides import disturbed_decay
 
@@ -27,7 +27,7 @@ _VANISHING = source("where the last stable section of a family vanishes", last_s
 _SEARCHED = 0.05  # alpha up to which last sections are looked for closely; the scan goes on from there
 
 
-def section_lines(evidence: Evidence) -> Iterator[Line]:
+def section_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     """Lines on where circular motions are Lyapunov stable."""
     for alpha in evidence.cases:
         yield _stable_families(evidence, alpha)
@@ -49,7 +49,7 @@ def _text(number: int, ends: tuple[SectionEnd, SectionEnd]) -> str:
     return f"family {number}: rear rate {rates}"
 
 
-def _stable_families(evidence: Evidence, alpha: float) -> Line:
+def _stable_families(evidence: Evidence, alpha: float) -> LedgerLine:
     sections = {n: evidence.sections(alpha, n) for n in FAMILIES}
     stable = [n for n in FAMILIES if sections[n]]
     printed = [n for key, families in evidence.figures["stable_in"].items() if float(key) == alpha for n in families]
@@ -70,7 +70,7 @@ def _stable_families(evidence: Evidence, alpha: float) -> Line:
     ]
     if not stable:
         thresholds.append(above("slowest growth on all curves", least, 0.0, "1/s"))
-    return words(
+    return claim_line(
         section="4.2",
         claim=f"at alpha = {alpha:g} stable motions are in families: {named}",
         thresholds=thresholds,
@@ -78,8 +78,8 @@ def _stable_families(evidence: Evidence, alpha: float) -> Line:
         source=source(
             "stable sections of all families, their ends solved for, and the growth on all curves",
             stable_sections,
-            sample,
-            command=families_command(alpha),
+            sample_curve,
+            command=families_command_line(alpha),
             search=evidence.found(alpha).described,
         ),
         checks=checks,
@@ -91,7 +91,7 @@ def _stable_families(evidence: Evidence, alpha: float) -> Line:
 def _least_growth(evidence: Evidence, alpha: float) -> float:
     """Slowest growth on all curves at alpha, of families or from a grid of starts [1/s]."""
     found = evidence.found(alpha)
-    rates = [sample(found.equations, curve[curve[:, SIGMA] >= 0]).growth_rate.min() for curve in found.curves]
+    rates = [sample_curve(found.equations, curve[curve[:, SIGMA] >= 0]).growth_rate.min() for curve in found.curves]
     for number in FAMILIES:
         try:
             rates.append(evidence.samples(alpha, number).growth_rate.min())
@@ -140,14 +140,14 @@ def _inside(evidence: Evidence, alpha: float, number: int, ends: tuple[SectionEn
     return growth_rate(Paraboloid(alpha), reduced.eigenvalues, motion.yaw_rate)
 
 
-def _next_to_cusps(evidence: Evidence, alpha: float, cusps: dict[int, str]) -> Line:
+def _next_to_cusps(evidence: Evidence, alpha: float, cusps: dict[int, str]) -> LedgerLine:
     gaps = {}
     for number, name in cusps.items():
         cusp, sections = evidence.special(alpha, number, name), evidence.sections(alpha, number)
         if cusp is not None:
             ends = [end.motion for section in sections for end in section]
             gaps[name] = min([np.inf, *(float(np.hypot(m.lean - cusp.lean, m.steer - cusp.steer)) for m in ends)])
-    return words(
+    return claim_line(
         section="4.2",
         claim=f"at alpha = {alpha:g} stable motions neighbour the cusp {' and '.join(cusps.values())}",
         thresholds=[
@@ -162,13 +162,15 @@ def _next_to_cusps(evidence: Evidence, alpha: float, cusps: dict[int, str]) -> L
         measured="they begin "
         + ", ".join(f"{gap:.5f} rad from {name}" for name, gap in gaps.items())
         + "; the cusps themselves are unstable",
-        source=source("stable sections and cusps", stable_sections, special_points, command=families_command(alpha)),
+        source=source(
+            "stable sections and cusps", stable_sections, special_points, command=families_command_line(alpha)
+        ),
         checks=[evidence.residual((alpha,))],
         kind="stability",
     )
 
 
-def _small(evidence: Evidence) -> Line:
+def _small(evidence: Evidence) -> LedgerLine:
     widths = {}
     for alpha in evidence.cases:
         for number in FAMILIES:
@@ -176,7 +178,7 @@ def _small(evidence: Evidence) -> Line:
                 widths[f"{alpha:g}, family {number}"] = _width(evidence, ends)
     largest = max(widths.values(), default=0.0)
     text = "; ".join(f"{where}: {width:.4f}" for where, width in widths.items())
-    return words(
+    return claim_line(
         section="4.2",
         claim="stable sections are small",
         thresholds=[
@@ -190,22 +192,22 @@ def _small(evidence: Evidence) -> Line:
 
 
 def _sections_of(alphas: tuple[float, ...]) -> Source:
-    return source("stable sections of all families", stable_sections, command=families_command(*alphas))
+    return source("stable sections of all families", stable_sections, command=families_command_line(*alphas))
 
 
 def _last(evidence: Evidence, number: int) -> CriticalPoint | None:
     return evidence.once(("last stable", number), lambda: last_stable(evidence.bicycle, number, _SEARCHED))
 
 
-def _second_and_fourth(evidence: Evidence) -> Line:
+def _second_and_fourth(evidence: Evidence) -> LedgerLine:
     two, four = _last(evidence, 2), _last(evidence, 4)
     others = [n for n in (1, 3) if any(evidence.sections(alpha, n) for alpha in evidence.cases)]
     claim = "when the curvature is very small there are stable sections in families 2 and 4"
     if two is None or four is None:
         missing = equals("families 2 and 4 with stable sections", sum(each is not None for each in (two, four)), 2)
-        return words("5", claim, [missing], "one of them has none", _VANISHING, [])
+        return claim_line("5", claim, [missing], "one of them has none", _VANISHING, [])
     residual = Check("growth rate where the last sections vanish", max(two.residual, four.residual), 1e-9)
-    return words(
+    return claim_line(
         section="5",
         claim=claim,
         thresholds=[
@@ -220,7 +222,7 @@ def _second_and_fourth(evidence: Evidence) -> Line:
     )
 
 
-def _shrinks(evidence: Evidence) -> Line:
+def _shrinks(evidence: Evidence) -> LedgerLine:
     slowest, first, parts = np.inf, np.inf, []
     for number in (2, 4):
         widths = [sum(_width(evidence, e) for e in evidence.sections(a, number)) for a in _SHRINKING]
@@ -228,7 +230,7 @@ def _shrinks(evidence: Evidence) -> Line:
         slowest = min([slowest, *(a - b for a, b in pairwise(widths) if a > 0 or b > 0)])
         first = min(first, widths[0])
         parts.append(f"family {number}: " + ", ".join(f"{width:.4f}" for width in widths))
-    return words(
+    return claim_line(
         section="5",
         claim="the stable region shrinks as the curvature grows",
         thresholds=[
@@ -243,13 +245,13 @@ def _shrinks(evidence: Evidence) -> Line:
     )
 
 
-def _none_from(evidence: Evidence) -> Line:
+def _none_from(evidence: Evidence) -> LedgerLine:
     start = evidence.figures["none_from"]
     alphas = sorted(alpha for alpha in {*evidence.cases, *_SCAN} if alpha >= start)
     slowest = {alpha: _least_growth(evidence, alpha) for alpha in alphas}
     last = max((point.alpha for point in (_last(evidence, n) for n in (2, 4)) if point is not None), default=np.nan)
     residual = max((p.residual for n in (2, 4) if (p := _last(evidence, n))), default=np.inf)
-    return words(
+    return claim_line(
         section="5",
         claim=f"from alpha = {start:g} on no stable section exists",
         thresholds=[
@@ -260,7 +262,7 @@ def _none_from(evidence: Evidence) -> Line:
         f"vanishes at {last:.10f}. Between these alphas and beyond 1 nothing is proved",
         source=source(
             "growth on all curves at some alphas, and where the last section vanishes",
-            sample,
+            sample_curve,
             last_stable,
             command="velodrome critical",
             search=evidence.found(alphas[-1]).described,
@@ -270,12 +272,12 @@ def _none_from(evidence: Evidence) -> Line:
     )
 
 
-def _only_small(evidence: Evidence) -> Line:
+def _only_small(evidence: Evidence) -> LedgerLine:
     point, claim = _last(evidence, 2), "stable motions exist only on very small curvature"
     if point is None:
-        return words("1", claim, [equals("last sections", 0, 1)], "no last one is found", _VANISHING, [])
+        return claim_line("1", claim, [equals("last sections", 0, 1)], "no last one is found", _VANISHING, [])
     curvature = 2 * point.alpha
-    return words(
+    return claim_line(
         section="1",
         claim=claim,
         thresholds=[below("largest curvature times the wheelbase", curvature * evidence.bicycle.wheelbase, 0.1)],

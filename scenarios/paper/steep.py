@@ -8,25 +8,25 @@ import numpy as np
 
 from ...reference.circular import LEAN, REAR_SPEED, SIGMA, STEER
 from ...reference.critical import reconnections
-from ...reference.curve import sample
+from ...reference.curve import sample_curve
 from ...reference.families import FAMILIES, trace
 from ...reference.kernels.steady import STANDING
 from .bowl import profiles
-from .evidence import Evidence, families_command
+from .evidence import Evidence, families_command_line
 from .fast import carry_pivot, pivot_at, squared_rates, with_angle
-from .ledger import Check, Line, Source, above, below, count_by_cut, equals, source, words
-from .limits import Limit, limit
-from .search import Found, coordinates, distance, search
+from .ledger import Check, LedgerLine, Source, above, below, claim_line, count_by_cut, equals, source
+from .limits import FlatLimit, find_limit
+from .search import FoundMotion, distance, search_coordinates, search_motions
 
 _STEEP, _DEEP = 1.0, 0.2
 _BETWEEN = (0.425, 0.44, 0.46)  # where no pivoting motion is left
 _MUCH = 0.4  # rad in the figures' coordinates: twice what counts as alike
 _NEAR_REST, _NEAR_INFINITY = 0.41, 0.47  # alphas at which the pivoting motion is slow, and fast
 _G_AND_A = ("pivot", "static")
-_SAME = 0.1  # in `coordinates`: curves are followed in steps of as much
+_SAME = 0.1  # in `search_coordinates`: curves are followed in steps of as much
 
 
-def steep_lines(evidence: Evidence) -> Iterator[Line]:
+def steep_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     """Lines on alpha = 1 and on all alphas."""
     found = evidence.found(_STEEP)
     yield _changed(evidence)
@@ -38,7 +38,7 @@ def steep_lines(evidence: Evidence) -> Iterator[Line]:
     yield _never_without(evidence)
 
 
-def _solved(found: Found) -> Check:
+def _solved(found: FoundMotion) -> Check:
     worst = 0.0
     for curve in found.curves:
         for u in curve[::5]:
@@ -47,26 +47,28 @@ def _solved(found: Found) -> Check:
     return Check("largest residual of the 21 equations along the curves", worst, 1e-12)
 
 
-def _changed(evidence: Evidence) -> Line:
+def _changed(evidence: Evidence) -> LedgerLine:
     apart_by = profiles(evidence, _DEEP, _STEEP, FAMILIES)
-    return words(
+    return claim_line(
         section="3.3",
         claim="when alpha is large the profiles change a lot",
         thresholds=[above("largest distance of two curves in the figures' coordinates", max(apart_by), _MUCH, "rad")],
         measured=f"from 1/5 to 1 the curves followed from the families' anchors move by "
         f"{', '.join(f'{value:.2f}' for value in apart_by)} rad in the figures' coordinates",
-        source=source("the families' curves and their distance", profiles, command=families_command(_DEEP, _STEEP)),
+        source=source(
+            "the families' curves and their distance", profiles, command=families_command_line(_DEEP, _STEEP)
+        ),
         checks=[evidence.residual((_DEEP, _STEEP))],
     )
 
 
-def _searched(found: Found, what: str) -> Source:
-    return source(what, search, search=found.described)
+def _searched(found: FoundMotion, what: str) -> Source:
+    return source(what, search_motions, search=found.described)
 
 
-def _still_there(evidence: Evidence, found: Found) -> Line:
-    forces = sample(found.equations, np.array([*found.static, *found.pivoting])).normal_force
-    return words(
+def _still_there(evidence: Evidence, found: FoundMotion) -> LedgerLine:
+    forces = sample_curve(found.equations, np.array([*found.static, *found.pivoting])).normal_force
+    return claim_line(
         section="3.3",
         claim="at alpha = 1 a static equilibrium A and a pivoting motion G (H) still exist",
         thresholds=[
@@ -80,36 +82,36 @@ def _still_there(evidence: Evidence, found: Found) -> Line:
     )
 
 
-def _one_each(found: Found) -> bool:
+def _one_each(found: FoundMotion) -> bool:
     return (len(found.static), len(found.pivoting)) == (1, 1)
 
 
-def _third_and_fourth(evidence: Evidence, found: Found) -> Line:
+def _third_and_fourth(evidence: Evidence, found: FoundMotion) -> LedgerLine:
     gaps = []
     for number in (3, 4):
         start = evidence.family(_STEEP, number).points[0].unknowns
         gaps.append(float(np.abs(np.abs(start) - np.abs(found.pivoting[0])).max()))
-    return words(
+    return claim_line(
         section="3.3",
         claim="at alpha = 1 family 3 merges with family 4 at G",
         thresholds=[below("largest difference of the constants of their ends from G's", max(gaps), 1e-12)],
         measured=f"both start in the one pivoting motion: constants differ by {max(gaps):.0e}",
-        source=source("the ends of families 3 and 4", trace, command=families_command(_STEEP)),
+        source=source("the ends of families 3 and 4", trace, command=families_command_line(_STEEP)),
         checks=[_solved(found)],
     )
 
 
-def _holding(found: Found, unknowns: np.ndarray) -> np.ndarray:
+def _holding(found: FoundMotion, unknowns: np.ndarray) -> np.ndarray:
     """The curve that passes a solution."""
     return min(found.curves, key=lambda curve: distance(curve, unknowns))
 
 
-def _towards(found: Found, curve: np.ndarray) -> Limit:
+def _towards(found: FoundMotion, curve: np.ndarray) -> FlatLimit:
     """Limit of a curve's end at a lean of -pi/2."""
-    return limit(found.equations, [curve[0], curve[-1]], -1)
+    return find_limit(found.equations, [curve[0], curve[-1]], -1)
 
 
-def _first_and_third(evidence: Evidence, found: Found) -> Iterator[Line]:
+def _first_and_third(evidence: Evidence, found: FoundMotion) -> Iterator[LedgerLine]:
     at_rest, pivoting = _holding(found, found.static[0]), _holding(found, found.pivoting[0])
     one, other = _towards(found, at_rest), _towards(found, pivoting)
     touch = evidence.touching((1, 3))
@@ -118,7 +120,7 @@ def _first_and_third(evidence: Evidence, found: Found) -> Iterator[Line]:
     if touch is not None:
         exchanged.append(Check("residual of the touching point's equations", touch.residual, 1e-12))
     where = "nowhere" if touch is None else f"at alpha = {touch.alpha:.11f}"
-    yield words(
+    yield claim_line(
         section="3.3",
         claim="by alpha = 1 family 3 has met family 1",
         thresholds=[
@@ -129,17 +131,21 @@ def _first_and_third(evidence: Evidence, found: Found) -> Iterator[Line]:
         measured=f"they have exchanged ends {where}: the curve that starts in A, as family 1 did, runs to F (-pi/2, 0, "
         f"infinity), as family 3 did; the curve of G tends to the same corner of the figure (steers {one.steer:.5f}, "
         f"{other.steer:.5f})",
-        source=source("the touching point, and the curves' limits", reconnections, limit, command="velodrome critical"),
+        source=source(
+            "the touching point, and the curves' limits", reconnections, find_limit, command="velodrome critical"
+        ),
         checks=exchanged,
     )
     yield _at_b(evidence, found)
     near = min(distance(pivoting, u) for u in at_rest)
     apart = abs(one.radius - other.radius)
-    yield words(
+    yield claim_line(
         section="3.3",
         claim="so at alpha = 1 families 1, 3 and 4 are one combined family",
         thresholds=[
-            below("least distance of the curve of A from that of G (its coordinates as in `search`)", near, _SAME)
+            below(
+                "least distance of the curve of A from that of G (its coordinates as in `search_motions`)", near, _SAME
+            )
         ],
         measured=f"the curve of A and the curve of G (through H into family 4) share no motion: nowhere nearer than "
         f"{near:.3f} (lean, steer, pitch, bounded radius and speed); at the corner they share in the figure D rides "
@@ -150,17 +156,19 @@ def _first_and_third(evidence: Evidence, found: Found) -> Iterator[Line]:
     yield _combined_somewhere(evidence)
 
 
-def _at_b(evidence: Evidence, found: Found) -> Line:
+def _at_b(evidence: Evidence, found: FoundMotion) -> LedgerLine:
     """B as the text has it: straight ahead, upright, which is the limit of large circles with the handlebar forward."""
     ends = [(curve, u) for curve in found.curves for u in (curve[0], curve[-1]) if u[STEER] < 0.5 * np.pi]
     straight, end = max(ends, key=lambda pair: float(np.hypot(*pair[1][:2])))
     pivoting, at_rest = _holding(found, found.pivoting[0]), _holding(found, found.static[0])
     apart = min(distance(pivoting, u) for u in straight)
     from_a = min(distance(at_rest, u) for u in straight)
-    return words(
+    return claim_line(
         section="3.3",
         claim="at alpha = 1 family 3 merges with family 1 at point B",
-        thresholds=[below("least distance of B's curve from that of G (coordinates as in `search`)", apart, _SAME)],
+        thresholds=[
+            below("least distance of B's curve from that of G (coordinates as in `search_motions`)", apart, _SAME)
+        ],
         measured="B, upright straight motion by the text, is the limit of large circles with the handlebar forward "
         f"(here lean {end[LEAN]:.2f}, steer {end[STEER]:.2f}, D's circle {np.hypot(*end[:2]):.0f} m). It lies on a "
         f"curve of its own, nowhere nearer than {apart:.3f} to the curve of G and {from_a:.3f} to the curve of A. The "
@@ -170,7 +178,7 @@ def _at_b(evidence: Evidence, found: Found) -> Line:
     )
 
 
-def _four_still(evidence: Evidence, found: Found) -> Iterator[Line]:
+def _four_still(evidence: Evidence, found: FoundMotion) -> Iterator[LedgerLine]:
     """Number of families at alpha = 1 by how curves are cut, beside those on the plane by the same cut."""
     level = evidence.found(evidence.cases[0])
     cuts = {
@@ -195,22 +203,24 @@ def _four_still(evidence: Evidence, found: Found) -> Iterator[Line]:
     )
 
 
-def _pushed(found: Found) -> int:
+def _pushed(found: FoundMotion) -> int:
     """Number of pieces along which the ground pushes both wheels, cut at pivoting motions in them."""
     pieces = 0
     for curve in found.curves:
         # A pivoting motion itself has a rear rate of zero to round-off, of either sign: its neighbours tell.
         moving = curve[(curve[:, SIGMA] >= 0) & (np.abs(curve[:, REAR_SPEED]) > STANDING)]
-        physical = sample(found.equations, moving).physical
+        physical = sample_curve(found.equations, moving).physical
         turns = (moving[:-1, REAR_SPEED] * moving[1:, REAR_SPEED] < 0) & physical[:-1] & physical[1:]
         pieces += int(physical[0]) + int(np.sum(~physical[:-1] & physical[1:])) + int(np.sum(turns))
     return pieces
 
 
-def _nearest(found: Found) -> float:
+def _nearest(found: FoundMotion) -> float:
     """Least distance between two curves."""
     pairs = [(a, b) for i, a in enumerate(found.curves) for b in found.curves[:i]]
-    return min(float(np.linalg.norm(coordinates(a)[:, None] - coordinates(b), axis=2).min()) for a, b in pairs)
+    return min(
+        float(np.linalg.norm(search_coordinates(a)[:, None] - search_coordinates(b), axis=2).min()) for a, b in pairs
+    )
 
 
 def _ends(curve: np.ndarray) -> str:
@@ -219,12 +229,12 @@ def _ends(curve: np.ndarray) -> str:
     )
 
 
-def _combined_somewhere(evidence: Evidence) -> Line:
+def _combined_somewhere(evidence: Evidence) -> LedgerLine:
     """Where families 1, 3, 4 are one curve: from where 1 and 3 touch to where the pivoting motion comes to rest."""
     touch, (rest, _) = evidence.touching((1, 3)), _at_rest(evidence)
     low = np.nan if touch is None else touch.alpha
     middle = evidence.family(0.5 * (low + rest), 3).ends if low < rest else ("", "")
-    return words(
+    return claim_line(
         section="5",
         claim="when alpha is large enough families 1, 3 and 4 are one",
         thresholds=[
@@ -257,7 +267,7 @@ def _infinitely_fast(evidence: Evidence) -> tuple[float, np.ndarray]:
     )
 
 
-def _never_without(evidence: Evidence) -> Line:
+def _never_without(evidence: Evidence) -> LedgerLine:
     """Families 3 and 4 meet in a pivoting motion: from one alpha to another there is none."""
     (rest, slow), (fast, quick) = _at_rest(evidence), _infinitely_fast(evidence)
     inside = [alpha for alpha in _BETWEEN if rest < alpha < fast]
@@ -268,7 +278,7 @@ def _never_without(evidence: Evidence) -> Line:
     lowest, highest = min(squares, default=np.nan), max(squares, default=np.nan)
     none = sum(len(each.pivoting) for each in found)
     least = min((len(each.pivoting) for each in found), default=0)
-    return words(
+    return claim_line(
         section="5",
         claim="families 3 and 4 can always be merged through the pivoting motion",
         thresholds=[equals("least number of pivoting motions at alphas between the five cases", least, 1)],
@@ -280,7 +290,7 @@ def _never_without(evidence: Evidence) -> Line:
             "alphas at which the pivoting motion's squared rates are zero, and infinite; searches between",
             pivot_at,
             carry_pivot,
-            search,
+            search_motions,
             search=found[0].described if found else None,
         ),
         checks=[
@@ -291,12 +301,12 @@ def _never_without(evidence: Evidence) -> Line:
     )
 
 
-def _always(evidence: Evidence) -> Iterator[Line]:
+def _always(evidence: Evidence) -> Iterator[LedgerLine]:
     cases = {alpha: evidence.found(alpha) for alpha in evidence.cases}
     solved = [*(_solved(found) for found in cases.values()), evidence.searched_again(*cases)]
     many = "; ".join(f"{a:g}: {len(f.static)} and {len(f.pivoting)}" for a, f in cases.items())
     searched = _searched(next(iter(cases.values())), "static equilibria and pivoting motions of the five cases")
-    yield words(
+    yield claim_line(
         section="5",
         claim="in the five cases there are one static equilibrium and one pivoting motion",
         thresholds=[equals("cases with one of each", sum(map(_one_each, cases.values())), len(cases))],
@@ -304,9 +314,11 @@ def _always(evidence: Evidence) -> Iterator[Line]:
         source=searched,
         checks=solved,
     )
-    rates = [abs(sample(f.equations, np.array(f.pivoting)).front_rate).min() for f in cases.values() if f.pivoting]
+    rates = [
+        abs(sample_curve(f.equations, np.array(f.pivoting)).front_rate).min() for f in cases.values() if f.pivoting
+    ]
     rests = [abs(u[SIGMA]) for f in cases.values() for u in f.static]
-    yield words(
+    yield claim_line(
         section="5",
         claim="in the static equilibrium both wheels stand, in the pivoting motion the rear wheel alone",
         thresholds=[
@@ -323,17 +335,17 @@ def _always(evidence: Evidence) -> Iterator[Line]:
         abs(abs(evidence.family(a, 3).points[0].unknowns) - abs(evidence.family(a, 4).points[0].unknowns)).max()
         for a in cases
     ]
-    yield words(
+    yield claim_line(
         section="5",
         claim="in the five cases families 3 and 4 merge in the pivoting motion",
         thresholds=[below("largest difference of the constants of their ends", max(apart), 1e-12)],
         measured=f"both start in it: constants differ by at most {max(apart):.0e}",
-        source=source("the ends of families 3 and 4", trace, command=families_command(*cases)),
+        source=source("the ends of families 3 and 4", trace, command=families_command_line(*cases)),
         checks=solved,
     )
     alpha = _BETWEEN[1]
     between = evidence.found(alpha)
-    yield words(
+    yield claim_line(
         section="5",
         claim="there always are one static equilibrium and one pivoting motion",
         thresholds=[
@@ -348,7 +360,7 @@ def _always(evidence: Evidence) -> Iterator[Line]:
     )
 
 
-def _steers_apart(found: Found) -> Check:
+def _steers_apart(found: FoundMotion) -> Check:
     steers = np.sort([u[STEER] for u in found.static])
     gap = float(np.diff(steers).min()) if len(steers) > 1 else np.inf
     return Check("round-off over the distance of two static equilibria", 1e-12 / gap, 1e-6)

@@ -16,7 +16,7 @@ from ...reference.kinematics import COORDINATES, YAW, angular_velocities, body_v
 from ...reference.surface import Paraboloid
 from .brackets import growth
 from .evidence import Evidence
-from .ledger import Check, Line, below, count, equals, source, words
+from .ledger import Check, LedgerLine, below, claim_line, count_line, equals, source
 
 CONTACT_ROWS, GAP_ROWS, ROLLING_ROWS = slice(9, 15), slice(15, 17), slice(17, 21)
 _BODIES, _HINGES = 4, 3
@@ -26,7 +26,7 @@ _ROUND_OFF = 1e-9  # of the largest singular value: what is below is zero to rou
 _PLACE, _LEAN, _STEER, _RATES = (1.3, -2.1), 0.2, 0.4, (0.3, -0.5, 12.0)
 
 
-def structure_lines(evidence: Evidence) -> Iterator[Line]:
+def structure_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     """Lines on sections 2 and 3.1."""
     printed, bicycle, surface = evidence.figures["counts"], evidence.bicycle, Paraboloid(0.2)
     q, qd = consistent_state(bicycle, surface, _PLACE, _LEAN, _STEER, _RATES)
@@ -49,9 +49,9 @@ def _clear(smallest: float) -> Check:
     return Check("limit of round-off over the smallest singular value that counts", _ROUND_OFF / smallest, 1e-3)
 
 
-def _bodies(printed: dict[str, int], bicycle: Bicycle, q: np.ndarray) -> Iterator[Line]:
+def _bodies(printed: dict[str, int], bicycle: Bicycle, q: np.ndarray) -> Iterator[LedgerLine]:
     names = [f.name for f in fields(bicycle) if f.name != "gravity"]
-    yield count(
+    yield count_line(
         section="2.1",
         claim="the bicycle has 25 geometric and mass parameters",
         printed=printed["parameters"],
@@ -64,7 +64,7 @@ def _bodies(printed: dict[str, int], bicycle: Bicycle, q: np.ndarray) -> Iterato
     motion = np.concatenate([body_velocities(bicycle, many, unit), angular_velocities(bicycle, many, unit)], axis=2)
     free, smallest = rank(motion.reshape(9, -1))
     hinged = Check("4 x 6 - 3 x 5 less the rank", abs(6 * _BODIES - 5 * _HINGES - free), 0.0)
-    yield count(
+    yield count_line(
         section="2.1",
         claim="without contacts the bicycle has nine coordinates: 4 x 6 - 3 x 5",
         printed=printed["coordinates"],
@@ -75,7 +75,7 @@ def _bodies(printed: dict[str, int], bicycle: Bicycle, q: np.ndarray) -> Iterato
     )
     product = _turn(2, q[3]) @ _turn(0, q[4]) @ _turn(1, q[5])
     error = float(np.abs(product - rotations(bicycle, q[None])[0, 0]).max())
-    yield words(
+    yield claim_line(
         section="2.1",
         claim="the rear frame's angles are yaw, lean, pitch, in the order 3-1-2",
         thresholds=[below("largest entry of the difference", error, 1e-14)],
@@ -110,12 +110,12 @@ def derivatives(bicycle: Bicycle, surface: Paraboloid, q: np.ndarray, qd: np.nda
 
 def _constraints(
     printed: dict[str, int], bicycle: Bicycle, surface: Paraboloid, q: np.ndarray, qd: np.ndarray
-) -> Iterator[Line]:
+) -> Iterator[LedgerLine]:
     slopes = derivatives(bicycle, surface, q, qd)
     ranked = source("rank of the constraints' derivatives at a state with nothing special about it", derivatives, rank)
 
-    def line(claim: str, key: str, value: int, measured: str, smallest: float) -> Line:
-        return count("2.2", claim, printed[key], value, measured, ranked, [_clear(smallest)])
+    def line(claim: str, key: str, value: int, measured: str, smallest: float) -> LedgerLine:
+        return count_line("2.2", claim, printed[key], value, measured, ranked, [_clear(smallest)])
 
     contact = slopes["p"][CONTACT_ROWS]
     solved, smallest = rank(contact)
@@ -136,7 +136,7 @@ def _constraints(
     claim = "the bicycle has three degrees of freedom in velocity"
     yield line(claim, "velocity_freedoms", len(COORDINATES) - both, text, smallest)
     reached, smallest = growth(bicycle, surface, q)
-    yield words(
+    yield claim_line(
         section="2.2",
         claim="the four rolling constraints are nonholonomic",
         thresholds=[equals("dimensions that are reached", reached[-1], printed["independent_coordinates"])],
@@ -149,7 +149,7 @@ def _constraints(
 
 def _equations(
     printed: dict[str, int], bicycle: Bicycle, surface: Paraboloid, q: np.ndarray, qd: np.ndarray
-) -> Iterator[Line]:
+) -> Iterator[LedgerLine]:
     now = dynamics(bicycle, surface, q, qd)
     rows = residual(bicycle, surface, q, qd, now.acceleration, now.contact.ravel(), now.force.ravel())
     parts = {
@@ -161,14 +161,14 @@ def _equations(
     counted = source("number of equations and unknowns of the DAE, solved at a state", residual, dynamics)
     for name, (part, what) in parts.items():
         text = f"{len(part)} {what}"
-        yield count("2.3", f"the DAE has {printed[name]} {what}", printed[name], len(part), text, counted, [left])
+        yield count_line("2.3", f"the DAE has {printed[name]} {what}", printed[name], len(part), text, counted, [left])
     unknown = len(COORDINATES) + now.contact.size + now.force.size
     text = f"{len(COORDINATES)} coordinates, {now.contact.size} contact parameters, {now.force.size} multipliers"
-    yield count("2.3", "21 unknowns", printed["unknowns"], unknown, text, counted, [left])
+    yield count_line("2.3", "21 unknowns", printed["unknowns"], unknown, text, counted, [left])
     slopes = derivatives(bicycle, surface, q, qd)
     regular, smallest = rank(slopes["force"][:9])
     condition = float(np.linalg.cond(mass_matrix(bicycle, q)))
-    yield words(
+    yield claim_line(
         section="2.3",
         claim="with initial conditions the equations determine the motion",
         thresholds=[
@@ -184,7 +184,7 @@ def _equations(
 
 def _symmetries(
     printed: dict[str, int], bicycle: Bicycle, surface: Paraboloid, q: np.ndarray, qd: np.ndarray
-) -> Iterator[Line]:
+) -> Iterator[LedgerLine]:
     here = dynamics(bicycle, surface, q, qd)
 
     def change(turned: np.ndarray, rates: np.ndarray, back: np.ndarray) -> float:
@@ -205,7 +205,7 @@ def _symmetries(
     # Accelerations are of order 10 to 100.
     moved = Check("what the test sees of a lean of 1e-3 (must be seen)", -change(lean, qd, np.eye(3)), -1e-3)
     changed = source("accelerations at a state and at the turned one", dynamics)
-    yield words(
+    yield claim_line(
         section="3.1",
         claim="the wheels' angles do not appear in the equations",
         thresholds=[by_wheels],
@@ -213,7 +213,7 @@ def _symmetries(
         source=changed,
         checks=[moved],
     )
-    yield words(
+    yield claim_line(
         section="3.1",
         claim="on a surface of revolution the equations are invariant under turns: yaw is cyclic",
         thresholds=[by_yaw],
@@ -224,16 +224,16 @@ def _symmetries(
     cyclic = int(by_wheels.met) * 2 + int(by_yaw.met)
     six = len(COORDINATES) - cyclic
     text = f"{len(COORDINATES)} coordinates less {cyclic} cyclic ones"
-    yield count("3.1", "six coordinates are not cyclic", printed["noncyclic_coordinates"], six, text, changed)
+    yield count_line("3.1", "six coordinates are not cyclic", printed["noncyclic_coordinates"], six, text, changed)
 
 
-def _constants(printed: dict[str, int], evidence: Evidence) -> Iterator[Line]:
+def _constants(printed: dict[str, int], evidence: Evidence) -> Iterator[LedgerLine]:
     residual_check = evidence.residual()
     family = evidence.family(evidence.cases[0], 1)
     motion = family.equations.motion(family.points[0].unknowns)
     angles, rates = (motion.lean, motion.pitch, motion.steer), (motion.yaw_rate, motion.rear_rate, motion.front_rate)
     constants = motion.position.size + len(angles) + len(rates) + motion.contact.size + motion.force.size
-    yield count(
+    yield count_line(
         section="3.1",
         claim="a circular motion is 21 constants: 9 kinematic, 6 of the contacts, 6 multipliers",
         printed=printed["unknowns"],
@@ -249,7 +249,7 @@ def _constants(printed: dict[str, int], evidence: Evidence) -> Iterator[Line]:
             for point in family.points[:: max(1, len(family.points) // 20)]:
                 values = np.linalg.svd(family.equations.jacobian(point.unknowns), compute_uv=False)
                 widest, least = max(widest, values[-1] / values[0]), min(least, values[-2] / values[0])
-    yield words(
+    yield claim_line(
         section="3.1",
         claim="one of the 21 constants is free: circular motions come in one-parameter families",
         thresholds=[below("smallest relative singular value of the equations", widest, 1e-12)],

@@ -8,9 +8,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from .ledger import DEPENDS, FAILS, REPRODUCED, ROUNDS, TRUNCATED, UNTESTABLE, Line, counts
+from .ledger import DEPENDS, FAILS, REPRODUCED, ROUNDS, TRUNCATED, UNTESTABLE, LedgerLine, counts
 
-STYLES = {
+VERDICT_STYLES = {
     REPRODUCED: "green",
     ROUNDS: "green",
     TRUNCATED: "yellow",
@@ -21,12 +21,12 @@ STYLES = {
 _WHOSE = {"paper": "the paper's", "ours": "ours: the measurement does not pass its own tests"}
 
 
-def show_ledger(console: Console, lines: Sequence[Line]) -> None:
+def show_ledger(console: Console, lines: Sequence[LedgerLine]) -> None:
     """Print the ledger: every line in the paper's order, then those that do not hold and whose they are."""
     table = Table("§", "claim", "printed", "measured", "verdict", box=None, pad_edge=False)
     for line in lines:
         row = (line.section, line.claim, line.printed or "", line.measured)
-        table.add_row(*(Text(cell) for cell in row), Text(line.verdict, STYLES[line.verdict]))
+        table.add_row(*(Text(cell) for cell in row), Text(line.verdict, VERDICT_STYLES[line.verdict]))
     console.print(table)
     console.print()
     for line in lines:
@@ -39,21 +39,21 @@ def show_ledger(console: Console, lines: Sequence[Line]) -> None:
                 word = "passes" if check.passes else "FAILS"
                 text = f"    {check.what}: {check.value:.2e}, limit {check.limit:.2e}: {word}"
                 console.print(text, markup=False, highlight=False, soft_wrap=True)
-    console.print(summary(lines), markup=False, highlight=False, soft_wrap=True)
+    console.print(ledger_summary(lines), markup=False, highlight=False, soft_wrap=True)
 
 
-def _failure(line: Line) -> str:
+def _failure(line: LedgerLine) -> str:
     return f"{line.section}: {line.claim}: {line.measured} ({_WHOSE[line.fault or 'ours']})"
 
 
-def summary(lines: Sequence[Line]) -> str:
+def ledger_summary(lines: Sequence[LedgerLine]) -> str:
     """One line: how many lines of each verdict."""
     return f"{len(lines)} lines: " + ", ".join(f"{n} {verdict}" for verdict, n in counts(lines).items() if n)
 
 
-def markdown(lines: Sequence[Line]) -> str:
+def ledger_markdown(lines: Sequence[LedgerLine]) -> str:
     """The ledger as a Markdown document."""
-    rows = ["# The paper, line by line", "", summary(lines), ""]
+    rows = ["# The paper, line by line", "", ledger_summary(lines), ""]
     rows += [
         "| § | claim | printed | measured | verdict | threshold | computed | reproduced by |",
         "|---|---|---|---|---|---|---|---|",
@@ -74,6 +74,6 @@ def markdown(lines: Sequence[Line]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _reproduced_by(line: Line) -> str:
+def _reproduced_by(line: LedgerLine) -> str:
     command = [line.source.command] if line.source.command else []
     return ", ".join(f"`{part}`" for part in (*command, *line.source.functions))

@@ -5,35 +5,35 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from .evidence import Evidence
-from .ledger import Line, untestable
+from .ledger import LedgerLine, untestable_line
 
 
-def unseen_lines(evidence: Evidence) -> Iterator[Line]:
+def unseen_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     """Lines on claims that cannot be tested, with the reason."""
-    yield untestable(
+    yield untestable_line(
         section="1",
         claim="on a curved surface no closed set of ordinary differential equations can be obtained",
         why="told of what elimination by hand or by a computer's algebra yields, not of the motion; section 4.1 itself "
         "has seven of them about a state",
     )
-    yield untestable(
+    yield untestable_line(
         section="2.1",
         claim="Table 1: the values of the 25 parameters",
         why="the text lacks the table; that the bicycle is the benchmark's is held by the accelerations of Basu-Mandal "
         "et al., which every line is tested by",
         kind="number",
     )
-    yield untestable(
+    yield untestable_line(
         section="2.3",
         claim="Equations 1 to 17 as printed",
         why="the text lacks the formulas; their number, structure and solutions are held",
     )
-    yield untestable(
+    yield untestable_line(
         section="3.2",
         claim="Figures 2 to 5 and 7: the curves as drawn",
         why="the text lacks the figures; they are drawn anew by `velodrome paper --out`",
     )
-    yield untestable(
+    yield untestable_line(
         section="4.2",
         claim="Figures 8 and 9: the rides as drawn",
         why="the text lacks the figures; they are drawn anew by `velodrome paper --out`",

@@ -1,24 +1,24 @@
 """A scenario in every engine: planned, run, measured, and stored as a run folder."""
 
-from .folder import Plan, library_versions
-from .installed import installed
-from .runner import Outcome, Trace, Watch, claimed_noise, configure, measure_one, plan_run, run
-from .stored import document, part, read_json, ride
+from .folder import RunPlan, library_versions
+from .installed import installed_engines
+from .runner import RunOutcome, RunWatch, Trace, claimed_noise, configure_engine, measure_one, plan_run, run_plan
+from .stored import find_part, read_document, read_json, read_ride
 
 __all__ = [
-    "Outcome",
-    "Plan",
+    "RunOutcome",
+    "RunPlan",
+    "RunWatch",
     "Trace",
-    "Watch",
     "claimed_noise",
-    "configure",
-    "document",
-    "installed",
+    "configure_engine",
+    "find_part",
+    "installed_engines",
     "library_versions",
     "measure_one",
-    "part",
     "plan_run",
+    "read_document",
     "read_json",
-    "ride",
-    "run",
+    "read_ride",
+    "run_plan",
 ]

@@ -12,7 +12,7 @@ from typing import Any
 
 from ...engines.engine import Engine, Settings, Trajectory, packages
 from ...reference.surface import SurfaceOfRevolution
-from ...reports.drawing import summary
+from ...reports.drawing import make_summary
 from ..error import ScenarioError
 from ..files import write_json, write_text
 from ..scenario import Scenario, Start
@@ -21,7 +21,7 @@ LIBRARIES = ("velodrome", "numpy", "scipy", "numba", "exudyn", "mujoco", "rerun-
 
 
 @dataclass(frozen=True)
-class Plan:
+class RunPlan:
     """A run that has been checked: everything bad input could break is behind it.
 
     Attributes
@@ -59,7 +59,7 @@ def new_folder(out: Path, name: str) -> Path:
 
 def write_manifest(
     folder: Path,
-    plan: Plan,
+    plan: RunPlan,
     trajectories: Mapping[str, Trajectory],
     failures: Mapping[str, str],
     verdicts: Sequence[Mapping[str, Any]] = (),
@@ -121,9 +121,9 @@ def library_versions() -> dict[str, str]:
     return found
 
 
-def record(
+def write_run_recording(
     folder: Path,
-    plan: Plan,
+    plan: RunPlan,
     shown: Mapping[str, Trajectory],
     measured: Mapping[str, Mapping[str, Any]],
     failures: Mapping[str, str],
@@ -138,7 +138,7 @@ def record(
     problem = plan.start.problem
     steady = isinstance(problem.surface, SurfaceOfRevolution)
     facts = (plan.start.growth_rate, plan.scenario.simulation.duration, steady)
-    text = summary(plan.scenario.title, measured, failures, verdicts, *facts)
+    text = make_summary(plan.scenario.title, measured, failures, verdicts, *facts)
     where = (plan.scenario.title, problem.bicycle, problem.surface)
     undisturbed = plan.start.undisturbed if steady else None
     write_recording(folder / "comparison.rrd", *where, shown, text, undisturbed=undisturbed)
@@ -146,14 +146,14 @@ def record(
 
 def write_page(
     folder: Path,
-    plan: Plan,
+    plan: RunPlan,
     shown: Mapping[str, Trajectory],
     measured: Mapping[str, Mapping[str, Any]],
     manifest: Mapping[str, Any],
 ) -> None:
     """Write the report page of the rides as they are to be shown; see `velodrome.reports.page`."""
-    from ...reports.page import page
+    from ...reports.page import make_page
 
     surface = plan.start.problem.surface
-    text = page(manifest, plan.scenario.model_dump(), measured, manifest["verdicts"], shown, surface)
+    text = make_page(manifest, plan.scenario.model_dump(), measured, manifest["verdicts"], shown, surface)
     write_text(folder / "report.html", text)

@@ -6,7 +6,7 @@ from ...engines.engine import engine_names
 from ..error import ScenarioError
 
 
-def installed() -> list[str]:
+def installed_engines() -> list[str]:
     """Names of all installed engines, the reference first.
 
     Raises

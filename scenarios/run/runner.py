@@ -15,25 +15,25 @@ import numpy as np
 import tomli_w
 from pydantic import ValidationError
 
-from ...engines.admission import ride
+from ...engines.admission import ride_engine
 from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, load_engine, why_failed
 from ...engines.guard import call_engine
 from ...engines.storage import write_trajectory
-from ...reports.measure import ROUND_OFF, as_shown, follow, metrics
+from ...reports.measure import ROUND_OFF, compute_metrics, cut_at_fall, evaluate_ride
 from ..error import ScenarioError
 from ..files import write_json, write_text
-from ..scenario import Scenario, Start, make_start, one_line, refuse_unknown
-from .folder import Plan, new_folder, record, write_manifest, write_page
-from .installed import installed
+from ..scenario import Scenario, Start, format_validation_error, make_start, refuse_unknown
+from .folder import RunPlan, new_folder, write_manifest, write_page, write_run_recording
+from .installed import installed_engines
 
 # (engine, simulated time reached, duration)
-Watch = Callable[[str, float, float], None]
+RunWatch = Callable[[str, float, float], None]
 # (engine, what it raised)
 Trace = Callable[[str, Exception], None]
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunOutcome:
     """What a run came to.
 
     Attributes
@@ -55,7 +55,7 @@ class Outcome:
     interrupted: bool
 
 
-def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> Plan:
+def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> RunPlan:
     """Check engines and settings and compute the start.
 
     Parameters
@@ -70,12 +70,12 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
     ScenarioError
         If an engine is not installed, a setting is wrong, or the motion does not exist.
     """
-    there = installed()
+    there = installed_engines()
     for engine in [*(wanted or []), *scenario.engines]:
         if engine not in there:
             raise ScenarioError(f"engine {engine!r} is not installed; there are {', '.join(there)}")
     names = [engine for engine in there if engine == REFERENCE or not wanted or engine in wanted]
-    chosen = {engine: configure(engine, scenario.engines.get(engine, {})) for engine in names}
+    chosen = {engine: configure_engine(engine, scenario.engines.get(engine, {})) for engine in names}
     start = make_start(scenario)
     left_out: dict[str, str] = {}
     for engine, (library, settings) in chosen.items():
@@ -88,10 +88,10 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
         except Exception as error:  # an engine may break here as well
             raise ScenarioError(f"engines.{engine}: its check failed: {why_failed(error)}") from error
     chosen = {engine: pair for engine, pair in chosen.items() if engine not in left_out}
-    return Plan(name, scenario, start, chosen, left_out)
+    return RunPlan(name, scenario, start, chosen, left_out)
 
 
-def configure(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
+def configure_engine(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
     """Load an engine and validate its settings.
 
     Raises
@@ -109,14 +109,16 @@ def configure(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
         text = json.dumps(dict(values), default=str)
         return engine, call_engine(engine.settings.model_validate_json, text, strict=True)
     except ValidationError as error:
-        raise ScenarioError(f"engines.{name}.{one_line(error)}") from error
+        raise ScenarioError(f"engines.{name}.{format_validation_error(error)}") from error
     except ValueError as error:
         raise ScenarioError(f"engines.{name}: {error}") from error
     except Exception as error:  # settings may have code of their own
         raise ScenarioError(f"engines.{name}: its settings failed: {why_failed(error)}") from error
 
 
-def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None], trace: Trace | None = None) -> Outcome:
+def run_plan(
+    plan: RunPlan, out: Path, watch: RunWatch, note: Callable[[str], None], trace: Trace | None = None
+) -> RunOutcome:
     """Run every engine of a plan and write the run folder.
 
     Each engine's trajectory is written when it is done; Ctrl-C ends the engine at work and leaves the
@@ -148,7 +150,7 @@ def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None], trace:
     try:
         for name, (engine, settings) in plan.engines.items():
             try:
-                trajectory = ride(engine, problem, settings, lambda t, name=name: watch(name, t, duration))
+                trajectory = ride_engine(engine, problem, settings, lambda t, name=name: watch(name, t, duration))
             except Exception as error:  # whatever an engine raises must not cost the others' results
                 failures[name] = why_failed(error)
                 note(f"{name}: {failures[name]}")
@@ -163,15 +165,15 @@ def run(plan: Plan, out: Path, watch: Watch, note: Callable[[str], None], trace:
         note("interrupted: finished engines are kept")
     with _deaf_to_interrupts():
         where = (problem.bicycle, problem.surface)
-        followed = {name: follow(one, *where) for name, one in trajectories.items()}
-        measured = measure(plan, trajectories, followed)
-        verdicts = judge(plan, measured)
+        followed = {name: evaluate_ride(one, *where) for name, one in trajectories.items()}
+        measured = measure_rides(plan, trajectories, followed)
+        verdicts = judge_run(plan, measured)
         write_json(folder / "metrics.json", measured)
-        shown = {name: as_shown(one, *where) for name, one in followed.items()}
-        record(folder, plan, shown, measured, failures, verdicts)
+        shown = {name: cut_at_fall(one, *where) for name, one in followed.items()}
+        write_run_recording(folder, plan, shown, measured, failures, verdicts)
         found = write_manifest(folder, plan, trajectories, failures, verdicts, complete=not interrupted)
         write_page(folder, plan, shown, measured, found)
-    return Outcome(folder, measured, failures, verdicts, interrupted)
+    return RunOutcome(folder, measured, failures, verdicts, interrupted)
 
 
 def measure_one(
@@ -183,7 +185,7 @@ def measure_one(
     followed: Trajectory | None = None,
 ) -> dict[str, Any]:
     """Metrics of a trajectory from a start, against a reference where there is one."""
-    return metrics(
+    return compute_metrics(
         trajectory,
         reference,
         start.problem.bicycle,
@@ -196,12 +198,12 @@ def measure_one(
     )
 
 
-def measure(
-    plan: Plan, trajectories: Mapping[str, Trajectory], followed: Mapping[str, Trajectory]
+def measure_rides(
+    plan: RunPlan, trajectories: Mapping[str, Trajectory], followed: Mapping[str, Trajectory]
 ) -> dict[str, dict[str, Any]]:
     """Metrics of every trajectory against the reference's; without a reference, of each by itself.
 
-    ``followed`` are the trajectories as `velodrome.reports.measure.consistency.follow` gives them.
+    ``followed`` are the trajectories as `velodrome.reports.measure.consistency.evaluate_ride` gives them.
     """
     reference = followed.get(REFERENCE)
     return {
@@ -225,7 +227,7 @@ def claimed_noise(engine: Engine, settings: Settings) -> float:
     return value if np.isfinite(value) and value >= 0 else ROUND_OFF
 
 
-def judge(plan: Plan, measured: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+def judge_run(plan: RunPlan, measured: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Verdicts on the scenario's criterion, one an engine; an engine that cannot show it does not hold it."""
     if plan.scenario.criterion is None:
         return []

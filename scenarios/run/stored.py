@@ -10,10 +10,10 @@ from typing import Any
 from ...engines.engine import Trajectory
 from ...engines.storage import read_trajectory
 from ..error import ScenarioError
-from ..scenario import shown
+from ..scenario import show_value
 
 
-def part(folder: Path, name: str) -> Path:
+def find_part(folder: Path, name: str) -> Path:
     """A file of a run folder, which must be there.
 
     Raises
@@ -22,15 +22,15 @@ def part(folder: Path, name: str) -> Path:
         If it is not, or the name leads elsewhere.
     """
     if Path(name).name != name:
-        raise ScenarioError(f"{folder}: {shown(repr(name))} is no name of a file in it")
+        raise ScenarioError(f"{folder}: {show_value(repr(name))} is no name of a file in it")
     if not folder.is_dir():
         raise ScenarioError(f"{folder}: no such folder; velodrome run writes one and says where")
     if not (folder / name).is_file():
-        raise ScenarioError(f"{folder}: not the folder of a finished run: it has no {shown(name)}")
+        raise ScenarioError(f"{folder}: not the folder of a finished run: it has no {show_value(name)}")
     return folder / name
 
 
-def document(folder: Path, name: str) -> Mapping[str, Any]:
+def read_document(folder: Path, name: str) -> Mapping[str, Any]:
     """A JSON object of a run folder.
 
     Raises
@@ -38,7 +38,7 @@ def document(folder: Path, name: str) -> Mapping[str, Any]:
     ScenarioError
         If it is missing, cannot be read, or is something else.
     """
-    path = part(folder, name)
+    path = find_part(folder, name)
     try:
         found = read_json(path)
     except OSError as error:
@@ -73,7 +73,7 @@ def read_json(path: Path) -> Any:
     return found
 
 
-def ride(folder: Path, manifest: Mapping[str, Any], metrics: Mapping[str, Any], engine: str) -> Trajectory:
+def read_ride(folder: Path, manifest: Mapping[str, Any], metrics: Mapping[str, Any], engine: str) -> Trajectory:
     """An engine's trajectory of a run folder, which must be the one that the other files tell of.
 
     Raises
@@ -83,11 +83,11 @@ def ride(folder: Path, manifest: Mapping[str, Any], metrics: Mapping[str, Any], 
     ValueError
         If it is no trajectory.
     """
-    path = part(folder, f"{engine}.parquet")
+    path = find_part(folder, f"{engine}.parquet")
     found = read_trajectory(path)
     entries = {"manifest.json": manifest["engines"][engine], "metrics.json": metrics[engine]}
     if found.engine != engine:
-        raise ScenarioError(f"{path}: is a trajectory of {shown(repr(found.engine))}")
+        raise ScenarioError(f"{path}: is a trajectory of {show_value(repr(found.engine))}")
     for name, entry in entries.items():
         # No two runs take the same CPU time to the last digit.
         if (entry["cpu_time"], entry["steps"]) != (found.cpu_time, found.steps):

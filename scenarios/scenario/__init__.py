@@ -8,12 +8,21 @@ from .schema import (
     Simulation,
     library_names,
     load_scenario,
-    read_file,
-    validate,
+    read_scenario_file,
+    validate_scenario,
 )
 from .start import Start, make_start
-from .surfaces import bowl, named, parse_surface
-from .table import Table, UnknownName, kinds, one_line, placed, read_toml, refuse_unknown, shown
+from .surfaces import make_bowl, name_surface, parse_surface
+from .table import (
+    Table,
+    UnknownName,
+    format_validation_error,
+    list_kinds,
+    place_error,
+    read_toml,
+    refuse_unknown,
+    show_value,
+)
 
 __all__ = [
     "OF_THE_MOTION",
@@ -24,18 +33,18 @@ __all__ = [
     "Start",
     "Table",
     "UnknownName",
-    "bowl",
-    "kinds",
+    "format_validation_error",
     "library_names",
+    "list_kinds",
     "load_scenario",
+    "make_bowl",
     "make_start",
-    "named",
-    "one_line",
+    "name_surface",
     "parse_surface",
-    "placed",
-    "read_file",
+    "place_error",
+    "read_scenario_file",
     "read_toml",
     "refuse_unknown",
-    "shown",
-    "validate",
+    "show_value",
+    "validate_scenario",
 ]

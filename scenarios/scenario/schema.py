@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from ...reference.bicycle import Bicycle
 from ..error import ScenarioError
 from .surfaces import SurfaceTable
-from .table import Table, UnknownName, one_line, placed, read_toml, shown
+from .table import Table, UnknownName, format_validation_error, place_error, read_toml, show_value
 
 LIBRARY = Path(__file__).parents[1] / "library"
 # The tables that the motion depends on.
@@ -145,7 +145,7 @@ class Scenario(Table):
         unknown = sorted(set(self.bicycle) - set(Bicycle.__dataclass_fields__))
         if unknown:
             names = ", ".join(Bicycle.__dataclass_fields__)
-            raise UnknownName(f"bicycle parameter {shown(repr(unknown[0]))} is unknown; there are {names}")
+            raise UnknownName(f"bicycle parameter {show_value(repr(unknown[0]))} is unknown; there are {names}")
         return Bicycle(**self.bicycle)
 
 
@@ -185,31 +185,31 @@ def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tupl
         name, text = source, (LIBRARY / f"{source}.toml").read_text(encoding="utf-8")
     elif Path(source).suffix != ".toml":
         raise ScenarioError(
-            f"no scenario {shown(repr(source))} in the library; there are {', '.join(library_names())}, "
+            f"no scenario {show_value(repr(source))} in the library; there are {', '.join(library_names())}, "
             "or give a path to a .toml file"
         )
     else:
-        name, text = read_file(source)
+        name, text = read_scenario_file(source)
     try:
         data = read_toml(text)
     except ValueError as error:
-        raise ScenarioError(f"{shown(source)}: not valid TOML: {shown(str(error))}") from error
+        raise ScenarioError(f"{show_value(source)}: not valid TOML: {show_value(str(error))}") from error
     try:
-        data = placed(data, changes or {})
+        data = place_error(data, changes or {})
     except ValueError as error:
         raise ScenarioError(f"--set {error}") from error
-    return name, validate(data, source)
+    return name, validate_scenario(data, source)
 
 
-def validate(data: Mapping[str, Any], source: str) -> Scenario:
+def validate_scenario(data: Mapping[str, Any], source: str) -> Scenario:
     """Validate a scenario's data; the first thing wrong makes the one line of a `ScenarioError`."""
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError(f"{shown(source)}: {one_line(error)}") from error
+        raise ScenarioError(f"{show_value(source)}: {format_validation_error(error)}") from error
 
 
-def read_file(source: str) -> tuple[str, str]:
+def read_scenario_file(source: str) -> tuple[str, str]:
     """Stem and text of a file that says what to run.
 
     Raises
@@ -220,13 +220,15 @@ def read_file(source: str) -> tuple[str, str]:
     path = Path(source)
     # Folders and files of what is run bear the stem.
     if not path.stem.isprintable():
-        raise ScenarioError(f"{shown(source)}: cannot be read: a scenario's file name must be printable text")
+        raise ScenarioError(f"{show_value(source)}: cannot be read: a scenario's file name must be printable text")
     try:
         if path.exists() and not path.is_file():
-            raise ScenarioError(f"{shown(source)}: cannot be read: it is no file")  # and a pipe would keep us waiting
+            raise ScenarioError(
+                f"{show_value(source)}: cannot be read: it is no file"
+            )  # and a pipe would keep us waiting
         return path.stem, path.read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:
         if isinstance(error, ScenarioError):
             raise
         reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
-        raise ScenarioError(f"{shown(source)}: cannot be read: {reason}") from error
+        raise ScenarioError(f"{show_value(source)}: cannot be read: {reason}") from error

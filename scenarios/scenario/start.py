@@ -18,7 +18,7 @@ from ...reference.stability import growth_rate, linearise
 from ...reference.surface import Plane, Surface, SurfaceOfRevolution, evaluate
 from ..error import ScenarioError
 from .schema import CircularTable, Scenario
-from .surfaces import bowl
+from .surfaces import make_bowl
 
 # Runs of one motion, disturbed in many ways, need it once.
 _found = lru_cache(maxsize=256)(find_motion)
@@ -90,7 +90,7 @@ def _undisturbed(
     table = scenario.motion
     if isinstance(table, CircularTable):
         near = (table.near.lean, table.near.steer) if table.near is not None else None
-        family, motion = _found(bicycle, bowl(surface), table.rear_rate, table.family, near)
+        family, motion = _found(bicycle, make_bowl(surface), table.rear_rate, table.family, near)
         return family, motion, *motion.state()
     rates = (0.0, 0.0, table.speed / bicycle.rear_wheel_radius)
     q, qd = consistent_state(bicycle, surface, (float(bicycle.reference_point[0]), 0.0), 0.0, 0.0, rates)

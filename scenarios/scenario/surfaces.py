@@ -12,7 +12,7 @@ from ...reference.height_field import HeightField
 from ...reference.profile import PolynomialProfile, SplineProfile
 from ...reference.surface import Paraboloid, Plane, Surface, SurfaceOfRevolution
 from ..error import ScenarioError
-from .table import Table, one_line, read_toml, shown
+from .table import Table, format_validation_error, read_toml, show_value
 
 _Length = Annotated[float, Field(gt=0, le=1e6)]
 _Moderate = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -172,7 +172,7 @@ def parse_surface(text: str) -> Surface:
         With one line.
     """
     kind, _, fields = text.partition(":")
-    where = f"--surface {shown(text)}"
+    where = f"--surface {show_value(text)}"
     try:
         table = read_toml(f"surface = {{ {fields} }}")["surface"]
         # A second line would be a second statement.
@@ -183,10 +183,10 @@ def parse_surface(text: str) -> Surface:
     try:
         return TypeAdapter(SurfaceTable).validate_python({"kind": kind.strip(), **table}).make()
     except ValidationError as error:
-        raise ScenarioError(f"{where}: {one_line(error)}") from error
+        raise ScenarioError(f"{where}: {format_validation_error(error)}") from error
 
 
-def bowl(ground: Surface | float) -> SurfaceOfRevolution:
+def make_bowl(ground: Surface | float) -> SurfaceOfRevolution:
     """The surface of revolution that a ground is; a number is the alpha of a paraboloid.
 
     Raises
@@ -200,11 +200,13 @@ def bowl(ground: Surface | float) -> SurfaceOfRevolution:
         where = "" if str(error).startswith("alpha") else f"alpha is {ground!r}; it "
         raise ScenarioError(f"{where}{error}") from error
     if not isinstance(surface, SurfaceOfRevolution):
-        raise ScenarioError(f"circular motions ride on a surface of revolution; {describe(surface)['kind']} is none")
+        raise ScenarioError(
+            f"circular motions ride on a surface of revolution; {describe_surface(surface)['kind']} is none"
+        )
     return surface
 
 
-def describe(surface: Surface) -> dict[str, Any]:
+def describe_surface(surface: Surface) -> dict[str, Any]:
     """Kind and fields of a surface, JSON values; of one that no table makes, the class and the parameters."""
     kind: Any = _KINDS.get(type(surface))
     if kind is None:
@@ -217,8 +219,8 @@ def _listed(value: Any) -> Any:
     return [_listed(item) for item in value] if isinstance(value, tuple) else value
 
 
-def named(surface: Surface) -> dict[str, Any]:
+def name_surface(surface: Surface) -> dict[str, Any]:
     """How a document names its surface: ``alpha`` of a paraboloid or the plane; of others null, and ``surface``."""
     if isinstance(surface, Plane | Paraboloid):
         return {"alpha": surface.alpha if isinstance(surface, Paraboloid) else 0.0}
-    return {"alpha": None, "surface": describe(surface)}
+    return {"alpha": None, "surface": describe_surface(surface)}

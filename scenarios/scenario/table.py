@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 _LONGEST = 200
 
 
-def shown(text: str) -> str:
+def show_value(text: str) -> str:
     """Text of somebody else's making as a part of one line: nothing that moves a cursor, not too long."""
     if len(text) > _LONGEST:
         # Both ends: that of a path is the file's name, that of a complaint says where.
@@ -34,7 +34,7 @@ def read_toml(text: str) -> dict[str, Any]:
         raise ValueError("it is nested too deeply") from None
 
 
-def placed(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+def place_error(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """A copy of nested tables with dotted keys set.
 
     Parameters
@@ -56,7 +56,7 @@ def placed(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any
         for table in tables:
             inner = here.get(table, {})
             if not isinstance(inner, Mapping):
-                raise ValueError(f"{shown(key)}: {shown(table)} is no table")
+                raise ValueError(f"{show_value(key)}: {show_value(table)} is no table")
             here[table] = dict(inner)
             here = here[table]
         here[last] = value
@@ -85,7 +85,7 @@ def refuse_unknown(data: Mapping[str, Any], known: Iterable[str]) -> None:
     """Raise UnknownName with the known keys if there is another."""
     unknown = sorted(set(data) - set(known))
     if unknown:
-        raise UnknownName(f"unknown key {shown(repr(unknown[0]))}; there are {', '.join(known)}")
+        raise UnknownName(f"unknown key {show_value(repr(unknown[0]))}; there are {', '.join(known)}")
 
 
 _PLAIN_WORDS = {
@@ -97,7 +97,7 @@ _PLAIN_WORDS = {
 }
 
 
-def kinds() -> set[str]:
+def list_kinds() -> set[str]:
     """All values that the kind of a table may have."""
     tables = (table.model_fields["kind"] for table in Table.__subclasses__() if "kind" in table.model_fields)
     return {value for kind in tables for value in get_args(kind.annotation)}
@@ -112,14 +112,14 @@ def _written(value: Any) -> str:
         return "nested too deeply"
 
 
-def one_line(error: ValidationError) -> str:
+def format_validation_error(error: ValidationError) -> str:
     """Say the first thing wrong in one line: where, what, what came."""
     first = error.errors()[0]
     # Discriminator values appear in the location of a union's member: they are no keys of the file.
-    where = ".".join(shown(str(part)) for part in first["loc"] if part not in kinds())
+    where = ".".join(show_value(str(part)) for part in first["loc"] if part not in list_kinds())
     message = " ".join(_PLAIN_WORDS.get(first["type"], first["msg"].removeprefix("Value error, ")).split())
     came = first.get("input")
     left_out = isinstance(came, Mapping | BaseModel) or first["type"] == "missing"
-    value = "" if left_out else f" (it is {shown(_written(came))})"
+    value = "" if left_out else f" (it is {show_value(_written(came))})"
     more = len(error.errors()) - 1
     return f"{where}: {message}{value}".lstrip(": ") + (f"; and {more} more" if more else "")

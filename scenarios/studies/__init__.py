@@ -1,5 +1,5 @@
 """Studies that run one scenario many times."""
 
-from .precision import all_ran, precision, write_precision
+from .precision import all_ran, study_precision, write_precision
 
-__all__ = ["all_ran", "precision", "write_precision"]
+__all__ = ["all_ran", "study_precision", "write_precision"]

@@ -9,20 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from ...engines.admission import ride
+from ...engines.admission import ride_engine
 from ...engines.engine import REFERENCE, Engine, Problem, Settings, Trajectory, why_failed
 from ...engines.guard import call_engine
 from ...reference.stability import linearise
 from ...reference.surface import SurfaceOfRevolution
-from ...reports.measure import LEVELS as IDENTIFY_LEVELS
+from ...reports.measure import IDENTIFY_LEVELS as IDENTIFY_LEVELS
 from ...reports.measure import Identified, Level, comparison_horizon, eigenvalue_document, engine_document, identify
 from ..error import ScenarioError
 from ..files import make_folder, write_json
-from ..run import Plan, Trace, Watch, claimed_noise, library_versions, measure_one, plan_run
+from ..run import RunPlan, RunWatch, Trace, claimed_noise, library_versions, measure_one, plan_run
 from ..scenario import Scenario, Start
 
 COARSEST = 4.0  # times the scenario's step
-LEVELS = 5
+STEP_LEVELS = 5
 _LONGEST_INTERVAL = 200  # output intervals of the scenario merged so that the coarsest steps divide them
 
 
@@ -48,13 +48,13 @@ class Study:
     identified: Identified | str | None
 
 
-def precision(
+def study_precision(
     name: str,
     scenario: Scenario,
     wanted: list[str] | None,
     levels: int,
     eigenvalues: bool,
-    watch: Watch,
+    watch: RunWatch,
     trace: Trace | None = None,
 ) -> dict[str, Any]:
     """Study the engines of a scenario.
@@ -96,7 +96,7 @@ def precision(
     engine, settings = plan.engines[REFERENCE]
     watch(REFERENCE, 0.0, _duration(problem))
     try:
-        reference = ride(engine, problem, settings, lambda t: watch(REFERENCE, t, _duration(problem)))
+        reference = ride_engine(engine, problem, settings, lambda t: watch(REFERENCE, t, _duration(problem)))
     except Exception as error:  # without it there is nothing to measure against
         raise ScenarioError(f"{name}: the reference did not run: {why_failed(error)}") from error
     if reference.ended is not None:
@@ -157,7 +157,7 @@ def _refinable(settings: Settings) -> Settings:
     return settings
 
 
-def _sampled(plan: Plan, ladders: Mapping[str, list[Settings]]) -> Problem:
+def _sampled(plan: RunPlan, ladders: Mapping[str, list[Settings]]) -> Problem:
     """The scenario's problem, sampled at the shortest interval that all steps divide."""
     simulation = plan.scenario.simulation
     samples = round(simulation.duration * simulation.output_rate)
@@ -192,13 +192,13 @@ def _runs(
     start: Start,
     problem: Problem,
     reference: Trajectory,
-    watch: Watch,
+    watch: RunWatch,
     trace: Trace | None,
 ) -> Iterator[Level | _Failure]:
     for settings in ladder:
         step = getattr(settings, "step", None)
         try:
-            trajectory = ride(engine, problem, settings, lambda t: watch(engine.name, t, _duration(problem)))
+            trajectory = ride_engine(engine, problem, settings, lambda t: watch(engine.name, t, _duration(problem)))
         except Exception as error:  # whatever an engine raises must not cost the others' results
             yield _Failure(step, why_failed(error), broke=True)
             if trace is not None:
@@ -214,7 +214,7 @@ def _runs(
 
 
 def _identified(
-    engine: Engine, settings: Settings, undisturbed: Problem, watch: Watch, trace: Trace | None
+    engine: Engine, settings: Settings, undisturbed: Problem, watch: RunWatch, trace: Trace | None
 ) -> Identified | str:
     if not isinstance(undisturbed.surface, SurfaceOfRevolution):
         return "the ground is no surface of revolution, so that the motion is not steady"

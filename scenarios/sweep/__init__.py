@@ -5,7 +5,7 @@ from .live import SweepView
 from .plan import plan_sweep
 from .rows import STATUSES
 from .run import Work, locally, run_sweep
-from .summary import resume_command, show_summary, status_of, summary
+from .summary import resume_command, show_summary, status_of, summarise_sweep
 
 __all__ = [
     "STATUSES",
@@ -18,5 +18,5 @@ __all__ = [
     "run_sweep",
     "show_summary",
     "status_of",
-    "summary",
+    "summarise_sweep",
 ]

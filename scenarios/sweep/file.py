@@ -10,21 +10,30 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from ...engines.engine import REFERENCE
 from ..error import ScenarioError
-from ..scenario import Scenario, Table, load_scenario, one_line, read_file, read_toml, shown, validate
+from ..scenario import (
+    Scenario,
+    Table,
+    format_validation_error,
+    load_scenario,
+    read_scenario_file,
+    read_toml,
+    show_value,
+    validate_scenario,
+)
 
 _Range = Annotated[tuple[float, float], Field(strict=False)]  # TOML has arrays only
 _Values = Annotated[tuple[Any, ...], Field(strict=False, min_length=1)]
 _Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
 
 
-def flattened(table: Any) -> Any:
+def flatten_table(table: Any) -> Any:
     """Dotted keys for tables in tables: ``{"surface": {"alpha": 1}}`` becomes ``{"surface.alpha": 1}``."""
     if not isinstance(table, Mapping):
         return table  # the schema says what is wrong with it
     found: dict[str, Any] = {}
     for key, value in table.items():
         if isinstance(value, Mapping) and value:
-            found |= {f"{key}.{rest}": part for rest, part in flattened(value).items()}
+            found |= {f"{key}.{rest}": part for rest, part in flatten_table(value).items()}
         else:
             found[key] = value
     return found
@@ -40,7 +49,7 @@ class Hypercube(Table):
     @field_validator("ranges", mode="before")
     @classmethod
     def _dotted(cls, ranges: Any) -> Any:
-        return flattened(ranges)
+        return flatten_table(ranges)
 
     @field_validator("ranges")
     @classmethod
@@ -66,12 +75,12 @@ class SweepFile(Table):
     @field_validator("grid", mode="before")
     @classmethod
     def _dotted(cls, grid: Any) -> Any:
-        return flattened(grid)
+        return flatten_table(grid)
 
     @field_validator("list")
     @classmethod
     def _rows_dotted(cls, rows: tuple[dict[str, Any], ...]) -> tuple[dict[str, Any], ...]:
-        return tuple(flattened(row) for row in rows)
+        return tuple(flatten_table(row) for row in rows)
 
     @model_validator(mode="after")
     def _each_key_once(self) -> Self:
@@ -107,21 +116,21 @@ def read_sweep(path: Path) -> tuple[SweepFile, dict[str, Any]]:
     ScenarioError
         With one line.
     """
-    _, text = read_file(str(path))
+    _, text = read_scenario_file(str(path))
     try:
         data = read_toml(text)
     except ValueError as error:
-        raise ScenarioError(f"{shown(str(path))}: not valid TOML: {shown(str(error))}") from error
+        raise ScenarioError(f"{show_value(str(path))}: not valid TOML: {show_value(str(error))}") from error
     try:
         sweep = SweepFile.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError(f"{path}: {one_line(error)}") from error
+        raise ScenarioError(f"{path}: {format_validation_error(error)}") from error
     return sweep, _base(sweep, path).model_dump(mode="json", exclude_none=True)
 
 
 def _base(sweep: SweepFile, path: Path) -> Scenario:
     if isinstance(sweep.scenario, dict):
-        return validate(sweep.scenario, f"{path}: scenario")
+        return validate_scenario(sweep.scenario, f"{path}: scenario")
     source = sweep.scenario
     try:
         return load_scenario(str(path.parent / source) if source.endswith(".toml") else source)[1]

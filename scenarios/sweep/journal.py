@@ -23,7 +23,7 @@ _BATCH, _WAIT = 200, 0.5  # rows, seconds: what a power failure may cost; a kill
 
 
 @dataclass(frozen=True)
-class Line:
+class JournalLine:
     """A finished task.
 
     Attributes
@@ -50,7 +50,7 @@ class Line:
         return b"%08x %b\n" % (zlib.crc32(body), body)
 
 
-def parsed(line: bytes) -> Line | None:
+def parse_lines(line: bytes) -> JournalLine | None:
     """Read a line; None if it is not whole.
 
     Raises
@@ -64,7 +64,9 @@ def parsed(line: bytes) -> Line | None:
     index, _, text = body.partition(b" ")
     try:
         found = json.loads(text)
-        return Line(str(found["sweep"]), str(found["key"]), int(index), dict(found["row"]), dict(found["timing"]))
+        return JournalLine(
+            str(found["sweep"]), str(found["key"]), int(index), dict(found["row"]), dict(found["timing"])
+        )
     except (KeyError, TypeError, ValueError) as error:
         raise ForeignLine("a line of another kind of journal") from error
 
@@ -105,7 +107,7 @@ class Journal:
     def __exit__(self, *_: object) -> None:
         os.close(self._file)  # and with it the lock
 
-    def append(self, line: Line) -> None:
+    def append(self, line: JournalLine) -> None:
         """Write a finished task.
 
         Raises
@@ -140,7 +142,7 @@ class Journal:
         self._unsynced, self._synced_at = 0, time.monotonic()
 
 
-def finished(path: Path) -> Iterator[tuple[int, Line]]:
+def finished_rows(path: Path) -> Iterator[tuple[int, JournalLine]]:
     """Read the whole lines of a journal in their order, each with its offset.
 
     Raises
@@ -153,16 +155,16 @@ def finished(path: Path) -> Iterator[tuple[int, Line]]:
     with path.open("rb") as file:
         offset = 0
         for line in file:
-            found = parsed(line)
+            found = parse_lines(line)
             if found is not None:
                 yield offset, found
             offset += len(line)
 
 
-def line_at(file: BinaryIO, offset: int) -> Line:
+def line_at(file: BinaryIO, offset: int) -> JournalLine:
     """Read the line that begins at an offset."""
     file.seek(offset)
-    found = parsed(file.readline())
+    found = parse_lines(file.readline())
     if found is None:
         raise OSError(f"{file.name}: was changed while it was read")
     return found

@@ -18,7 +18,7 @@ from .rows import BROKEN, COMPUTED, REFUSED
 
 _REASONS = 4
 _RECENT = 500  # rows that the rate is taken over
-STYLES = dict.fromkeys(COMPUTED, "cyan") | {"done": "green", REFUSED: "yellow"} | dict.fromkeys(BROKEN, "red")
+ROW_STYLES = dict.fromkeys(COMPUTED, "cyan") | {"done": "green", REFUSED: "yellow"} | dict.fromkeys(BROKEN, "red")
 
 
 class SweepView:
@@ -64,7 +64,9 @@ class SweepView:
         """What is shown now."""
         line = Table.grid(padding=(0, 2))
         line.add_row(ProgressBar(self._total, self._rows, width=30), f"{self._rows} of {self._total}", *self._speed())
-        counts = Text("  ").join(Text(f"{status} {n}", STYLES[status]) for status, n in sorted(self._counts.items()))
+        counts = Text("  ").join(
+            Text(f"{status} {n}", ROW_STYLES[status]) for status, n in sorted(self._counts.items())
+        )
         return Group(line, counts, *self._reasons)
 
     def _speed(self) -> tuple[str, str]:

@@ -13,12 +13,12 @@ from pydantic import ValidationError
 
 from ...engines.engine import REFERENCE, UnsuitableProblem, load_engine
 from ..error import ScenarioError
-from ..run import configure, installed, library_versions
-from ..scenario import Scenario, UnknownName, kinds, make_start, one_line, placed
+from ..run import configure_engine, installed_engines, library_versions
+from ..scenario import Scenario, UnknownName, format_validation_error, list_kinds, make_start, place_error
 from .file import SweepFile, read_sweep
-from .points import count, points
+from .points import count_points, make_points
 
-MOST = 5_000_000  # tasks; some 2 GB in the planning process
+MOST_TASKS = 5_000_000  # tasks; some 2 GB in the planning process
 # Errors of pydantic that a value of the right type may have.
 _OF_A_POINT = ("value_error", "greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")
 _CHECKED = 50  # kinds of runs whose engine is asked beforehand; each may need a motion, a tenth of a second
@@ -49,7 +49,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Plan:
+class SweepPlan:
     """A sweep that has been checked.
 
     Attributes
@@ -82,7 +82,7 @@ class Plan:
         }
 
 
-def plan_sweep(path: Path) -> Plan:
+def plan_sweep(path: Path) -> SweepPlan:
     """Read a sweep file, validate every run of it, number them.
 
     Settings of one engine do not multiply the runs of another: runs that come out the same are one task. A point
@@ -95,16 +95,18 @@ def plan_sweep(path: Path) -> Plan:
         nothing but points that are refused.
     """
     sweep, base = read_sweep(path)
-    names = installed()
+    names = installed_engines()
     for engine in sweep.engines:
         if engine not in names:
             raise ScenarioError(f"{path}: engine {engine!r} is not installed; there are {', '.join(names)}")
-    if count(sweep) * len(sweep.engines) > MOST:
-        raise ScenarioError(f"{path}: {count(sweep) * len(sweep.engines)} runs; at most {MOST} fit one sweep")
+    if count_points(sweep) * len(sweep.engines) > MOST_TASKS:
+        raise ScenarioError(
+            f"{path}: {count_points(sweep) * len(sweep.engines)} runs; at most {MOST_TASKS} fit one sweep"
+        )
     checker = _Checker(path, base, drawn=sweep.latin_hypercube.ranges if sweep.latin_hypercube else ())
     tasks: list[Task] = []
     seen: set[tuple[str, str]] = set()
-    for changes in points(sweep):
+    for changes in make_points(sweep):
         _refuse_other_engines(path, sweep, changes)
         for engine in sweep.engines:
             own = concerning(engine, changes)
@@ -115,7 +117,7 @@ def plan_sweep(path: Path) -> Plan:
     for engine in sweep.engines:
         if all(task.refused for task in tasks if task.engine == engine):
             raise ScenarioError(checker.first_refusal[engine])
-    return Plan(path.stem, path, sweep, base, tasks)
+    return SweepPlan(path.stem, path, sweep, base, tasks)
 
 
 def concerning(engine: str, changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -123,7 +125,7 @@ def concerning(engine: str, changes: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in changes.items() if _engine_of(key) in (None, engine, REFERENCE)}
 
 
-def pruned(data: dict[str, Any], engine: str) -> dict[str, Any]:
+def prune_settings(data: dict[str, Any], engine: str) -> dict[str, Any]:
     """A scenario's data with the settings of this engine and the reference only."""
     engines = data.get("engines", {})
     if not isinstance(engines, Mapping):
@@ -174,7 +176,7 @@ class _Checker:
             If the file is wrong.
         """
         try:
-            data = pruned(placed(self._base, changes), engine)
+            data = prune_settings(place_error(self._base, changes), engine)
         except ValueError as error:
             raise ScenarioError(f"{self._where(changes)}: {error}") from error
         refused = None
@@ -186,7 +188,7 @@ class _Checker:
                 raise ScenarioError(line) from error
             self.first_refusal.setdefault(engine, line)
             refused = str(error)
-        return hashlib.sha256(canonical([engine, data]).encode()).hexdigest(), refused
+        return hashlib.sha256(canonical_text([engine, data]).encode()).hexdigest(), refused
 
     def _where(self, changes: Mapping[str, Any]) -> str:
         at = ", ".join(f"{key} = {value!r}" for key, value in changes.items())
@@ -197,7 +199,7 @@ class _Checker:
         try:
             scenario = Scenario.model_validate(data)
         except ValidationError as error:
-            raise _complaint(one_line(error), error, stated) from error
+            raise _complaint(format_validation_error(error), error, stated) from error
         resolved = scenario.model_dump(mode="json", exclude_none=True)
         for name in {engine, REFERENCE}:
             self._configure(name, resolved["engines"].get(name, {}), stated)
@@ -205,17 +207,17 @@ class _Checker:
         return resolved
 
     def _configure(self, engine: str, settings: dict[str, Any], stated: Collection[str]) -> None:
-        text = canonical([engine, settings])
+        text = canonical_text([engine, settings])
         if text not in self._settings:
             try:
-                configure(engine, settings)
+                configure_engine(engine, settings)
             except ScenarioError as error:
                 raise _complaint(str(error), error.__cause__, stated, ("engines", engine)) from error
             self._settings.add(text)
 
     def _ask(self, engine: str, scenario: Scenario, data: Mapping[str, Any]) -> None:
         """Let the engine refuse a step that does not divide the output interval, and the like."""
-        kind = canonical([engine, data["engines"].get(engine, {}), data["simulation"]])
+        kind = canonical_text([engine, data["engines"].get(engine, {}), data["simulation"]])
         if kind not in self._kinds and len(self._kinds) < _CHECKED:
             self._kinds[kind] = _why_refused(engine, scenario)
         if refused := self._kinds.get(kind):
@@ -228,7 +230,7 @@ def _why_refused(engine: str, scenario: Scenario) -> str | None:
         problem = make_start(scenario).problem
     except ScenarioError:
         return None  # a motion that does not exist is a row
-    library, settings = configure(engine, scenario.engines.get(engine, {}))
+    library, settings = configure_engine(engine, scenario.engines.get(engine, {}))
     try:
         library.check(problem, settings)
     except UnsuitableProblem:
@@ -251,7 +253,7 @@ def _complaint(
     if not isinstance(cause, ValidationError):
         return _FileError(line)
     for error in cause.errors():
-        where = ".".join(str(part) for part in (*place, *error["loc"]) if part not in kinds())
+        where = ".".join(str(part) for part in (*place, *error["loc"]) if part not in list_kinds())
         ours = any(where == key or where.startswith(f"{key}.") for key in stated)
         unknown = isinstance(error.get("ctx", {}).get("error"), UnknownName)
         if ours or unknown or error["type"] not in _OF_A_POINT:
@@ -259,6 +261,6 @@ def _complaint(
     return ScenarioError(line)
 
 
-def canonical(data: Any) -> str:
+def canonical_text(data: Any) -> str:
     """JSON of which there is one for equal data."""
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)

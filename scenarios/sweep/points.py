@@ -11,7 +11,7 @@ import numpy as np
 from .file import Hypercube, SweepFile
 
 
-def count(sweep: SweepFile) -> int:
+def count_points(sweep: SweepFile) -> int:
     """Number of points, before any that coincide are made one."""
     sizes = [len(values) for values in sweep.grid.values()]
     cube = 1 if sweep.latin_hypercube is None else sweep.latin_hypercube.count
@@ -21,7 +21,7 @@ def count(sweep: SweepFile) -> int:
     return found
 
 
-def points(sweep: SweepFile) -> Iterator[dict[str, Any]]:
+def make_points(sweep: SweepFile) -> Iterator[dict[str, Any]]:
     """Changes of every point, dotted key to value; the grid's last key changes fastest."""
     rows = sweep.list or ({},)
     cube = [{}] if sweep.latin_hypercube is None else list(_sampled(sweep.latin_hypercube))

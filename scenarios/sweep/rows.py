@@ -18,7 +18,7 @@ STATUSES = (*COMPUTED, REFUSED, *BROKEN)
 _LONGEST_REASON = 500  # letters
 
 _ERRORS = ("position_error_max", "position_error_end", "orientation_error_max", "orientation_error_end")
-FACTS = {
+ROW_FACTS = {
     "key": pa.string(),
     "index": pa.int64(),
     "version": pa.string(),
@@ -62,7 +62,7 @@ TIMING: dict[str, pa.DataType] = {
 }
 
 
-def flat(metrics: Mapping[str, Any]) -> dict[str, Any]:
+def flatten_metrics(metrics: Mapping[str, Any]) -> dict[str, Any]:
     """Metrics as columns: ``position_error`` becomes ``position_error_max`` and ``_end``, names one text or None."""
     found: dict[str, Any] = {}
     for name, value in metrics.items():
@@ -75,9 +75,9 @@ def flat(metrics: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def schema(tasks: Sequence[Task]) -> pa.Schema:
+def row_schema(tasks: Sequence[Task]) -> pa.Schema:
     """Columns of the data set beside the engine, which is the partition: facts, parameters, metrics."""
-    fields = [*FACTS.items(), *_parameter_types(tasks).items(), *METRICS.items()]
+    fields = [*ROW_FACTS.items(), *_parameter_types(tasks).items(), *METRICS.items()]
     return pa.schema([pa.field(name, kind) for name, kind in fields])
 
 
@@ -99,7 +99,7 @@ def _column_type(kinds: set[type]) -> pa.DataType:
     return pa.string()
 
 
-def record(task: Task, row: Mapping[str, Any], columns: pa.Schema) -> dict[str, Any]:
+def make_record(task: Task, row: Mapping[str, Any], columns: pa.Schema) -> dict[str, Any]:
     """A row as the data set has it: the task's parameters with what a worker found."""
     values: dict[str, Any] = {"key": task.key, "index": task.index, **row}
     for key, value in task.changes.items():
@@ -108,6 +108,6 @@ def record(task: Task, row: Mapping[str, Any], columns: pa.Schema) -> dict[str, 
     return values
 
 
-def one_line(text: str) -> str:
+def reason_line(text: str) -> str:
     """Fit for a row: one line, not endless, nothing that is no text."""
     return " ".join(text.encode(errors="replace").decode().split())[:_LONGEST_REASON]

@@ -10,19 +10,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..error import ScenarioError
-from .journal import ForeignLine, Journal, Line, finished
-from .plan import Plan, Task
+from .journal import ForeignLine, Journal, JournalLine, finished_rows
+from .plan import SweepPlan, Task
 from .pool import Done, Pool, WorkersBroken
-from .rows import REFUSED, one_line
-from .store import JOURNAL, Opened, open_folder, refuse_other_limits, write_manifest, write_results
+from .rows import REFUSED, reason_line
+from .store import JOURNAL, Opened, open_folder, refuse_other_limits, write_results, write_sweep_manifest
 from .worker import Setup
 
 Work = Callable[[Setup, Sequence[Task]], Generator[Done]]
-Watch = Callable[[Task, Done, bool], None]
+SweepWatch = Callable[[Task, Done, bool], None]
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SweepOutcome:
     """What a sweep came to.
 
     Attributes
@@ -57,7 +57,9 @@ def locally(workers: int) -> Work:
     return work
 
 
-def run_sweep(plan: Plan, out: Path, work: Work, resume: bool, watch: Watch, retry: Collection[str] = ()) -> Outcome:
+def run_sweep(
+    plan: SweepPlan, out: Path, work: Work, resume: bool, watch: SweepWatch, retry: Collection[str] = ()
+) -> SweepOutcome:
     """Do what is missing of a sweep, and make its data set once nothing is.
 
     Parameters
@@ -90,11 +92,11 @@ def run_sweep(plan: Plan, out: Path, work: Work, resume: bool, watch: Watch, ret
                 watch(plan.tasks[index], Done(index, {"status": status, "reason": reason}, {}), False)
         try:
             if missing:
-                write_manifest(out, plan, opened, complete=False)
+                write_sweep_manifest(out, plan, opened, complete=False)
             with closing(_arriving(plan, work, missing)) as arriving:
                 for done in arriving:
                     task = plan.tasks[done.index]
-                    journal.append(Line(opened.key, task.key, done.index, done.row, done.timing))
+                    journal.append(JournalLine(opened.key, task.key, done.index, done.row, done.timing))
                     have[done.index] = (done.row["status"], done.row["reason"])
                     missing.discard(done.index)
                     watch(task, done, True)
@@ -110,10 +112,10 @@ def run_sweep(plan: Plan, out: Path, work: Work, resume: bool, watch: Watch, ret
     for index, (status, _) in have.items():
         counts[plan.tasks[index].engine][status] += 1
     rows = {name: dict(found) for name, found in counts.items()}
-    return Outcome(out, rows, len(missing), stopped, interrupted)
+    return SweepOutcome(out, rows, len(missing), stopped, interrupted)
 
 
-def _stored(path: Path, plan: Plan, opened: Opened) -> dict[int, tuple[str, str | None]]:
+def _stored(path: Path, plan: SweepPlan, opened: Opened) -> dict[int, tuple[str, str | None]]:
     """Status and reason of the rows of a journal, by the task's index.
 
     Raises
@@ -123,7 +125,7 @@ def _stored(path: Path, plan: Plan, opened: Opened) -> dict[int, tuple[str, str 
     """
     found: dict[int, tuple[str, str | None]] = {}
     try:
-        for _, line in finished(path):
+        for _, line in finished_rows(path):
             task = plan.tasks[line.index] if 0 <= line.index < len(plan.tasks) else None
             if line.sweep != opened.key or task is None or line.key != task.key:
                 raise ForeignLine(f"the row {line.key}")
@@ -133,15 +135,15 @@ def _stored(path: Path, plan: Plan, opened: Opened) -> dict[int, tuple[str, str 
     return found
 
 
-def _arriving(plan: Plan, work: Work, missing: Collection[int]) -> Generator[Done]:
+def _arriving(plan: SweepPlan, work: Work, missing: Collection[int]) -> Generator[Done]:
     """Rows of all missing tasks, first of those that are refused: nobody has to work for them."""
     tasks = [task for task in plan.tasks if task.index in missing]
     for task in tasks:
         if task.refused is not None:
-            yield Done(task.index, {"status": REFUSED, "reason": one_line(task.refused)}, {})
+            yield Done(task.index, {"status": REFUSED, "reason": reason_line(task.refused)}, {})
     with closing(work(_setup(plan), [task for task in tasks if task.refused is None])) as arriving:
         yield from arriving
 
 
-def _setup(plan: Plan) -> Setup:
+def _setup(plan: SweepPlan) -> Setup:
     return Setup(plan.base, plan.file.time_limit, plan.file.memory_limit)

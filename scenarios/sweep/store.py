@@ -13,13 +13,13 @@ from urllib.parse import quote
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ...engines.files import whole
+from ...engines.files import write_whole
 from ..error import ScenarioError
 from ..files import make_folder, write_json
 from ..run import read_json
-from .journal import finished, line_at
-from .plan import Plan, canonical
-from .rows import TIMING, record, schema
+from .journal import finished_rows, line_at
+from .plan import SweepPlan, canonical_text
+from .rows import TIMING, make_record, row_schema
 
 MANIFEST, JOURNAL, RESULTS, TIMINGS = "sweep.json", "journal.txt", "results", "timing.parquet"
 _BLOCK = 20_000  # rows of a row group
@@ -38,7 +38,7 @@ class Opened:
     limits : dict
         Limits under which the rows that it has were done.
     facts : dict
-        What the rows of this session are of; see `Plan.facts`.
+        What the rows of this session are of; see `SweepPlan.facts`.
     """
 
     key: str
@@ -46,7 +46,7 @@ class Opened:
     facts: dict[str, Any]
 
 
-def open_folder(out: Path, plan: Plan, resume: bool) -> Opened:
+def open_folder(out: Path, plan: SweepPlan, resume: bool) -> Opened:
     """Make the folder of a new sweep, or see that an old one is of the same sweep.
 
     Raises
@@ -66,22 +66,22 @@ def open_folder(out: Path, plan: Plan, resume: bool) -> Opened:
             f"{out}: holds the {JOURNAL} of a sweep without its {MANIFEST}: name another folder by --out"
         )
     make_folder(out)
-    opened = Opened(hashlib.sha256(canonical(facts).encode()).hexdigest()[:16], _limits(plan), facts)
-    write_manifest(out, plan, opened, complete=False)
+    opened = Opened(hashlib.sha256(canonical_text(facts).encode()).hexdigest()[:16], _limits(plan), facts)
+    write_sweep_manifest(out, plan, opened, complete=False)
     return opened
 
 
-def write_manifest(out: Path, plan: Plan, opened: Opened, complete: bool) -> None:
+def write_sweep_manifest(out: Path, plan: SweepPlan, opened: Opened, complete: bool) -> None:
     """Write what the folder's rows are of, and whether all are there."""
     found = {"format": _FORMAT, "key": opened.key} | opened.facts | {"limits": opened.limits}
     write_json(out / MANIFEST, found | {"title": plan.file.title, "complete": complete})
 
 
-def _limits(plan: Plan) -> dict[str, Any]:
+def _limits(plan: SweepPlan) -> dict[str, Any]:
     return {"time_limit": plan.file.time_limit, "memory_limit": plan.file.memory_limit}
 
 
-def refuse_other_limits(out: Path, plan: Plan, opened: Opened, statuses: Collection[str]) -> None:
+def refuse_other_limits(out: Path, plan: SweepPlan, opened: Opened, statuses: Collection[str]) -> None:
     """Refuse to keep rows of these statuses where they would be others under the limits of the file.
 
     Raises
@@ -137,7 +137,7 @@ def part_of(out: Path, engine: str) -> Path:
     return out / RESULTS / f"engine={quote(engine, safe='')}" / "part-0.parquet"
 
 
-def write_results(out: Path, plan: Plan, opened: Opened) -> None:
+def write_results(out: Path, plan: SweepPlan, opened: Opened) -> None:
     """Make the data set of a complete journal, sorted by key, a part an engine; and say that it is complete.
 
     Raises
@@ -145,8 +145,8 @@ def write_results(out: Path, plan: Plan, opened: Opened) -> None:
     OSError
         If the disk is full, or the like; the journal stays, and nothing looks whole that is not.
     """
-    offsets = {line.index: offset for offset, line in finished(out / JOURNAL)}
-    columns = schema(plan.tasks)
+    offsets = {line.index: offset for offset, line in finished_rows(out / JOURNAL)}
+    columns = row_schema(plan.tasks)
     with (out / JOURNAL).open("rb") as journal:
         done = [(task, offsets[task.index]) for task in plan.tasks if task.index in offsets]
         for engine, version in opened.facts["engines"].items():
@@ -154,17 +154,17 @@ def write_results(out: Path, plan: Plan, opened: Opened) -> None:
             part.parent.mkdir(parents=True, exist_ok=True)
             own = ((task, line_at(journal, offset)) for task, offset in done if task.engine == engine)
             # A run that was killed could not say its version.
-            found = ({"version": version} | record(task, line.row, columns) for task, line in own)
+            found = ({"version": version} | make_record(task, line.row, columns) for task, line in own)
             _write(part, columns, found)
         every = ((task, line_at(journal, offset)) for task, offset in done)
         clocks = ({"key": task.key, "index": task.index, "engine": task.engine, **line.timing} for task, line in every)
         _write(out / TIMINGS, pa.schema(list(TIMING.items())), clocks)
-    write_manifest(out, plan, replace(opened, limits=_limits(plan)), complete=True)
+    write_sweep_manifest(out, plan, replace(opened, limits=_limits(plan)), complete=True)
 
 
 def _write(path: Path, columns: pa.Schema, records: Iterator[dict[str, Any]]) -> None:
     """Write records as Parquet, whole or not at all, without holding them all."""
-    with whole(path) as partial, pq.ParquetWriter(partial, columns, compression="zstd") as writer:
+    with write_whole(path) as partial, pq.ParquetWriter(partial, columns, compression="zstd") as writer:
         block = list(islice(records, _BLOCK))
         while block:
             writer.write_table(pa.Table.from_pylist(block, schema=columns))

@@ -10,16 +10,16 @@ import pyarrow.parquet as pq
 from rich.console import Console
 from rich.table import Table
 
-from .live import STYLES
-from .plan import Plan
+from .live import ROW_STYLES
+from .plan import SweepPlan
 from .rows import BROKEN, REFUSED
-from .run import Outcome
+from .run import SweepOutcome
 from .store import RESULTS, TIMINGS, part_of
 
 _REASONS = 5
 
 
-def summary(plan: Plan, outcome: Outcome) -> dict[str, Any]:
+def summarise_sweep(plan: SweepPlan, outcome: SweepOutcome) -> dict[str, Any]:
     """The JSON document of `velodrome sweep`.
 
     Parameters
@@ -51,7 +51,7 @@ def summary(plan: Plan, outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def _of_results(outcome: Outcome, engine: str) -> dict[str, Any]:
+def _of_results(outcome: SweepOutcome, engine: str) -> dict[str, Any]:
     columns = ["status", "reason", "position_error_max"]
     table = pq.ParquetFile(part_of(outcome.folder, engine)).read(columns=columns)
     errors = table.column("position_error_max").drop_null().to_numpy()
@@ -66,7 +66,7 @@ def _of_results(outcome: Outcome, engine: str) -> dict[str, Any]:
     }
 
 
-def status_of(outcome: Outcome) -> int:
+def status_of(outcome: SweepOutcome) -> int:
     """Exit status: 0 if every run has its result, 1 if some broke or are missing, 130 after Ctrl-C."""
     if outcome.interrupted:
         return 130
@@ -74,7 +74,7 @@ def status_of(outcome: Outcome) -> int:
     return int(broke or outcome.stopped is not None)
 
 
-def resume_command(plan: Plan, outcome: Outcome, retry: Collection[str] = ()) -> str:
+def resume_command(plan: SweepPlan, outcome: SweepOutcome, retry: Collection[str] = ()) -> str:
     """What goes on with a sweep that was stopped."""
     again = "".join(f" --retry {status}" for status in retry)
     return f"velodrome sweep {plan.path} --out {outcome.folder} --resume{again}"
@@ -83,10 +83,10 @@ def resume_command(plan: Plan, outcome: Outcome, retry: Collection[str] = ()) ->
 def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> None:
     """Print a table by engine, why rows broke, and where the data set is or how to go on."""
     entries: Mapping[str, Mapping[str, Any]] = document["engines"]
-    statuses = [status for status in STYLES if any(entry["rows"].get(status) for entry in entries.values())]
+    statuses = [status for status in ROW_STYLES if any(entry["rows"].get(status) for entry in entries.values())]
     table = Table("engine", box=None, pad_edge=False)
     for status in statuses:
-        table.add_column(status, justify="right", style=STYLES[status], no_wrap=True)
+        table.add_column(status, justify="right", style=ROW_STYLES[status], no_wrap=True)
     for title in ("error,\nmedian, m", "error,\nworst, m", "rows/s of\na worker"):
         table.add_column(title, justify="right", no_wrap=True)
     for name, entry in entries.items():
@@ -97,7 +97,7 @@ def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> 
     console.print(table)
     for name, entry in entries.items():
         for reason in entry.get("reasons", ()):
-            _say(console, f"{name} {reason}", STYLES[reason.partition(":")[0]])
+            _say(console, f"{name} {reason}", ROW_STYLES[reason.partition(":")[0]])
     if document["stopped"] is None:
         _say(console, f"data set: {document['folder']}/{RESULTS}")
         return

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from ...engines.admission import ride
+from ...engines.admission import ride_engine
 from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, why_failed
 from ...engines.guard import call_engine
 from ..error import ScenarioError
-from ..run import claimed_noise, configure, measure_one
-from ..scenario import OF_THE_MOTION, Scenario, Start, make_start, placed, validate
-from .plan import canonical, pruned
-from .rows import METRICS, REFUSED, flat, one_line
+from ..run import claimed_noise, configure_engine, measure_one
+from ..scenario import OF_THE_MOTION, Scenario, Start, make_start, place_error, validate_scenario
+from .plan import canonical_text, prune_settings
+from .rows import METRICS, REFUSED, flatten_metrics, reason_line
 
 
 class Tasks:
@@ -63,19 +63,19 @@ class Tasks:
         return _plain(row), _plain(timing)
 
     def _ride(self, name: str, changes: Mapping[str, Any], timing: dict[str, Any]) -> dict[str, Any]:
-        scenario = validate(pruned(placed(self._base, changes), name), "task")
-        engine, version, settings = _configured(name, canonical(scenario.engines.get(name, {})))
+        scenario = validate_scenario(prune_settings(place_error(self._base, changes), name), "task")
+        engine, version, settings = _configured(name, canonical_text(scenario.engines.get(name, {})))
         facts: dict[str, Any] = {"version": version}
         start = self._starts(_what_starts(scenario))
         if isinstance(start, str):
-            return facts | {"status": "no-motion", "reason": one_line(start)}
+            return facts | {"status": "no-motion", "reason": reason_line(start)}
         facts |= {"family": start.family, "growth_rate": start.growth_rate, "size": start.size}
         try:
             engine.check(start.problem, settings)
         except UnsuitableProblem:
             raise
         except ValueError as error:  # a step that does not divide the output interval, and the like
-            return facts | {"status": REFUSED, "reason": one_line(f"engines.{name}: {error}")}
+            return facts | {"status": REFUSED, "reason": reason_line(f"engines.{name}: {error}")}
         begin = time.process_time()
         reference: Trajectory | str | None = None
         try:
@@ -85,7 +85,7 @@ class Tasks:
                     return facts | {"status": "failed", "reason": trajectory}
             else:
                 reference = self._reference(scenario, start)
-                trajectory = ride(engine, start.problem, settings, lambda _: None)
+                trajectory = ride_engine(engine, start.problem, settings, lambda _: None)
         except MemoryError:
             raise
         except Exception as error:
@@ -93,7 +93,7 @@ class Tasks:
         finally:
             timing["engine_time"] = time.process_time() - begin
         known = None if isinstance(reference, str) else reference
-        measured = flat(measure_one(start, trajectory, known, step_noise=claimed_noise(engine, settings)))
+        measured = flatten_metrics(measure_one(start, trajectory, known, step_noise=claimed_noise(engine, settings)))
         timing |= {key: measured.get(key) for key in ("cpu_time", "real_time_factor")}
         facts |= {key: measured.get(key) for key in METRICS if key not in facts}
         reason = f"nothing to compare with: the reference: {reference}" if isinstance(reference, str) else None
@@ -101,30 +101,30 @@ class Tasks:
 
     def _reference(self, scenario: Scenario, start: Start) -> Trajectory | str:
         """The reference's ride at this point, or why there is none; the last is kept for the other engines."""
-        chosen = canonical(scenario.engines.get(REFERENCE, {}))
+        chosen = canonical_text(scenario.engines.get(REFERENCE, {}))
         text = f"{_what_starts(scenario)} {chosen}"
         if text not in self._references:
             engine, _, settings = _configured(REFERENCE, chosen)
             found: Trajectory | str
             try:
                 engine.check(start.problem, settings)
-                found = ride(engine, start.problem, settings, lambda _: None)
+                found = ride_engine(engine, start.problem, settings, lambda _: None)
             except MemoryError:
                 raise
             except Exception as error:
-                found = one_line(why_failed(error))
+                found = reason_line(why_failed(error))
             self._references = {text: found}
         return self._references[text]
 
 
 def _what_starts(scenario: Scenario) -> str:
     """What of a scenario its start depends on."""
-    return canonical(scenario.model_dump(mode="json", exclude_none=True, include={*OF_THE_MOTION, "simulation"}))
+    return canonical_text(scenario.model_dump(mode="json", exclude_none=True, include={*OF_THE_MOTION, "simulation"}))
 
 
 def _start(text: str) -> Start | str:
     try:
-        return make_start(validate(json.loads(text) | {"title": "start"}, "task"))
+        return make_start(validate_scenario(json.loads(text) | {"title": "start"}, "task"))
     except ScenarioError as error:
         return str(error)
 
@@ -132,7 +132,7 @@ def _start(text: str) -> Start | str:
 @lru_cache(maxsize=1024)
 def _configured(name: str, settings: str) -> tuple[Engine, str, Settings]:
     """An engine, its version, its settings; to look each up takes longer than a short ride."""
-    engine, chosen = configure(name, json.loads(settings))
+    engine, chosen = configure_engine(name, json.loads(settings))
     return engine, engine.version, chosen
 
 
@@ -150,7 +150,7 @@ def _broken(error: Exception) -> dict[str, Any]:
     short = isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM)
     if short or "bad_alloc" in str(error):
         return {"status": "memory", "reason": "more memory than the sweep's memory_limit, or than there is"}
-    return {"status": "failed", "reason": one_line(why_failed(error))}
+    return {"status": "failed", "reason": reason_line(why_failed(error))}
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:

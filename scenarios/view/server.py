@@ -42,7 +42,7 @@ class Content:
     body: bytes
 
 
-class PageServer(ThreadingHTTPServer):
+class RunPageServer(ThreadingHTTPServer):
     """Listens on the loopback interface as soon as it is made; `serve_forever` answers.
 
     Parameters
@@ -77,7 +77,7 @@ class PageServer(ThreadingHTTPServer):
 
 
 class _Handler(BaseHTTPRequestHandler):
-    server: PageServer  # pyright: ignore[reportIncompatibleVariableOverride]
+    server: RunPageServer  # pyright: ignore[reportIncompatibleVariableOverride]
     protocol_version = "HTTP/1.1"
 
     def do_GET(self) -> None:

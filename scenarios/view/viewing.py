@@ -6,12 +6,12 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from ...reports.measure import as_shown, follow
+from ...reports.measure import cut_at_fall, evaluate_ride
 from ..error import ScenarioError
 from ..files import write_text
-from ..run import document, part, ride
-from ..scenario import load_scenario, shown
-from .server import LOOPBACK, PageServer
+from ..run import find_part, read_document, read_ride
+from ..scenario import load_scenario, show_value
+from .server import LOOPBACK, RunPageServer
 from .viewer import ReplayError, rerun, viewer_files
 
 RECORDING, REPORT = "comparison.rrd", "report.html"
@@ -25,7 +25,7 @@ def open_native(folder: Path) -> None:
     ScenarioError
         If the folder has no recording, or the viewer cannot run here.
     """
-    command = native_command(part(folder, RECORDING))
+    command = native_command(find_part(folder, RECORDING))
     try:
         status = subprocess.call(command)
     except OSError as error:
@@ -64,9 +64,9 @@ def serve(folder: Path, port: int, ready: Callable[[str], None]) -> None:
             return
 
 
-def page_server(folder: Path, port: int) -> PageServer:
+def page_server(folder: Path, port: int) -> RunPageServer:
     """The server of `serve`, listening but not yet answering."""
-    part(folder, RECORDING)
+    find_part(folder, RECORDING)
     if not (folder / REPORT).is_file():
         text = stored_page(folder)
         try:
@@ -85,7 +85,7 @@ def page_server(folder: Path, port: int) -> PageServer:
         if path.is_file() and not path.is_symlink() and not path.name.startswith(".")
     }
     try:
-        return PageServer(port, files, viewer)
+        return RunPageServer(port, files, viewer)
     except OSError as error:
         raise ScenarioError(f"--port {port}: cannot listen on it: {error.strerror}; 0 takes a free one") from error
 
@@ -110,18 +110,18 @@ def stored_page(folder: Path) -> str:
     """
     from jinja2 import TemplateError
 
-    from ...reports.page import page
+    from ...reports.page import make_page
 
-    manifest, measured = document(folder, "manifest.json"), document(folder, "metrics.json")
-    _, scenario = load_scenario(str(part(folder, "scenario.toml")))
+    manifest, measured = read_document(folder, "manifest.json"), read_document(folder, "metrics.json")
+    _, scenario = load_scenario(str(find_part(folder, "scenario.toml")))
     try:
         where = scenario.make_bicycle(), scenario.surface.make()
-        rides = {name: follow(ride(folder, manifest, measured, name), *where) for name in measured}
-        runs = {name: as_shown(one, *where) for name, one in rides.items()}
+        rides = {name: evaluate_ride(read_ride(folder, manifest, measured, name), *where) for name in measured}
+        runs = {name: cut_at_fall(one, *where) for name, one in rides.items()}
         verdicts = manifest.get("verdicts", [])
-        return page(manifest, scenario.model_dump(), measured, verdicts, runs, where[1])
+        return make_page(manifest, scenario.model_dump(), measured, verdicts, runs, where[1])
     except ScenarioError:
         raise
     except (LookupError, TypeError, AttributeError, ArithmeticError, ValueError, TemplateError) as error:
-        what = shown(f"{type(error).__name__}: {error}")
+        what = show_value(f"{type(error).__name__}: {error}")
         raise ScenarioError(f"{folder}: not the files of one run: {what}") from error

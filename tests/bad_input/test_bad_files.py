@@ -22,8 +22,8 @@ from velodrome.engines.engine import Trajectory
 from velodrome.engines.storage import METADATA_KEY, read_trajectory
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.gate import checks as gate
-from velodrome.scenarios.gate.verdict import judge
-from velodrome.scenarios.run.runner import plan_run, run
+from velodrome.scenarios.gate.verdict import judge_sample
+from velodrome.scenarios.run.runner import plan_run, run_plan
 from velodrome.scenarios.scenario.schema import load_scenario
 from velodrome.scenarios.view import viewing as view
 
@@ -39,7 +39,7 @@ KEYS = ["", "x", "a/b", "../../x", "..", "\0", "a\nb", "reference", "<b>"]
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of the reference and one engine."""
     plan = plan_run(*load_scenario("q2", {"simulation.duration": 0.1}), wanted=[NATIVE])
-    return run(plan, tmp_path_factory.mktemp("runs"), lambda *_: None, lambda _: None).folder
+    return run_plan(plan, tmp_path_factory.mktemp("runs"), lambda *_: None, lambda _: None).folder
 
 
 @pytest.fixture(scope="module")
@@ -287,7 +287,7 @@ def test_a_document_that_is_none_is_refused(text: str, words: str, spoilt: Path)
 
 def test_files_of_different_runs_are_told_apart(folder: Path, tmp_path: Path) -> None:
     plan = plan_run(*load_scenario("q2", {"simulation.duration": 0.1}), wanted=[NATIVE])
-    other = run(plan, tmp_path / "runs", lambda *_: None, lambda _: None).folder
+    other = run_plan(plan, tmp_path / "runs", lambda *_: None, lambda _: None).folder
     copied = Path(shutil.copytree(folder, tmp_path / "run"))
     for name in ("reference.parquet", "manifest.json", "metrics.json"):
         good = (copied / name).read_bytes()
@@ -324,7 +324,7 @@ def judged(found: Mapping[str, Any]) -> bool:
     holds = True
     for name, entry in BASELINE["engines"].items():
         limits = dict.fromkeys(entry["quantities"], 1e-12)
-        verdicts = judge(name, entry["quantities"], found.get(name), limits, entry["settings"], entry["version"])
+        verdicts = judge_sample(name, entry["quantities"], found.get(name), limits, entry["settings"], entry["version"])
         assert all(is_one_line(verdict.reason) for verdict in verdicts)
         json.dumps([verdict.as_json() for verdict in verdicts], allow_nan=False)
         holds = holds and all(verdict.passes for verdict in verdicts)
@@ -367,7 +367,7 @@ def test_a_cut_baseline_is_refused(tmp_path_factory: Any, where: int, more: byte
 def test_a_baseline_of_another_ride_is_refused(changes: dict[str, Any], words: str, tmp_path: Path) -> None:
     (tmp_path / "q2.json").write_text(json.dumps(BASELINE | changes))
     with pytest.raises(ScenarioError, match=words):
-        gate.read_baseline("q2", tmp_path, gate.as_gated("q2")[1])
+        gate.read_baseline("q2", tmp_path, gate.load_gated("q2")[1])
 
 
 def test_a_file_is_no_folder_of_baselines(tmp_path: Path) -> None:

@@ -25,9 +25,9 @@ from velodrome.reference.stability import growth_rate, linearise
 from velodrome.reference.surface import Paraboloid, Plane, Surface, evaluate, has_tip
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run.runner import plan_run
-from velodrome.scenarios.scenario.schema import validate
+from velodrome.scenarios.scenario.schema import validate_scenario
 from velodrome.scenarios.scenario.start import Start, make_start
-from velodrome.scenarios.scenario.surfaces import FLATTEST, bowl
+from velodrome.scenarios.scenario.surfaces import FLATTEST, make_bowl
 
 PLANE = {"kind": "plane"}
 UPRIGHT = {"kind": "upright", "speed": 5.0}
@@ -36,7 +36,7 @@ EDGES = [0.0, -0.0, 5e-324, 1e-300, 1e-12, 1e-9, 1e-3, 0.3, 1.0, 10.0, 1e3, 1e6,
 
 def start(surface: Mapping[str, Any], motion: Mapping[str, Any], **tables: Any) -> Start:
     data = {"title": "edge", "surface": surface, "motion": motion, "simulation": {"duration": 1.0}} | tables
-    return make_start(validate(data, "a.toml"))
+    return make_start(validate_scenario(data, "a.toml"))
 
 
 def assert_rides(found: Start) -> None:
@@ -190,7 +190,7 @@ def test_a_bowl_tends_to_the_plane_as_it_flattens() -> None:
 @pytest.mark.parametrize("alpha", [5e-324, 1e-300, 0.99 * FLATTEST])
 def test_a_bowl_that_round_off_hides_is_refused(alpha: float) -> None:
     with pytest.raises(ScenarioError, match="must be 0, which is the plane, or at least 1e-12"):
-        bowl(alpha)
+        make_bowl(alpha)
     with pytest.raises(ScenarioError, match=r"surface\.alpha: must be 0, which is the plane"):
         start({"kind": "paraboloid", "alpha": alpha}, UPRIGHT)
 
@@ -321,7 +321,7 @@ ODD = {
 @pytest.mark.parametrize("odd", ODD)
 def test_every_engine_rides_the_odd_or_says_why_not(name: str, odd: str) -> None:
     data = {"title": odd, "surface": PLANE, "motion": UPRIGHT, "simulation": {"duration": 0.1}} | ODD[odd]
-    plan = plan_run("odd", validate(data, "a.toml"), [name])
+    plan = plan_run("odd", validate_scenario(data, "a.toml"), [name])
     engine, chosen = plan.engines[name]
     found = load_engine(name).simulate(plan.start.problem, chosen, lambda _: None)
     assert engine.name == found.engine

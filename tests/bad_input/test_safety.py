@@ -19,12 +19,12 @@ from packaging.utils import canonicalize_name
 from packaging.version import Version
 
 from velodrome.engines import engine as registry
-from velodrome.reports.drawing.summary import summary
+from velodrome.reports.drawing.summary import make_summary
 from velodrome.reports.figures.precision import precision_figure
 from velodrome.scenarios.gate.ci_files import junit_xml, markdown_page
 from velodrome.scenarios.gate.verdict import Verdict
 from velodrome.scenarios.run.folder import new_folder
-from velodrome.scenarios.run.runner import plan_run, run
+from velodrome.scenarios.run.runner import plan_run, run_plan
 from velodrome.scenarios.scenario.schema import LIBRARY, load_scenario
 from velodrome.scenarios.view import viewing as view
 from velodrome.scenarios.view.server import Content
@@ -73,7 +73,7 @@ def test_a_scenarios_name_stays_inside_the_output_folder(stem: str, tmp_path: Pa
     assert name == stem
     plan = plan_run(name, scenario, ["reference"])
     out = tmp_path / "a" / "runs"
-    folder = run(plan, out, lambda *_: None, lambda _: None).folder
+    folder = run_plan(plan, out, lambda *_: None, lambda _: None).folder
     assert folder.resolve().parent == out.resolve()
     # Nothing but the folder, and in it what every run leaves.
     assert [entry.name for entry in out.iterdir()] == [folder.name]
@@ -167,7 +167,7 @@ MARKUP = "\"><wbr onerror=x>'><wbr></script><wbr></style><wbr><!--<wbr>{{ 7 }}<w
 def test_no_text_of_a_run_is_markup_in_its_page(tmp_path: Path) -> None:
     changes = {"title": MARKUP, "tags": [MARKUP], "simulation.duration": 0.02}
     plan = plan_run("a<wbr>", load_scenario("q2", changes)[1], ["reference"])
-    folder = run(plan, tmp_path, lambda *_: None, lambda _: None).folder
+    folder = run_plan(plan, tmp_path, lambda *_: None, lambda _: None).folder
     clean = Seen((folder / "report.html").read_text(encoding="utf-8"))
     assert "wbr" not in clean.tags
     assert "onerror" not in clean.attributes
@@ -207,7 +207,7 @@ def test_no_text_of_a_run_is_markup_in_markdown() -> None:
     measured = {name: {**unmeasured, "horizon": None, "ended": name, "not_finite": []}}
     pages = [
         markdown_page([(name, verdict)]),
-        summary(name, measured, {name: name}, [], -1.0, 1.0),
+        make_summary(name, measured, {name: name}, [], -1.0, 1.0),
     ]
     for page in pages:
         left = markup(page)

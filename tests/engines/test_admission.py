@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from velodrome.engines import engine as registry
-from velodrome.engines.admission import ride
+from velodrome.engines.admission import ride_engine
 from velodrome.engines.engine import SHAPES, EngineError, Problem, Settings, Trajectory, load_engine
 from velodrome.engines.lagrange import ENGINE, LagrangeEngine
 from velodrome.reference.bicycle import Bicycle
@@ -42,7 +42,7 @@ class Giving(LagrangeEngine):
 
 
 def taken(given: Any, gives: tuple[str, ...] = LagrangeEngine.gives) -> Trajectory:
-    return ride(Giving(given, gives), problem(), ENGINE.settings(), lambda _: None)
+    return ride_engine(Giving(given, gives), problem(), ENGINE.settings(), lambda _: None)
 
 
 def test_a_whole_trajectory_is_taken_as_it_is() -> None:
@@ -72,7 +72,7 @@ def test_what_an_engine_writes_into_its_problem_changes_no_other_ride() -> None:
 
     before = problem()
     kept = [array.copy() for array in (before.q, before.qd, before.times)]
-    ride(Writing(), before, ENGINE.settings(), lambda _: None)
+    ride_engine(Writing(), before, ENGINE.settings(), lambda _: None)
     for array, copy in zip((before.q, before.qd, before.times), kept, strict=True):
         assert np.array_equal(array, copy)
 

@@ -18,7 +18,7 @@ from velodrome.engines.engine import EngineError, Problem, Trajectory, load_engi
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.dae import consistent_state
 from velodrome.reference.rim import rim_search
-from velodrome.reference.simulate import Motion, simulate
+from velodrome.reference.simulate import PreciseMotion, simulate
 from velodrome.reference.surface import Paraboloid, Plane, Surface, SurfaceFunction, surface_function
 
 ENGINE = load_engine("exudyn")
@@ -50,7 +50,7 @@ def bowl_run(duration: float, step: float) -> Trajectory:
 
 
 @cache
-def bowl_reference(duration: float) -> Motion:
+def bowl_reference(duration: float) -> PreciseMotion:
     task = bowl(duration)
     return simulate(task.bicycle, task.surface, task.q, task.qd, task.times)
 

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from exudyn.itemInterface import MassPoint, NodePoint, SensorBody
 
-from velodrome.engines.admission import ride
+from velodrome.engines.admission import ride_engine
 from velodrome.engines.engine import Problem, Trajectory
 from velodrome.engines.exudyn import kernel
 from velodrome.engines.exudyn.engine import BUILTIN, ENGINE, PLANE_NORMAL, ExudynEngine
 from velodrome.engines.exudyn.method import generalized_alpha
 from velodrome.engines.exudyn.results import weights
 from velodrome.engines.exudyn.settings import SolverSettings
-from velodrome.engines.exudyn.solve import Integration, integrate, silent
+from velodrome.engines.exudyn.solve import Integration, integrate, no_progress
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.contact import observe
 from velodrome.reference.dae import consistent_state
@@ -42,7 +42,7 @@ def falling_point(write_period: float | None = None) -> np.ndarray:
     kind: Any = exu.OutputVariableType.Position
     sensor = system.AddSensor(SensorBody(bodyNumber=body, outputVariableType=kind, storeInternal=True))
     system.Assemble()
-    with silent():
+    with no_progress():
         if write_period is None:
             outcome = integrate(system, Integration(STEPS * STEP, STEPS, STEPS, SolverSettings()), lambda _time: None)
             assert (outcome.steps, outcome.ended, outcome.unconverged_steps) == (STEPS, None, 0)
@@ -82,7 +82,7 @@ def upright(speed: float, duration: float, rate: float, surface: Surface | None 
 def test_a_hundred_seconds_at_every_step():
     speed = 5.0
     task = upright(speed, 100.0, 1000.0)
-    found = ride(ENGINE, task, ENGINE.settings(), lambda _time: None)
+    found = ride_engine(ENGINE, task, ENGINE.settings(), lambda _time: None)
     assert found.ended is None
     np.testing.assert_array_equal(found.time, task.times)
     # A sample left out would be a step of twice the way; the step's own error is (k h)^2 / 12 of it at the most.

@@ -12,7 +12,7 @@ import pytest
 
 from velodrome.engines.engine import Problem
 from velodrome.engines.exudyn.engine import BUILTIN
-from velodrome.engines.exudyn.solve import silent
+from velodrome.engines.exudyn.solve import no_progress
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.dae import consistent_state
 from velodrome.reference.simulate import simulate
@@ -26,7 +26,7 @@ FIXED = f"Exudyn {version('exudyn')} has mended this: drop what works around it"
 
 
 def disc(solver, step, *rest, **options) -> np.ndarray:
-    with silent():
+    with no_progress():
         return SCRIPT.disc_force(solver, step, 0.2, *rest, **options)
 
 
@@ -57,7 +57,7 @@ def test_imported_accelerations_cure_it():
 
 def test_first_steps_of_generalized_alpha_are_of_first_order():
     """The library starts from what it was given: a pendulum's reaction is off by O(h), later by O(h^2)."""
-    with silent():
+    with no_progress():
         coarse, fine = (SCRIPT.pendulum_force(step, 1.0, 0.8) for step in (2e-3, 1e-3))
     fastest = 8.0  # the bar's first swing [rad/s]
     assert coarse[:11].max() / fine[:11].max() == pytest.approx(2, rel=3 * fastest * 2e-3), FIXED

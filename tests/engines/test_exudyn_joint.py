@@ -15,7 +15,7 @@ from exudyn.rigidBodyUtilities import InertiaCylinder
 
 from velodrome.engines.exudyn.joint import CreateRollingJointOnSurface
 from velodrome.engines.exudyn.sensor import CreateRollingJointSensor
-from velodrome.engines.exudyn.solve import silent
+from velodrome.engines.exudyn.solve import no_progress
 from velodrome.reference.bowls import Sphere
 from velodrome.reference.surface import Paraboloid, Plane, evaluate
 
@@ -30,7 +30,7 @@ NEXT_ORDER = MOTION.spin * STEP
 
 @pytest.fixture(scope="module")
 def kicked() -> list[Any]:
-    with silent():
+    with no_progress():
         return [EXAMPLE.ride(MOTION, step, 1.0, kick=0.5) for step in (STEP, STEP / 2)]
 
 
@@ -41,7 +41,7 @@ def drift(ride: Any) -> float:
 @pytest.mark.parametrize("surface", [EXAMPLE.BOWL, Plane(), Sphere(2.6)])
 def test_steady_precession_is_kept_with_order_two(surface):
     """Centre and contact force of the example's equations, which ask for the circle only, not for the surface."""
-    with silent():
+    with no_progress():
         rides = [EXAMPLE.ride(MOTION, step, 1.0, surface=surface) for step in (STEP, STEP / 2)]
     coarse, fine = (EXAMPLE.errors(MOTION, ride) for ride in rides)
     assert coarse[0] / fine[0] == pytest.approx(4, rel=NEXT_ORDER)
@@ -66,7 +66,7 @@ def test_a_system_solved_again_does_the_same():
     settings.timeIntegration.verboseMode = 0
     settings.timeIntegration.numberOfSteps, settings.timeIntegration.endTime = 20, 0.02
     seen = []
-    with silent():
+    with no_progress():
         for _ in range(2):
             mbs.SolveDynamic(settings)
             seen.append(mbs.GetSensorStoredData(sensor).copy())
@@ -150,7 +150,7 @@ def rolled(axle: int, offset: float, joints: int) -> np.ndarray:
     settings.timeIntegration.verboseMode = 0
     settings.timeIntegration.numberOfSteps, settings.timeIntegration.endTime = 200, 0.2
     settings.timeIntegration.newton.relativeTolerance = 1e-11
-    with silent():
+    with no_progress():
         mbs.SolveDynamic(settings)
     return np.stack([mbs.GetSensorStoredData(sensor)[-1, 1:] for sensor in sensors])
 

@@ -12,14 +12,14 @@ import pytest
 from velodrome.engines.engine import Problem, Trajectory
 from velodrome.engines.exudyn.engine import ENGINE
 from velodrome.engines.exudyn.model import Model, build_model, read_motion
-from velodrome.engines.exudyn.solve import Integration, integrate, silent
+from velodrome.engines.exudyn.solve import Integration, integrate, no_progress
 from velodrome.engines.exudyn.wheels import constrain
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.circular import CircularMotion
 from velodrome.reference.dae import consistent_state, dynamics
 from velodrome.reference.families import find_motion
 from velodrome.reference.kinematics import angular_velocities, body_positions, body_velocities, rotations
-from velodrome.reference.simulate import Motion, simulate
+from velodrome.reference.simulate import PreciseMotion, simulate
 from velodrome.reference.surface import Paraboloid
 from velodrome.reports.measure.convergence import extrapolate
 from velodrome.reports.measure.steady import steady_trajectory
@@ -46,7 +46,7 @@ def disturbed(duration: float, interval: float = 0.1) -> Problem:
 
 
 @cache
-def exact(duration: float, interval: float = 0.1) -> Motion:
+def exact(duration: float, interval: float = 0.1) -> PreciseMotion:
     task = disturbed(duration, interval)
     return simulate(task.bicycle, task.surface, task.q, task.qd, task.times, tolerance=1e-14)
 
@@ -63,14 +63,14 @@ def furthest(q: np.ndarray, other: np.ndarray) -> float:
 
 
 def model_of(task: Problem) -> Model:
-    with silent():
+    with no_progress():
         return build_model(task, ENGINE.settings(), constrain)
 
 
 def test_poses_and_velocities_at_the_start():
     task = disturbed(0.01, 0.01)
     model = model_of(task)
-    with silent():
+    with no_progress():
         integrate(model.system, Integration(0.01, 10, 1, ENGINE.settings()), lambda _time: None)
     motion, q, qd = read_motion(model), task.q[None], task.qd[None]
     # Some dozen operations on positions of 2.4 m and velocities of 5.4 m/s and 18 rad/s.
@@ -85,7 +85,7 @@ def test_accelerations_at_the_start():
     """Of the four mass centres, and the angular ones, 2 vec(theta'' conj(theta)) of the Euler parameters."""
     task = disturbed(1.0)
     model, solver = model_of(task), exu.MainSolverImplicitSecondOrder()
-    with silent():
+    with no_progress():
         settings: Any = exu.SimulationSettings()
         settings.solution.file.write = False  # or a folder appears wherever the tests are run
         assert solver.InitializeSolver(model.system, settings)  # pyright: ignore[reportCallIssue]

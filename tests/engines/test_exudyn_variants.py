@@ -12,7 +12,7 @@ from velodrome.engines.engine import Problem, Trajectory
 from velodrome.engines.exudyn.engine import BUILTIN, ENGINE, PLANE_NORMAL, ExudynEngine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.dae import consistent_state
-from velodrome.reference.simulate import Motion, simulate
+from velodrome.reference.simulate import PreciseMotion, simulate
 from velodrome.reference.surface import Paraboloid, Plane, Surface
 from velodrome.reports.measure.convergence import extrapolate
 
@@ -30,7 +30,7 @@ def task(surface: Surface, duration: float = 1.0) -> Problem:
 
 
 @cache
-def exact(surface: Surface, duration: float = 1.0) -> Motion:
+def exact(surface: Surface, duration: float = 1.0) -> PreciseMotion:
     problem = task(surface, duration)
     return simulate(problem.bicycle, problem.surface, problem.q, problem.qd, problem.times, tolerance=1e-14)
 

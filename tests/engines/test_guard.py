@@ -115,14 +115,14 @@ class Reporting:
 def test_what_the_callback_raises_is_no_failure_of_the_engine(error: BaseException, swallows: bool) -> None:
     engine: Any = Reporting(0.5, swallows)
     with pytest.raises(type(error)) as caught:
-        guard.simulate(engine, PROBLEM, None, lambda _: raising(error)())
+        guard.simulate_guarded(engine, PROBLEM, None, lambda _: raising(error)())
     assert caught.value is error
 
 
 def test_a_time_that_is_none_is_a_failure_of_the_engine() -> None:
     engine: Any = Reporting("soon")
     with pytest.raises(ValueError, match="could not convert string to float") as caught:
-        guard.simulate(engine, PROBLEM, None, lambda _: None)
+        guard.simulate_guarded(engine, PROBLEM, None, lambda _: None)
     place = where_raised(caught.value)
     assert place is not None
     assert place.startswith("test_guard.py:")

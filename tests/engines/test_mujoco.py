@@ -18,7 +18,7 @@ from benchmarks.mujoco_settings.creep import contact_acceleration
 from benchmarks.mujoco_settings.study import slip_power
 from velodrome.engines.engine import EngineError, Problem, Trajectory
 from velodrome.engines.mujoco.native import ENGINE
-from velodrome.engines.mujoco.planes import build
+from velodrome.engines.mujoco.planes import build_planes
 from velodrome.engines.mujoco.ride import Rig
 from velodrome.engines.mujoco.settings import IMPEDANCES
 from velodrome.engines.mujoco.state import HINGES, from_mujoco, spin_matrix, to_mujoco
@@ -119,7 +119,7 @@ def test_mass_matrix_and_bias_are_those_of_the_reference(q2):
     rng = np.random.default_rng(2)
     for _ in range(20):
         bicycle, (q, qd) = random_bicycle(rng), random_state(rng)
-        rig = build(replace(q2, bicycle=bicycle, surface=Plane()), ENGINE.settings())
+        rig = build_planes(replace(q2, bicycle=bicycle, surface=Plane()), ENGINE.settings())
         set_state(rig, q, qd)
         transformation = np.zeros((9, 9))
         transformation[:3, :3], transformation[3:6, 3:6] = np.eye(3), spin_matrix(q)
@@ -172,7 +172,7 @@ def test_contact_is_the_closest_approach_on_any_surface(surface):
     for x, y, lean, steer in ((1.0, 2.0, 0.4, 0.3), (-2.0, 0.5, -0.6, -0.4), (0.3, -1.5, 0.1, 1.0)):
         q, qd = consistent_state(bicycle, surface, (x, y), lean, steer, (0.1, 0.2, 5.0), yaw=0.7)
         q[2] -= 2e-3
-        rig = build(Problem(bicycle, surface, q, qd, every(0.01, 0.1)), ENGINE.settings())
+        rig = build_planes(Problem(bicycle, surface, q, qd, every(0.01, 0.1)), ENGINE.settings())
         mujoco.mj_forward(rig.model, rig.data)
         seen = observe(bicycle, surface, q[None], qd[None])
         assert rig.data.ncon == 2
@@ -233,7 +233,7 @@ def test_wheels_creep_by_the_missing_acceleration(start, step, request):
 
 def euler_power(problem: Problem, step: float) -> float:
     """Energy a second [W] that one semi-implicit Euler step adds with exact accelerations."""
-    rig = build(problem, ENGINE.settings(step=step))
+    rig = build_planes(problem, ENGINE.settings(step=step))
     q, qd = problem.q, problem.qd
     acceleration = rate_of_velocity(q, qd, dynamics(problem.bicycle, problem.surface, q, qd).acceleration)
 

@@ -144,15 +144,15 @@ def test_wheel_lifts_off():
 @pytest.fixture
 def unknown_layout():
     """Nothing found out yet, before and after."""
-    layout.find.cache_clear()
+    layout.find_layout.cache_clear()
     layout._place.cache_clear()
     yield
-    layout.find.cache_clear()
+    layout.find_layout.cache_clear()
     layout._place.cache_clear()
 
 
 def test_places_are_those_of_the_views(unknown_layout):
-    found = layout.find()
+    found = layout.find_layout()
     assert found.contact_size == mujoco.MjData(disc()[0]).contact.dist.itemsize * 76
 
 
@@ -179,7 +179,7 @@ def test_fields_that_moved_give_an_error(unknown_layout, monkeypatch, structure,
 def test_another_function_gives_an_error(unknown_layout, monkeypatch):
     monkeypatch.setitem(layout._CALLED, "mj_jac", "const mjModel * | int")
     with pytest.raises(EngineError, match="another function mj_jac"):
-        layout.find()
+        layout.find_layout()
 
 
 def test_listing_the_ladder_does_not_load_mujoco():

@@ -13,9 +13,9 @@ import pytest
 from velodrome.engines.engine import EngineError, Problem, Trajectory
 from velodrome.engines.lagrange import ENGINE as REFERENCE
 from velodrome.engines.mujoco import default, edges, exact_contact, multipliers, native
-from velodrome.engines.mujoco.convergence import watched
+from velodrome.engines.mujoco.convergence import watch_solver
 from velodrome.engines.mujoco.knife_edge import knife_edges, standing, stiffen
-from velodrome.engines.mujoco.ride import start
+from velodrome.engines.mujoco.ride import set_start
 from velodrome.engines.mujoco.settings import (
     WRONG,
     ContactSettings,
@@ -116,11 +116,11 @@ def test_residual_is_the_gradient_of_the_solver_s_cost(iterations):
 @pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast", "RK4"])
 def test_watch_sees_every_stage_and_changes_nothing(integrator):
     problem, settings = circle(1.0), NativeSettings(integrator=integrator)
-    model, data = start(problem, settings, "plane")
+    model, data = set_start(problem, settings, "plane")
     other = mujoco.MjData(model)
     other.qpos[:], other.qvel[:] = data.qpos, data.qvel
     mujoco.mj_step(model, other, 20)
-    with watched(model, data, settings.converged_below) as convergence:
+    with watch_solver(model, data, settings.converged_below) as convergence:
         convergence.begin(0)
         mujoco.mj_step(model, data, 20)
         convergence.look()
@@ -208,14 +208,14 @@ def test_solver_s_start_changes_nothing_but_its_cost(monkeypatch):
     """From the accelerations without contacts, MuJoCo's cold start, the solver finds the same to the step's noise."""
     problem = circle(0.5)
     warm = run(exact_contact, problem)
-    begin = edges.start
+    begin = edges.set_start
 
     def cold(*arguments):
         model, data = begin(*arguments)
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_WARMSTART
         return model, data
 
-    monkeypatch.setattr(edges, "start", cold)
+    monkeypatch.setattr(edges, "set_start", cold)
     other = run(exact_contact, problem)
     assert other.unconverged_steps == 0
     change = np.abs(other.q - warm.q).max() / np.abs(warm.q).max()

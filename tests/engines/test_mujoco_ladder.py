@@ -17,7 +17,7 @@ from velodrome.engines.engine import EngineError, Problem, Trajectory
 from velodrome.engines.lagrange import ENGINE as REFERENCE
 from velodrome.engines.mujoco import default, exact_contact, multipliers, native
 from velodrome.engines.mujoco.edges import build_contacts
-from velodrome.engines.mujoco.ride import start
+from velodrome.engines.mujoco.ride import set_start
 from velodrome.engines.mujoco.settings import ExactContactSettings, MultiplierSettings
 from velodrome.engines.mujoco.state import to_mujoco
 from velodrome.reference.bicycle import Bicycle
@@ -95,7 +95,7 @@ def gap(trajectory: Trajectory) -> float:
 
 def test_energies_of_the_tree_at_random_states():
     rng = np.random.default_rng(5)
-    model, data = start(upright(), MultiplierSettings(), "nothing")
+    model, data = set_start(upright(), MultiplierSettings(), "nothing")
     for _ in range(50):
         angles = [rng.uniform(-9, 9), rng.uniform(-1.4, 1.4), *rng.uniform(-9, 9, 4)]
         q, qd = np.concatenate([rng.uniform(-3, 3, 3), angles]), rng.uniform(-5, 5, 9)

@@ -15,7 +15,7 @@ from velodrome.reference.families import find_motion
 from velodrome.reference.stability import Linearisation, linearise
 from velodrome.reference.surface import Paraboloid, Plane
 from velodrome.reports.measure.identify import Identified, identify
-from velodrome.reports.measure.precision import match
+from velodrome.reports.measure.precision import eigenvalue_pairs
 
 # Meijaard et al. 2007, Table 2, at 4.6 m/s, with more digits from the linearised equations.
 WEAVE = -0.37796622642237 + 3.87284190914j
@@ -80,7 +80,7 @@ def test_exact_models_have_the_eigenvalues_of_the_bowl(engine: MujocoEngine[Any]
     """All seven; the stencil leaves up to 1e-6, and noise is divided by disturbances of 1e-3 and grows by e^4."""
     problem, exact = circle(name)
     found = identify(engine, engine.settings(), problem, levels=3)
-    assert np.abs(match(exact.eigenvalues, found.eigenvalues) - exact.eigenvalues).max() < 1e-5
+    assert np.abs(eigenvalue_pairs(exact.eigenvalues, found.eigenvalues) - exact.eigenvalues).max() < 1e-5
 
 
 @pytest.mark.slow
@@ -92,4 +92,4 @@ def test_native_tends_to_the_eigenvalues_of_the_bowl(name: str) -> None:
     assert found.order == pytest.approx(1, abs=0.1)
     # The third power is left: the fastest mode, 13.4 1/s, at the three levels, 2, 1 and 0.5 ms.
     left = 13.4 * (18.0 * 0.002) * (18.0 * 0.001) * (18.0 * 0.0005)
-    assert np.abs(match(exact.eigenvalues, found.eigenvalues) - exact.eigenvalues).max() < left
+    assert np.abs(eigenvalue_pairs(exact.eigenvalues, found.eigenvalues) - exact.eigenvalues).max() < left

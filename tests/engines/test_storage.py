@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from velodrome.engines.engine import Trajectory
-from velodrome.engines.storage import METADATA_KEY, columns, read_trajectory, write_trajectory
+from velodrome.engines.storage import METADATA_KEY, read_trajectory, trajectory_columns, write_trajectory
 
 OPTIONAL = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
 SHAPES = {
@@ -98,7 +98,7 @@ def test_columns_are_named_and_carry_units(tmp_path: Path) -> None:
     write_trajectory(written, tmp_path / "a.parquet")
     table = pq.read_table(tmp_path / "a.parquet")
     units = {field.name: field.metadata[b"unit"].decode() for field in table.schema}
-    assert list(units) == [column for _, names in columns() for column, _ in names]
+    assert list(units) == [column for _, names in trajectory_columns() for column, _ in names]
     sample = {"time": "s", "lean": "rad", "lean_rate": "rad/s", "x_rate": "m/s", "rear_contact_x": "m"}
     sample |= {"front_force_z": "N", "rear_gap": "m", "front_slip_forward": "m/s", "kinetic_energy": "J"}
     sample |= {"front_wheel_qw": "1", "rear_frame_x": "m"}

@@ -23,7 +23,7 @@ from velodrome.reference.surface import is_level
 from velodrome.scenarios.cli import app
 from velodrome.scenarios.gate import checks as gate
 from velodrome.scenarios.gate.verdict import RIDE_QUANTITIES, SHOWN
-from velodrome.scenarios.run.runner import configure, plan_run, run
+from velodrome.scenarios.run.runner import configure_engine, plan_run, run_plan
 from velodrome.scenarios.scenario.schema import load_scenario
 from velodrome.scenarios.scenario.start import make_start
 
@@ -52,8 +52,8 @@ def test_the_package_announces_the_engine_that_it_has() -> None:
 
 def test_the_suite_does_not_pack_the_example() -> None:
     suite = tomllib.loads((SUITE / "pyproject.toml").read_text(encoding="utf-8"))
-    packed = suite["tool"]["setuptools"]["packages"]["find"]["include"]
-    assert not any(Path(name).match(pattern) for pattern in packed for name in ("examples", "velodrome_symbrim"))
+    (root,) = suite["tool"]["setuptools"]["packages"]["find"]["where"]
+    assert [folder.name for folder in (SUITE / root).iterdir() if folder.suffix != ".egg-info"] == ["velodrome"]
     assert "symbrim" not in suite["project"]["entry-points"][registry.ENTRY_POINT_GROUP]
 
 
@@ -97,7 +97,7 @@ def test_the_guides_smallest_engine_runs_and_gives_only_what_it_has(own: str, tm
     assert own in engine_names()
     assert load_engine(own).name == own
     plan = plan_run(*load_scenario("iftomm-2", {"simulation.duration": 0.5}), [own])
-    outcome = run(plan, tmp_path, lambda *_: None, lambda _: None)
+    outcome = run_plan(plan, tmp_path, lambda *_: None, lambda _: None)
     assert not outcome.failures
     measured = outcome.metrics[own]
     # Modified Euler at 1 ms: (h rate)^2 of the fastest rate, the wheels' 15 rad/s, of half a second's way.
@@ -116,8 +116,8 @@ def test_the_guides_smallest_engine_is_gated(own: str, tmp_path: Path, monkeypat
     monkeypatch.setattr("velodrome.scenarios.gate.sample._eigenvalues", lambda *_: {})
 
     def check(**settings: float) -> list[Any]:
-        found = gate.check(
-            lambda *_: None, ["plane-circle"], [own], tmp_path, lambda n, v: configure(n, {**v, **settings})
+        found = gate.check_gate(
+            lambda *_: None, ["plane-circle"], [own], tmp_path, lambda n, v: configure_engine(n, {**v, **settings})
         )
         if not (tmp_path / "plane-circle.json").exists():
             gate.update_baselines(found[1], found[0], "first", tmp_path)

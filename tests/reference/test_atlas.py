@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from velodrome.reference.atlas import Atlas, Boundary, atlas, spacing
+from velodrome.reference.atlas import Atlas, Boundary, compute_atlas, spacing
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.families import FAMILIES, find_motion, trace
 from velodrome.reference.sections import stable_sections
@@ -19,7 +19,7 @@ LONGEST = 0.05
 
 @cache
 def small() -> Atlas:
-    return atlas(BICYCLE, ALPHAS, LONGEST)
+    return compute_atlas(BICYCLE, ALPHAS, LONGEST)
 
 
 def boundary(family: int) -> Boundary:
@@ -101,7 +101,7 @@ def test_families_one_and_three_have_no_boundary() -> None:
 
 def test_spacing_gives_the_asked_number_of_motions() -> None:
     size = 6000
-    found = atlas(BICYCLE, *spacing(size, largest=0.04))
+    found = compute_atlas(BICYCLE, *spacing(size, largest=0.04))
     # The length of the arcs, taken as a constant, changes by a sixth with alpha.
     assert found.size == pytest.approx(size, rel=0.3)
     assert found.alphas[0] == 0

@@ -7,9 +7,9 @@ from tests.literature import published, rounds_to
 from velodrome.reference.anchors import anchor, start_on_plane
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.circular import Steady, nearest_condition, newton
-from velodrome.reference.continuation import follow
+from velodrome.reference.continuation import follow_curve
 from velodrome.reference.dae import dynamics, residual
-from velodrome.reference.families import find_motion, motions
+from velodrome.reference.families import find_motion, find_motions
 from velodrome.reference.surface import Paraboloid
 
 BICYCLE = Bicycle()
@@ -38,7 +38,7 @@ def test_points_q_round_to_the_print(name: str, family: int) -> None:
 
 
 def test_family_two_has_two_motions_at_q2_and_near_tells_them_apart() -> None:
-    both = motions(BICYCLE, Paraboloid(0.005), 2, 18.0)
+    both = find_motions(BICYCLE, Paraboloid(0.005), 2, 18.0)
     assert [round(motion.lean, 3) for motion in both] == [0.737, 0.693]
     _, other = find_motion(BICYCLE, Paraboloid(0.005), 18.0, 2, near=(0.69, 2.87))
     assert other.lean == both[1].lean
@@ -63,7 +63,7 @@ def test_straight_motions_are_the_limits_of_large_circles(name: str, guess: tupl
     u, _ = newton(level, start_on_plane(BICYCLE, *guess), nearest_condition(), most=30)
     outwards = np.zeros(22)
     outwards[1] = np.sign(u[1])
-    far = level.motion(list(follow(level, u, outwards))[-1].unknowns)
+    far = level.motion(list(follow_curve(level, u, outwards))[-1].unknowns)
     assert np.hypot(*far.position[:2]) > 900
     assert rounds_to(far.front_rate, PRINTED[name]["front_rate"])
 

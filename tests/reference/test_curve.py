@@ -11,8 +11,8 @@ from tests.reference.test_lean import BICYCLES, ROUND_OFF, SURFACES, conditionin
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.circular import REAR_SPEED
 from velodrome.reference.contact import observe
-from velodrome.reference.continuation import follow
-from velodrome.reference.curve import sample
+from velodrome.reference.continuation import follow_curve
+from velodrome.reference.curve import sample_curve
 from velodrome.reference.families import FAMILIES, Family, trace
 from velodrome.reference.kernels import dynamics as full
 from velodrome.reference.kernels.circle import STEP
@@ -118,8 +118,8 @@ def test_the_pivoting_motion_has_its_neighbours_eigenvalues(alpha: float, number
     assert abs(at.unknowns[REAR_SPEED]) < 1e-12
     gaps = []
     for distance in (1e-3, 1e-4):
-        near = next(p for i, p in enumerate(follow(curve.equations, at.unknowns, at.tangent, distance)) if i == 1)
-        seen = sample(curve.equations, np.array([at.unknowns, near.unknowns]))
+        near = next(p for i, p in enumerate(follow_curve(curve.equations, at.unknowns, at.tangent, distance)) if i == 1)
+        seen = sample_curve(curve.equations, np.array([at.unknowns, near.unknowns]))
         gaps.append(np.abs(seen.eigenvalues[0] - seen.eigenvalues[1]).max())
     # First order in the distance; the second order is the distance times rates of change of some 1e1.
     assert gaps[0] / gaps[1] == pytest.approx(10, rel=0.1)

@@ -10,8 +10,8 @@ from velodrome.reference.anchors import anchor, static_equilibria
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.circular import LEAN, REAR_SPEED, SIGMA, STEER, Steady
 from velodrome.reference.continuation import FARTHEST, LARGEST_LEAN, LARGEST_SIGMA, crossings, root_between
-from velodrome.reference.families import FAMILIES, Family, find_motion, front_rate_slope, motions, trace, trace_all
-from velodrome.reference.modes import modes
+from velodrome.reference.families import FAMILIES, Family, find_motion, find_motions, front_rate_slope, trace, trace_all
+from velodrome.reference.modes import follow_modes
 from velodrome.reference.profile import SplineProfile
 from velodrome.reference.sections import growth_along, sample_family, stable_sections
 from velodrome.reference.special import SpecialPoint, special_points
@@ -164,13 +164,13 @@ def test_static_equilibria(alpha: float, steers: list[float]) -> None:
 
 def test_motions_of_further_curves_come_after_those_of_the_anchors() -> None:
     steep = Paraboloid(1.0)
-    pivoting, reversed_circle = motions(BICYCLE, steep, 4, 20.0)
+    pivoting, reversed_circle = find_motions(BICYCLE, steep, 4, 20.0)
     assert find_motion(BICYCLE, steep, 20.0, 4)[1].steer == pivoting.steer
     number, near = find_motion(BICYCLE, steep, 20.0, near=(reversed_circle.lean + 0.01, reversed_circle.steer))
     assert (number, near.steer) == (4, reversed_circle.steer)
     # While that anchor lies on another family's curve, or on this one's own, there are no further motions.
-    assert motions(BICYCLE, Paraboloid(0.005), 2, 26.4)
-    assert not motions(BICYCLE, Paraboloid(0.005), 4, 26.4)
+    assert find_motions(BICYCLE, Paraboloid(0.005), 2, 26.4)
+    assert not find_motions(BICYCLE, Paraboloid(0.005), 4, 26.4)
 
 
 def test_a_family_has_a_further_curve_where_its_own_is_gone() -> None:
@@ -178,7 +178,7 @@ def test_a_family_has_a_further_curve_where_its_own_is_gone() -> None:
     curves, absent = trace_all(BICYCLE, Paraboloid(0.44))
     assert list(absent) == [3]
     assert [(c.number, *c.ends) for c in curves if c.number == 4] == [(4, "static", "large circle")]
-    (motion,) = motions(BICYCLE, Paraboloid(0.44), 4, 18.0)
+    (motion,) = find_motions(BICYCLE, Paraboloid(0.44), 4, 18.0)
     assert motion.front_rate < 0
 
 
@@ -310,7 +310,7 @@ def test_on_the_plane_stability_is_lost_at_an_energy_extremum() -> None:
 
 def test_modes_are_followed_by_continuity() -> None:
     curve = family(0.005, 2, 0.05)
-    rows = modes(curve)
+    rows = follow_modes(curve)
     assert rows.shape == (len(curve.points), 7)
     for expected, row in zip(sample_family(curve).eigenvalues, rows, strict=True):
         assert sorted(row, key=lambda v: (v.real, v.imag)) == sorted(expected, key=lambda v: (v.real, v.imag))
@@ -322,7 +322,7 @@ def test_modes_are_followed_by_continuity() -> None:
 @pytest.mark.parametrize("alpha", [0.0, 0.005, 0.2])
 @pytest.mark.parametrize("number", [1, 2, 3, 4])
 def test_no_pair_is_torn_apart(alpha: float, number: int) -> None:
-    rows = modes(family(alpha, number, 0.05))
+    rows = follow_modes(family(alpha, number, 0.05))
     for start in (1, 3, 5):
         first, second = rows[:, start], rows[:, start + 1]
         real = (np.imag(first) == 0) & (np.imag(second) == 0)
@@ -332,14 +332,14 @@ def test_no_pair_is_torn_apart(alpha: float, number: int) -> None:
 def test_modes_have_the_names_that_they_have_on_the_plane() -> None:
     for number in (1, 2, 3, 4):
         curve = family(0.0, number, 0.05)
-        rows, yaw_rate = modes(curve), sample_family(curve).yaw_rate
+        rows, yaw_rate = follow_modes(curve), sample_family(curve).yaw_rate
         # The circle's centre is free. The eigenvalues of a nearly double pair are known to the root of round-off.
         distance = np.abs(rows[:, 5:] - 1j * np.abs(yaw_rate)[:, None] * [[1, -1]]).max(axis=1)
         assert np.median(distance) < 1e-9
     # Q2: in the bowl the centre is held, and its pair turns a little faster than the yaw.
     curve = family(0.005, 2, 0.05)
     angles = np.array([point.unknowns[[LEAN, STEER]] for point in curve.points])
-    named = modes(curve)[np.linalg.norm(angles - (0.7374, 2.837), axis=1).argmin()]
+    named = follow_modes(curve)[np.linalg.norm(angles - (0.7374, 2.837), axis=1).argmin()]
     # Points are 0.05 of arc apart, along which the fastest eigenvalue moves by 1.
     assert np.abs(named[1:4] - [-12.28, -0.43, -0.14 + 6.71j]).max() < 1
     assert np.abs(np.imag(named[5:])).max() == pytest.approx(2.35, abs=0.1)

@@ -8,12 +8,12 @@ import pytest
 from tests.shaken import shake
 from velodrome.reference.anchors import anchor
 from velodrome.reference.bicycle import Bicycle
-from velodrome.reference.circular import REAR_SPEED, SIGMA, YAW_SPEED, turned
+from velodrome.reference.circular import REAR_SPEED, SIGMA, YAW_SPEED, reverse_speeds
 from velodrome.reference.continuation import Point, roots_along, sign_changes
-from velodrome.reference.curve import sample
+from velodrome.reference.curve import sample_curve
 from velodrome.reference.families import Family, trace
 from velodrome.reference.kernels.steady import STANDING, direction
-from velodrome.reference.modes import modes
+from velodrome.reference.modes import follow_modes
 from velodrome.reference.sections import sample_family, stable_sections
 from velodrome.reference.special import special_points
 from velodrome.reference.stability import are_zero, eigenvalue_order, sorted_eigenvalues
@@ -60,7 +60,7 @@ def test_round_off_of_the_rear_speed_tells_nothing(number: int, noise: float) ->
     u[REAR_SPEED] = noise
     motion, expected = curve.equations.motion(u), curve.equations.motion(curve.points[0].unknowns)
     assert (motion.yaw_rate, motion.front_rate) == (expected.yaw_rate, expected.front_rate)
-    seen = sample(curve.equations, u[None])
+    seen = sample_curve(curve.equations, u[None])
     assert (seen.yaw_rate[0], seen.front_rate[0]) == (motion.yaw_rate, motion.front_rate)
 
 
@@ -85,7 +85,7 @@ def test_a_static_end_stands_still() -> None:
 def test_turned_speeds_solve_the_same_equations() -> None:
     curve = family(0.2, 2)
     for point in curve.points[::20]:
-        here, there = (curve.equations.residual(u) for u in (point.unknowns, turned(point.unknowns)))
+        here, there = (curve.equations.residual(u) for u in (point.unknowns, reverse_speeds(point.unknowns)))
         # Each row is odd or even in the speeds.
         assert np.array_equal(np.abs(here), np.abs(there))
 
@@ -156,7 +156,7 @@ def test_complex_eigenvalues_are_exactly_conjugate_and_sorted() -> None:
 
 @pytest.mark.parametrize(("alpha", "number"), [(0.0, 2), (0.0, 4), (0.2, 1), (0.2, 3)])
 def test_halves_of_modes_have_one_order(alpha: float, number: int) -> None:
-    rows = modes(family(alpha, number))
+    rows = follow_modes(family(alpha, number))
     for start in (1, 3, 5):
         first, second = rows[:, start], rows[:, start + 1]
         turning = np.imag(first) != 0
@@ -177,7 +177,7 @@ def test_growth_that_is_round_off_is_none() -> None:
 
 
 def test_shaken_round_off_changes_no_name_and_no_flag(monkeypatch: pytest.MonkeyPatch) -> None:
-    kept = {number: (family(0.005, number), modes(family(0.005, number))) for number in (3, 4)}
+    kept = {number: (family(0.005, number), follow_modes(family(0.005, number))) for number in (3, 4)}
     shake(3, monkeypatch.setattr)
     for number, (curve, named) in kept.items():
         other = trace(BICYCLE, Paraboloid(0.005), number, 0.1)
@@ -187,5 +187,5 @@ def test_shaken_round_off_changes_no_name_and_no_flag(monkeypatch: pytest.Monkey
         assert np.array_equal(seen.stable, same.stable)
         size = np.abs(named).max(axis=1, keepdims=True)
         # A double zero splits by the root of round-off times its condition, 1e-7.
-        assert np.abs(modes(other) - named).max() <= (1e-6 * size).max()
+        assert np.abs(follow_modes(other) - named).max() <= (1e-6 * size).max()
         assert [point.name for point in special_points(other)] == [point.name for point in special_points(curve)]

@@ -6,7 +6,7 @@ from velodrome.reference.contact import observe
 from velodrome.reference.dae import consistent_state
 from velodrome.reference.families import find_motion
 from velodrome.reference.kinematics import LEAN, YAW
-from velodrome.reference.simulate import Motion, simulate, simulate_modified_euler, steps_per_output
+from velodrome.reference.simulate import PreciseMotion, simulate, simulate_modified_euler, steps_per_output
 from velodrome.reference.stability import linearise
 from velodrome.reference.surface import Paraboloid, Plane
 
@@ -22,11 +22,11 @@ def q2(lean_rate: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.fixture(scope="module")
-def q2_plus() -> Motion:
+def q2_plus() -> PreciseMotion:
     return simulate(BICYCLE, BOWL, *q2(0.1), TIMES)
 
 
-def test_energy_gaps_and_rolling_are_kept(q2_plus: Motion) -> None:
+def test_energy_gaps_and_rolling_are_kept(q2_plus: PreciseMotion) -> None:
     seen = observe(BICYCLE, BOWL, q2_plus.q, q2_plus.qd)
     energy = seen.kinetic_energy + seen.potential_energy
     assert np.abs(energy / energy[0] - 1).max() <= 1e-11
@@ -42,13 +42,13 @@ def test_constraints_are_kept_whatever_the_tolerance() -> None:
     assert np.abs(seen.slip).max() <= 1e-11
 
 
-def test_two_tolerances_agree(q2_plus: Motion) -> None:
+def test_two_tolerances_agree(q2_plus: PreciseMotion) -> None:
     loose = simulate(BICYCLE, BOWL, *q2(0.1), TIMES, tolerance=1e-11)
     assert np.linalg.norm(loose.q[:, :3] - q2_plus.q[:, :3], axis=1).max() <= 1e-9
     assert np.abs(loose.force - q2_plus.force).max() <= 1e-6
 
 
-def test_error_follows_the_tolerance(q2_plus: Motion) -> None:
+def test_error_follows_the_tolerance(q2_plus: PreciseMotion) -> None:
     """The error of an order-8 method is about proportional to its tolerance."""
     errors = []
     for tolerance in (1e-8, 1e-9, 1e-10, 1e-11):
@@ -59,7 +59,7 @@ def test_error_follows_the_tolerance(q2_plus: Motion) -> None:
     assert 0.85 < slope < 1.15
 
 
-def test_the_papers_integrator_converges_with_order_two(q2_plus: Motion) -> None:
+def test_the_papers_integrator_converges_with_order_two(q2_plus: PreciseMotion) -> None:
     errors = []
     for step in (2e-3, 1e-3, 5e-4):
         motion = simulate_modified_euler(BICYCLE, BOWL, *q2(0.1), TIMES, step)

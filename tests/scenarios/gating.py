@@ -16,7 +16,7 @@ from velodrome.scenarios.gate import checks as gate
 from velodrome.scenarios.gate import sample as gate_sample
 from velodrome.scenarios.gate.exact import Exact, find_exact
 from velodrome.scenarios.gate.verdict import Verdict
-from velodrome.scenarios.run.runner import configure
+from velodrome.scenarios.run.runner import configure_engine
 from velodrome.scenarios.scenario.schema import Scenario
 from velodrome.scenarios.scenario.start import Start, make_start
 
@@ -55,13 +55,13 @@ def measure_rides_only(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def verdicts_of(
     engine: str,
-    chosen: Chosen = configure,
+    chosen: Chosen = configure_engine,
     scenarios: Sequence[str] | None = None,
     baselines: Path | None = None,
     **options: Any,
 ) -> dict[str, list[Verdict]]:
     """Verdicts on an engine by scenario; on all that are gated if none is named."""
-    verdicts, _ = gate.check(lambda *_: None, scenarios, [engine], baselines, chosen, **options)
+    verdicts, _ = gate.check_gate(lambda *_: None, scenarios, [engine], baselines, chosen, **options)
     assert {verdict.engine for _, verdict in verdicts} == {engine}
     found: dict[str, list[Verdict]] = {}
     for name, verdict in verdicts:
@@ -69,7 +69,7 @@ def verdicts_of(
     return found
 
 
-def verdicts_on(engine: str, chosen: Chosen = configure, scenario: str = "q2") -> list[Verdict]:
+def verdicts_on(engine: str, chosen: Chosen = configure_engine, scenario: str = "q2") -> list[Verdict]:
     """Verdicts on an engine in one scenario."""
     return verdicts_of(engine, chosen, [scenario])[scenario]
 
@@ -86,7 +86,7 @@ def altered(
     """An engine with another problem, or another trajectory."""
 
     def chosen(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
-        engine, settings = configure(name, values)
+        engine, settings = configure_engine(name, values)
         return Altered(engine, before, after), settings
 
     return chosen
@@ -109,7 +109,7 @@ def simulated(simulate: Simulate) -> Chosen:
     """An engine that computes its trajectory in another way, and says nothing of it."""
 
     def chosen(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
-        engine, settings = configure(name, values)
+        engine, settings = configure_engine(name, values)
         return _Simulated(engine, replaced=simulate), settings
 
     return chosen
@@ -117,4 +117,4 @@ def simulated(simulate: Simulate) -> Chosen:
 
 def set_to(**changes: Any) -> Chosen:
     """An engine with other settings."""
-    return lambda name, values: configure(name, {**values, **changes})
+    return lambda name, values: configure_engine(name, {**values, **changes})

@@ -15,8 +15,8 @@ import os
 import sys
 from dataclasses import replace
 
-from engines.engine import Settings
-from engines.lagrange import ENGINE as INNER
+from velodrome.engines.engine import Settings
+from velodrome.engines.lagrange import ENGINE as INNER
 
 
 def do(place):

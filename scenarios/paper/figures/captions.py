@@ -9,11 +9,11 @@ import numpy as np
 
 from ....reference.circular import CircularMotion
 from ....reference.kinematics import REAR_ANGLE
-from ....reports.figures import curves
-from .trajectories import Ride, leaves_at
+from ....reports.figures import make_curves
+from .trajectories import FigureRide, leaves_at
 
-LEFT = 0.01  # of the radius: so far off its circle D has left it
-SETTLED = 10.0  # last part of a ride, over which its mean rate is taken [s]
+LEFT_CIRCLE_AT = 0.01  # of the radius: so far off its circle D has left it
+SETTLED_PART = 10.0  # last part of a ride, over which its mean rate is taken [s]
 
 _AXES = (
     "Circular motions: (a) lean and (b) steer over the scaled speed of the front wheel; on families 2 and 4, whose "
@@ -23,7 +23,7 @@ _AXES = (
 
 def families_caption(document: Mapping[str, Any], front_radius: float) -> str:
     """Of a figure of solution families: what its lines mean, and what is stable."""
-    drawn = curves(document["families"], front_radius)
+    drawn = make_curves(document["families"], front_radius)
     words = [_AXES]
     shared = [curve.families for curve in drawn if len(curve.families) > 1]
     if shared:
@@ -54,28 +54,31 @@ def configurations_caption(alpha: float) -> str:
     )
 
 
-def departure_caption(ride: Ride, circle: CircularMotion, growth_rate: float) -> str:
+def departure_caption(ride: FigureRide, circle: CircularMotion, growth_rate: float) -> str:
     """Of the ride that leaves Q1."""
-    times = [leaves_at(motion, circle, LEFT) for motion in (ride.paper, ride.precise)]
+    times = [leaves_at(motion, circle, LEFT_CIRCLE_AT) for motion in (ride.paper, ride.precise)]
     paper, precise = ("never" if time is None else f"after {time:.1f} s" for time in times)
     ends = [f"{motion.time[-1]:.1f} s" for motion in (ride.paper, ride.precise)]
     return (
         f"A ride from {ride.name}: (a) path of D, (b) wheel rates, (c) distance of D from its circle. By modified "
-        f"Euler D is {100 * LEFT:g} % off its circle {paper}, by the precise integrator {precise}: that one starts "
-        f"from round-off alone, and in both errors grow at the rate of linear theory, {growth_rate:.4f} 1/s. They "
-        f"leave along like paths at different times. Curves end where a wheel leaves the ground, after {ends[0]} "
+        f"Euler D is {100 * LEFT_CIRCLE_AT:g} % off its circle {paper}, by the precise integrator {precise}: that one "
+        f"starts from round-off alone, and in both errors grow at the rate of linear theory, {growth_rate:.4f} 1/s. "
+        f"They leave along like paths at different times. Curves end where a wheel leaves the ground, after {ends[0]} "
         f"and {ends[1]}."
     )
 
 
-def disturbed_caption(rides: Sequence[Ride], circle: CircularMotion, neighbours: Mapping[str, CircularMotion]) -> str:
+def disturbed_caption(
+    rides: Sequence[FigureRide], circle: CircularMotion, neighbours: Mapping[str, CircularMotion]
+) -> str:
     """Of the disturbed rides about Q2."""
     words = []
     for ride in rides:
         level = neighbours[ride.name].rear_rate
         words.append(
-            f"with {ride.name} its mean over the last {SETTLED:g} s is {settled_rate(ride):.4f} rad/s, and {level:.4f} "
-            f"on the circle of equal energy (integrators apart after {ride.both[0][-1]:g} s: {ride.apart[-1]:.2g} m)"
+            f"with {ride.name} its mean over the last {SETTLED_PART:g} s is {settled_rate(ride):.4f} rad/s, and "
+            f"{level:.4f} on the circle of equal energy (integrators apart after {ride.both[0][-1]:g} s: "
+            f"{ride.apart[-1]:.2g} m)"
         )
     return (
         "Rides from Q2, disturbed in the lean rate: (a) path of D in the first 20 s, (b) rate of the rear wheel, (c) "
@@ -85,9 +88,9 @@ def disturbed_caption(rides: Sequence[Ride], circle: CircularMotion, neighbours:
     )
 
 
-def settled_rate(ride: Ride) -> float:
+def settled_rate(ride: FigureRide) -> float:
     """Mean rear-wheel rate at the end of a ride [rad/s]."""
-    late = ride.precise.time > ride.precise.time[-1] - SETTLED
+    late = ride.precise.time > ride.precise.time[-1] - SETTLED_PART
     return float(np.mean(ride.precise.qd[late, REAR_ANGLE]))
 
 

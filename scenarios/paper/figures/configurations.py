@@ -15,7 +15,7 @@ from ....reference.bicycle import BODIES, Bicycle
 from ....reference.circular import CircularMotion
 from ....reference.kinematics import body_positions, rotations
 from ....reference.surface import Surface, unit_normals
-from ....reports.drawing import STEEPEST, ball, body_meshes, disc, lifted
+from ....reports.drawing import STEEPEST, ball, body_meshes, ground_disc, lift_points
 from ....reports.figures import FAMILY_COLOURS, INK, WIDTH, new_figure
 from .picture import Picture, View
 
@@ -68,7 +68,7 @@ def configurations_figure(bicycle: Bicycle, surface: Surface, shown: Sequence[Co
 def _panel(axes: Axes, bicycle: Bicycle, surface: Surface, item: Configuration, tag: str) -> None:
     motion = item.motion
     radius = float(np.hypot(*motion.contact[:, :2].T).max()) + _MARGIN
-    rim = float(lifted(surface, np.array([radius]), np.zeros(1))[0, 2])
+    rim = float(lift_points(surface, np.array([radius]), np.zeros(1))[0, 2])
     view = _view(motion, radius, rim)
     picture = Picture(view, _COLUMNS)
     _draw_ground(picture, view, surface, radius)
@@ -100,7 +100,7 @@ def _view(motion: CircularMotion, radius: float, rim: float) -> View:
 
 def _draw_ground(picture: Picture, view: View, surface: Surface, radius: float) -> None:
     ring = radius * np.column_stack([np.cos(_AROUND), np.sin(_AROUND)])
-    ground = disc(surface, ring, radius, STEEPEST)
+    ground = ground_disc(surface, ring, radius, STEEPEST)
     colours = np.tile(_GROUND, (len(ground.vertices), 1)) * (0.94 + 0.12 * ground.brightness[:, None])
     # From outside the near wall would hide the bicycle: only what shows its inner side is drawn.
     picture.body(ground.vertices, ground.normals, ground.triangles, colours, cull=True)
@@ -117,9 +117,9 @@ def _draw_circles(picture: Picture, surface: Surface, motion: CircularMotion) ->
     """Circles of the two contact points on the ground, and the path of D with its direction."""
     for contact, colour in zip(motion.contact, (_REAR_TRACK, _FRONT_TRACK), strict=True):
         reach = float(np.hypot(*contact[:2]))
-        track = lifted(surface, reach * np.cos(_AROUND), reach * np.sin(_AROUND), 0.004)
+        track = lift_points(surface, reach * np.cos(_AROUND), reach * np.sin(_AROUND), 0.004)
         picture.line(track, 3.0, np.array(colour))
-        here = lifted(surface, contact[:1], contact[1:2])[0]
+        here = lift_points(surface, contact[:1], contact[1:2])[0]
         point = ball(here, _DOT)
         picture.body(point.vertices, point.normals, point.triangles, np.tile(colour, (len(point.vertices), 1)))
     reach, height = float(np.hypot(*motion.position[:2])), float(motion.position[2])

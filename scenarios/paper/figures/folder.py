@@ -15,30 +15,30 @@ from ....reference.families import trace
 from ....reference.simulate import simulate, simulate_modified_euler
 from ....reference.stability import independent, linearise
 from ....reference.surface import Paraboloid
-from ....reports.figures import solution_figure, style, write_figure
+from ....reports.figures import solution_figure, use_style, write_figure
 from ...files import make_folder, write_json, write_text
 from ...motions import families_document
-from ...run import Watch
+from ...run import RunWatch
 from ...scenario import Start, load_scenario, make_start
 from ..energy import motion_of_energy
-from ..ledger import Line
-from ..ledger import document as ledger_document
-from ..table import markdown
+from ..ledger import LedgerLine
+from ..ledger import ledger_document as ledger_document
+from ..table import ledger_markdown
 from .captions import captions_text, configurations_caption, departure_caption, disturbed_caption, families_caption
 from .configurations import Configuration, configurations_figure
 from .tables import LinearisedPoint, linearisation_document, linearisation_tables
-from .trajectories import Ride, departure_figure, disturbed_figure, while_pushed
+from .trajectories import FigureRide, departure_figure, disturbed_figure, while_pushed
 
 ENDINGS = (".svg", ".png")
 ALPHAS = {"figure-2": 0.0, "figure-3": 1 / 200, "figure-4": 1 / 20, "figure-5": 1 / 5, "figure-7": 1.0}
 MARKS = {"figure-3": ("q1", "q2"), "figure-5": ("p1", "p2", "p3", "p4")}  # motions that the paper marks
-DISTURBED = {"+0.1 rad/s": "q2-plus", "−0.1 rad/s": "q2-minus"}
+DISTURBED_SCENARIO = {"+0.1 rad/s": "q2-plus", "−0.1 rad/s": "q2-minus"}
 DEPARTURE, SETTLING = 100.0, 60.0  # simulated from Q1 and about Q2 [s]
 
-Drawn = tuple[Figure, str]
+DrawnFigure = tuple[Figure, str]
 
 
-def write_figures(out: Path, progress: Watch, endings: Iterable[str] = ENDINGS) -> list[Path]:
+def write_figures(out: Path, progress: RunWatch, endings: Iterable[str] = ENDINGS) -> list[Path]:
     """Compute and write Figures 2 to 9, their captions, and the tables at Q1 and Q2.
 
     Parameters
@@ -59,7 +59,7 @@ def write_figures(out: Path, progress: Watch, endings: Iterable[str] = ENDINGS) 
     written: list[Path] = []
     captions: dict[str, str] = {}
     jobs = _jobs()
-    with style():
+    with use_style():
         for done, (name, draw) in enumerate(jobs.items()):
             progress(name, done, len(jobs) + 1)
             figure, captions[name] = draw()
@@ -74,7 +74,7 @@ def write_figures(out: Path, progress: Watch, endings: Iterable[str] = ENDINGS) 
     return [*written, *(out / name for name in ("captions.md", "tables.md", "linearisation.json"))]
 
 
-def write_paper(out: Path, lines: Sequence[Line], progress: Watch) -> list[Path]:
+def write_paper(out: Path, lines: Sequence[LedgerLine], progress: RunWatch) -> list[Path]:
     """Write the ledger, as JSON and as a page of Markdown, and all figures and tables into a folder.
 
     Raises
@@ -84,18 +84,18 @@ def write_paper(out: Path, lines: Sequence[Line], progress: Watch) -> list[Path]
     """
     make_folder(out)
     write_json(out / "ledger.json", ledger_document(lines))
-    write_text(out / "ledger.md", markdown(lines))
+    write_text(out / "ledger.md", ledger_markdown(lines))
     return [out / "ledger.json", out / "ledger.md", *write_figures(out, progress)]
 
 
-def _jobs() -> dict[str, Callable[[], Drawn]]:
+def _jobs() -> dict[str, Callable[[], DrawnFigure]]:
     """Name of a figure to what computes and draws it, in the paper's order."""
-    jobs: dict[str, Callable[[], Drawn]] = {name: partial(_families, name) for name in ALPHAS}
+    jobs: dict[str, Callable[[], DrawnFigure]] = {name: partial(_families, name) for name in ALPHAS}
     jobs |= {"figure-6": _configurations, "figure-8": _departure, "figure-9": _disturbed}
     return dict(sorted(jobs.items()))
 
 
-def _families(name: str) -> Drawn:
+def _families(name: str) -> DrawnFigure:
     alpha, marked = ALPHAS[name], {key.upper(): start_named(key) for key in MARKS.get(name, ())}
     marks = {key: _figures(_motion(start)) for key, start in marked.items()}
     document = families_document(alpha)
@@ -104,7 +104,7 @@ def _families(name: str) -> Drawn:
     )
 
 
-def _configurations() -> Drawn:
+def _configurations() -> DrawnFigure:
     starts = {name: start_named(name) for name in MARKS["figure-5"]}
     shown = [Configuration(name.upper(), start.family or 0, _motion(start)) for name, start in starts.items()]
     problem = starts["p1"].problem
@@ -112,28 +112,28 @@ def _configurations() -> Drawn:
     return figure, configurations_caption(ALPHAS["figure-5"])
 
 
-def _departure() -> Drawn:
+def _departure() -> DrawnFigure:
     start = start_named("q1", DEPARTURE)
     ride, motion = ride_from("Q1", start), _motion(start)
     return departure_figure(ride, motion, start.growth_rate), departure_caption(ride, motion, start.growth_rate)
 
 
-def _disturbed() -> Drawn:
+def _disturbed() -> DrawnFigure:
     circle = _motion(start_named("q2"))
-    starts = {words: start_named(name, SETTLING) for words, name in DISTURBED.items()}
+    starts = {words: start_named(name, SETTLING) for words, name in DISTURBED_SCENARIO.items()}
     rides = [ride_from(words, start) for words, start in starts.items()]
     neighbours = {words: circle_of_equal_energy(start, circle) for words, start in starts.items()}
     return disturbed_figure(rides, circle, neighbours), disturbed_caption(rides, circle, neighbours)
 
 
-def ride_from(name: str, start: Start) -> Ride:
+def ride_from(name: str, start: Start) -> FigureRide:
     """Integrate a start precisely and by the paper's method, as far as both wheels are pushed."""
     problem = start.problem
     motions = [
         integrate(problem.bicycle, problem.surface, problem.q, problem.qd, problem.times)
         for integrate in (simulate, simulate_modified_euler)
     ]
-    return Ride(name, *(while_pushed(motion, problem.bicycle, problem.surface) for motion in motions))
+    return FigureRide(name, *(while_pushed(motion, problem.bicycle, problem.surface) for motion in motions))
 
 
 def circle_of_equal_energy(start: Start, circle: CircularMotion) -> CircularMotion:

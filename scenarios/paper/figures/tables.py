@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ....reference.stability import VARIABLES, Linearisation
-from ..printed import printed as printed_figures
+from ..printed import read_printed as printed_figures
 
 SYMBOLS = ("x̃", "ỹ", "θ", "δ", "θ̇", "δ̇", "φ̇r")
 

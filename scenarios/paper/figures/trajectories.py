@@ -16,19 +16,19 @@ from ....reference.bicycle import Bicycle
 from ....reference.circular import CircularMotion
 from ....reference.contact import observe
 from ....reference.kinematics import FRONT_ANGLE, REAR_ANGLE
-from ....reference.simulate import Motion
+from ....reference.simulate import PreciseMotion
 from ....reference.surface import Surface
 from ....reports.figures import FAMILY_COLOURS, GREY, INK, new_figure
 
 REAR, FRONT = FAMILY_COLOURS[1], FAMILY_COLOURS[2]
-DISTURBED = (FAMILY_COLOURS[1], FAMILY_COLOURS[2])
+DISTURBED_COLOURS = (FAMILY_COLOURS[1], FAMILY_COLOURS[2])
 _FIRST = 20.0  # the paths are drawn up to here [s]: later laps lie on one another
 _PRECISE: dict[str, Any] = {"lw": 2.4, "alpha": 0.55, "solid_capstyle": "butt", "gid": "precise"}
 _PAPER: dict[str, Any] = {"lw": 0.9, "color": INK, "dashes": (4, 2), "gid": "modified Euler"}
 
 
 @dataclass(frozen=True)
-class Ride:
+class FigureRide:
     """One start, integrated twice, as far as both wheels are pushed.
 
     Attributes
@@ -39,8 +39,8 @@ class Ride:
     """
 
     name: str
-    precise: Motion
-    paper: Motion
+    precise: PreciseMotion
+    paper: PreciseMotion
 
     @property
     def both(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -55,7 +55,7 @@ class Ride:
         return np.hypot(*(precise - paper).T)
 
 
-def while_pushed(motion: Motion, bicycle: Bicycle, surface: Surface) -> Motion:
+def while_pushed(motion: PreciseMotion, bicycle: Bicycle, surface: Surface) -> PreciseMotion:
     """A motion up to the first sample at which the ground would have to pull a wheel: there it is off the ground."""
     seen = observe(bicycle, surface, motion.q, motion.qd)
     normal = np.einsum("nwi,nwi->nw", motion.force, seen.normal)
@@ -68,18 +68,18 @@ def while_pushed(motion: Motion, bicycle: Bicycle, surface: Surface) -> Motion:
     return replace(motion, ended=ended, **kept)
 
 
-def radius_change(motion: Motion, circle: CircularMotion) -> np.ndarray:
+def radius_change(motion: PreciseMotion, circle: CircularMotion) -> np.ndarray:
     """How far D is off its circle, shape (n,) [m]."""
     return np.abs(np.hypot(*motion.q[:, :2].T) - np.hypot(*circle.position[:2]))
 
 
-def leaves_at(motion: Motion, circle: CircularMotion, share: float) -> float | None:
+def leaves_at(motion: PreciseMotion, circle: CircularMotion, share: float) -> float | None:
     """First time at which D is off its circle by a share of the radius [s], or None."""
     off = np.flatnonzero(radius_change(motion, circle) > share * np.hypot(*circle.position[:2]))
     return float(motion.time[off[0]]) if len(off) else None
 
 
-def departure_figure(ride: Ride, circle: CircularMotion, growth_rate: float) -> Figure:
+def departure_figure(ride: FigureRide, circle: CircularMotion, growth_rate: float) -> Figure:
     """Draw a ride that leaves its circle: path, wheel rates, distance from the circle on a log scale.
 
     Parameters
@@ -112,7 +112,7 @@ def departure_figure(ride: Ride, circle: CircularMotion, growth_rate: float) -> 
     return figure
 
 
-def _guide(axes: Axes, motion: Motion, circle: CircularMotion, growth_rate: float) -> None:
+def _guide(axes: Axes, motion: PreciseMotion, circle: CircularMotion, growth_rate: float) -> None:
     """The linear theory's slope, below the precise curve."""
     off = radius_change(motion, circle)
     middle = int(np.argmin(np.abs(np.log(np.maximum(off, 1e-300)) - np.log(1e-7))))
@@ -123,7 +123,9 @@ def _guide(axes: Axes, motion: Motion, circle: CircularMotion, growth_rate: floa
     axes.annotate(words, (times[0], values[0]), (14, 0), textcoords="offset points", va="center")
 
 
-def disturbed_figure(rides: Sequence[Ride], circle: CircularMotion, neighbours: Mapping[str, CircularMotion]) -> Figure:
+def disturbed_figure(
+    rides: Sequence[FigureRide], circle: CircularMotion, neighbours: Mapping[str, CircularMotion]
+) -> Figure:
     """Draw disturbed rides about a stable circle: paths, rear-wheel rates, distance of the integrators.
 
     Parameters
@@ -142,7 +144,7 @@ def disturbed_figure(rides: Sequence[Ride], circle: CircularMotion, neighbours: 
     figure, path, rates, apart = _panels("integrators apart [m]", "rear-wheel rate [rad/s]")
     lens = path.inset_axes((0.27, 0.27, 0.46, 0.46), xticks=[], yticks=[], aspect="equal")
     handles = []
-    for ride, colour in zip(rides, DISTURBED, strict=False):
+    for ride, colour in zip(rides, DISTURBED_COLOURS, strict=False):
         look, thin = _with(_PRECISE, color=colour, lw=1.6), _with(_PAPER, lw=0.55)
         early = ride.precise.time <= _FIRST
         for axes in (path, lens):

@@ -7,7 +7,7 @@ from velodrome.reference.bowls import Sphere, Torus
 from velodrome.reference.height_field import HeightField
 from velodrome.reference.profile import SplineProfile
 from velodrome.reference.surface import Paraboloid, Plane, Surface, evaluate
-from velodrome.reports.drawing.ground import STEEPEST, Ground, ground_of_ride
+from velodrome.reports.drawing.ground import STEEPEST, GroundMesh, make_ground
 
 REACH = STEEPEST / np.hypot(1, STEEPEST)  # sine of the steepest slope that is drawn
 TURN = np.linspace(0, 2 * np.pi, 200)
@@ -16,7 +16,7 @@ x, y = np.arange(12.0)[:, None] - 1, np.arange(8.0)[None, :] - 3.5
 FIELD = HeightField((0.1 * np.sin(x) * np.cos(y)).tolist(), 1.0, (-1.0, -3.5))
 
 
-def everything(ground: Ground) -> np.ndarray:
+def everything(ground: GroundMesh) -> np.ndarray:
     return np.concatenate([ground.vertices, ground.normals, ground.edge, ground.wall, *ground.lines])
 
 
@@ -40,7 +40,7 @@ def everything(ground: Ground) -> np.ndarray:
 def test_ground_is_drawn_as_far_as_there_is_any(
     surface: Surface, path: np.ndarray, inner: float | None, outer: float | None
 ) -> None:
-    ground = ground_of_ride(surface, path)
+    ground = make_ground(surface, path)
     assert np.isfinite(everything(ground)).all()
     assert np.isfinite(ground.brightness).all()
     vertices = ground.vertices
@@ -55,12 +55,12 @@ def test_ground_is_drawn_as_far_as_there_is_any(
 
 def test_a_steep_ride_has_ground_on_both_sides() -> None:
     """At the slope of 6 of a deep paraboloid."""
-    ground = ground_of_ride(Paraboloid(1.0), 3 * ROUND)
+    ground = make_ground(Paraboloid(1.0), 3 * ROUND)
     assert np.linalg.norm(ground.vertices[:, :2], axis=1).max() == pytest.approx(4.2)
 
 
 def test_a_ride_that_has_left_the_ground_is_left_out() -> None:
     path = np.concatenate([ALONG, [[60.0, 0.0]]])
-    ground = ground_of_ride(FIELD, path)
+    ground = make_ground(FIELD, path)
     assert np.isfinite(everything(ground)).all()
     assert ground.vertices[:, 0].max() == pytest.approx(10.0, abs=1e-9)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from velodrome.reports.drawing.summary import COLUMNS, cell, remarks, summary, verdict_line
+from velodrome.reports.drawing.summary import COLUMNS, format_cell, format_verdict, make_remarks, make_summary
 
 MEASURED: dict[str, Any] = {
     "position_error": {"max": 9.397e-6, "end": 8.83e-6},
@@ -35,7 +35,7 @@ ALONE = dict.fromkeys(MEASURED) | {"energy_drift": 8e-14, "cpu_time": 0.01}
 
 def text(growth_rate: float = -0.4, **changes: Any) -> str:
     measured = {"reference": ALONE, "exudyn": MEASURED | changes}
-    return summary("A ride", measured, {"mujoco-native": "no such thing"}, [], growth_rate, 20.0)
+    return make_summary("A ride", measured, {"mujoco-native": "no such thing"}, [], growth_rate, 20.0)
 
 
 def test_the_table_has_every_quantity_of_every_engine() -> None:
@@ -54,12 +54,12 @@ def test_the_table_has_every_quantity_of_every_engine() -> None:
 
 @pytest.mark.parametrize(("value", "shown"), [(None, "–"), ({"max": None}, "–"), ({"max": 0.5}, "0.5"), (0.0, "0")])
 def test_a_cell_shows_a_dash_for_nothing_and_nought_for_nought(value: Any, shown: str) -> None:
-    assert cell({"x": value}, "x", "max") == shown
+    assert format_cell({"x": value}, "x", "max") == shown
 
 
 def test_no_news_is_no_remark() -> None:
-    assert remarks("exudyn", MEASURED, 20.0) == []
-    assert remarks("exudyn", MEASURED | {"horizon": 20.0}, 20.0) == []
+    assert make_remarks("exudyn", MEASURED, 20.0) == []
+    assert make_remarks("exudyn", MEASURED | {"horizon": 20.0}, 20.0) == []
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_no_news_is_no_remark() -> None:
     ],
 )
 def test_what_spoils_a_row_is_said(change: dict[str, Any], words: list[str]) -> None:
-    (line,) = remarks("exudyn", MEASURED | change, 20.0)
+    (line,) = make_remarks("exudyn", MEASURED | change, 20.0)
     assert all(word in line for word in words)
     assert f"- {line}" in text(**change)
 
@@ -114,5 +114,5 @@ def test_a_failure_and_the_stability_are_said() -> None:
 )
 def test_a_verdict_is_one_line(value: float | None, holds: bool, line: str) -> None:
     verdict = {"engine": "exudyn", "quantity": "energy_variation", "value": value, "limit": 1e-3, "holds": holds}
-    assert verdict_line(verdict) == line
-    assert summary("A ride", {}, {}, [verdict], -1.0, 1.0).endswith(f"- {line}\n")
+    assert format_verdict(verdict) == line
+    assert make_summary("A ride", {}, {}, [verdict], -1.0, 1.0).endswith(f"- {line}\n")

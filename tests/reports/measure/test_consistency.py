@@ -19,9 +19,9 @@ from velodrome.reports.measure.consistency import (
     ROOM,
     Mismatch,
     _integrals,
-    describe,
-    follow,
-    mismatches,
+    describe_mismatch,
+    evaluate_ride,
+    find_mismatches,
 )
 from velodrome.reports.measure.limits import START_ERROR
 from velodrome.reports.measure.steady import steady_trajectory
@@ -30,12 +30,12 @@ BICYCLE, BOWL = Bicycle(), Paraboloid(0.005)
 _, MOTION = find_motion(BICYCLE, BOWL, 18.0, 2)
 RADIUS = float(np.hypot(*MOTION.position[:2]))
 TIMES = np.arange(201) / 100
-EXACT = follow(steady_trajectory(BICYCLE, MOTION, TIMES), BICYCLE, BOWL)
+EXACT = evaluate_ride(steady_trajectory(BICYCLE, MOTION, TIMES), BICYCLE, BOWL)
 
 
 def found(ride: Trajectory, exact: Trajectory | None = EXACT, noise: float = 0.0) -> dict[str, Mismatch]:
-    followed = follow(ride, BICYCLE, BOWL)
-    return {mismatch.quantity: mismatch for mismatch in mismatches(ride, followed, exact, RADIUS, noise)}
+    followed = evaluate_ride(ride, BICYCLE, BOWL)
+    return {mismatch.quantity: mismatch for mismatch in find_mismatches(ride, followed, exact, RADIUS, noise)}
 
 
 def test_what_follows_is_what_the_kinematics_and_the_contact_equations_say() -> None:
@@ -51,7 +51,7 @@ def test_what_follows_is_what_the_kinematics_and_the_contact_equations_say() -> 
 def test_a_wheel_without_a_contact_point_has_none_in_that_sample_only() -> None:
     q = EXACT.q.copy()
     q[7, LEAN] = np.nan
-    followed = follow(replace(EXACT, q=q), BICYCLE, BOWL)
+    followed = evaluate_ride(replace(EXACT, q=q), BICYCLE, BOWL)
     for values, exact in ((followed.gap, EXACT.gap), (followed.slip, EXACT.slip)):
         assert values is not None
         assert exact is not None
@@ -96,7 +96,7 @@ def test_a_report_is_named_with_its_part_its_time_and_its_limit() -> None:
     words = (
         "its position of the front wheel is 0.002 m from what follows from its coordinates at 0.3 s, limit 2.6e-10 m"
     )
-    assert describe(mismatch.as_json()) == words
+    assert describe_mismatch(mismatch.as_json()) == words
 
 
 def test_no_claim_of_noise_makes_more_room_than_there_is() -> None:
@@ -108,7 +108,7 @@ def test_an_error_of_the_coordinates_makes_room_from_then_on_and_not_before() ->
     error = 1e-4
     q, late = EXACT.q.copy(), TIMES[:, None] > 0.5
     q[:, :2] += late * error * RADIUS
-    wrong = follow(replace(EXACT, q=q), BICYCLE, BOWL)
+    wrong = evaluate_ride(replace(EXACT, q=q), BICYCLE, BOWL)
     within = 0.9 * ROOM * error * RADIUS
     for when, allowed in ((late, True), (~late, False)):
         ride = replace(wrong, body_position=wrong.body_position + when[..., None] * [0, 0, within])
@@ -143,7 +143,7 @@ def test_one_error_of_coordinates_and_rates_is_no_contradiction() -> None:
     q, qd = EXACT.q.copy(), EXACT.qd.copy()
     q[:, LEAN] += 1e-3 * np.sin(5 * TIMES)
     qd[:, LEAN] += 5e-3 * np.cos(5 * TIMES)
-    assert all(mismatch.holds for mismatch in found(follow(replace(EXACT, q=q, qd=qd), BICYCLE, BOWL)).values())
+    assert all(mismatch.holds for mismatch in found(evaluate_ride(replace(EXACT, q=q, qd=qd), BICYCLE, BOWL)).values())
 
 
 def test_without_a_reference_the_start_is_judged_and_the_reference_all_along() -> None:

@@ -12,8 +12,8 @@ from velodrome.reference.families import find_motion
 from velodrome.reference.kinematics import YAW
 from velodrome.reference.stability import independent, linearise
 from velodrome.reference.surface import Paraboloid, Plane, SurfaceOfRevolution
-from velodrome.reports.drawing.plots import Ride, mode_plots
-from velodrome.reports.measure.modes import Modes, modes_of
+from velodrome.reports.drawing.plots import RideData, mode_plots
+from velodrome.reports.measure.modes import Modes, find_modes
 
 BICYCLE = Bicycle()
 BOWL = Paraboloid(0.005)
@@ -55,7 +55,7 @@ def ride(
 def test_small_disturbances_follow_the_linear_law(
     surface: SurfaceOfRevolution, motion: tuple[np.ndarray, np.ndarray]
 ) -> None:
-    modes = modes_of(BICYCLE, surface, *motion)
+    modes = find_modes(BICYCLE, surface, *motion)
     rides = [ride(surface, motion, size=size) for size in (SMALL, SMALL / 2)]
     for mode in modes.modes:
         found = [modes.amplitude(mode, run) for run in rides]
@@ -68,7 +68,7 @@ def test_small_disturbances_follow_the_linear_law(
 
 
 def test_amplitudes_add_up_to_the_deviation() -> None:
-    modes = modes_of(BICYCLE, BOWL, *Q2)
+    modes = find_modes(BICYCLE, BOWL, *Q2)
     jacobian = linearise(BICYCLE, BOWL, *Q2).jacobian
     rng = np.random.default_rng(1)
     deviation = 1e-3 * rng.standard_normal(7)
@@ -86,7 +86,7 @@ def test_amplitudes_add_up_to_the_deviation() -> None:
 
 
 def test_the_published_modes_have_their_names() -> None:
-    found = {mode.name: mode.eigenvalue for mode in modes_of(BICYCLE, BOWL, *Q2).modes}
+    found = {mode.name: mode.eigenvalue for mode in find_modes(BICYCLE, BOWL, *Q2).modes}
     assert found == {
         "castering": pytest.approx(-12.28445, abs=5e-6),
         "capsize": pytest.approx(-0.42773, abs=5e-6),
@@ -94,12 +94,12 @@ def test_the_published_modes_have_their_names() -> None:
         "orbital": pytest.approx(-0.01111 + 2.35022j, abs=1e-5),
         "family": 0,
     }
-    titles = [mode.title for mode in modes_of(BICYCLE, BOWL, *Q2).modes]
+    titles = [mode.title for mode in find_modes(BICYCLE, BOWL, *Q2).modes]
     assert titles[2:4] == ["weave −0.141 ± 6.71i 1/s", "orbital −0.0111 ± 2.35i 1/s"]
 
 
 def test_a_circle_may_lie_anywhere_on_the_plane() -> None:
-    modes, run = modes_of(BICYCLE, Plane(), *PLANE), ride(Plane(), PLANE, duration=0.5)
+    modes, run = find_modes(BICYCLE, Plane(), *PLANE), ride(Plane(), PLANE, duration=0.5)
     assert [mode.name for mode in modes.modes] == ["castering", "capsize", "weave", "family"]
     moved = run.q.copy()
     moved[:, :2] += (3.0, -2.0)
@@ -109,7 +109,7 @@ def test_a_circle_may_lie_anywhere_on_the_plane() -> None:
 
 
 def test_an_upright_ride_has_the_modes_of_the_benchmark() -> None:
-    found = {mode.name: mode for mode in modes_of(BICYCLE, Plane(), *UPRIGHT).modes}
+    found = {mode.name: mode for mode in find_modes(BICYCLE, Plane(), *UPRIGHT).modes}
     assert set(found) == {"castering", "capsize", "weave", "family"}
     assert found["weave"].eigenvalue == pytest.approx(-0.37797 + 3.87284j, abs=1e-5)
     assert UPRIGHT[1][YAW] == 0
@@ -118,13 +118,13 @@ def test_an_upright_ride_has_the_modes_of_the_benchmark() -> None:
 def test_modes_without_plain_names_keep_their_eigenvalues_only() -> None:
     # P4 has four real modes: no pair is the weave.
     motion = find_motion(BICYCLE, Paraboloid(0.2), 4.0, 4)[1].state()
-    names = [mode.name for mode in modes_of(BICYCLE, Paraboloid(0.2), *motion).modes]
+    names = [mode.name for mode in find_modes(BICYCLE, Paraboloid(0.2), *motion).modes]
     assert sorted(names) == ["family", "pair", "real", "real", "real", "real"]
 
 
 def test_plots_say_name_and_unit_and_draw_the_law() -> None:
-    modes, run = modes_of(BICYCLE, BOWL, *Q2), ride(BOWL, Q2)
-    shown = Ride(BOWL, {"reference": run}, modes=modes)
+    modes, run = find_modes(BICYCLE, BOWL, *Q2), ride(BOWL, Q2)
+    shown = RideData(BOWL, {"reference": run}, modes=modes)
     plots = mode_plots(modes)
     assert plots[2].title == "weave −0.141 ± 6.71i 1/s: log10 angle [rad]"
     assert plots[4].title == "family 0 1/s: log10 rear rate [rad/s]"
@@ -133,7 +133,7 @@ def test_plots_say_name_and_unit_and_draw_the_law() -> None:
     slope = np.polyfit(law[0], law[1], 1)[0]
     assert slope == pytest.approx(modes.modes[2].eigenvalue.real / np.log(10), rel=1e-9)
     # A start on the motion itself excites nothing that a law could be drawn of.
-    still = Ride(BOWL, {"reference": _still(run, modes)}, modes=modes)
+    still = RideData(BOWL, {"reference": _still(run, modes)}, modes=modes)
     assert [plot.expected(still) for plot in plots] == [None] * 5
 
 

@@ -14,7 +14,7 @@ from velodrome.reference.families import find_motion
 from velodrome.reference.stability import Linearisation, free_eigenvalues, independent, linearise
 from velodrome.reference.surface import Paraboloid, Plane
 from velodrome.reports.measure.identify import identify
-from velodrome.reports.measure.precision import match
+from velodrome.reports.measure.precision import eigenvalue_pairs
 
 BICYCLE = Bicycle()
 # alpha, rear rate, family, and the angles where the family has several motions
@@ -44,7 +44,7 @@ def motion(name: str) -> tuple[Problem, Linearisation]:
 def error(name: str, engine: str, settings: Settings, levels: int = 3) -> tuple[float, Any]:
     problem, exact = motion(name)
     found = identify(load_engine(engine), settings, problem, levels=levels)
-    return float(np.abs(match(exact.eigenvalues, found.eigenvalues) - exact.eigenvalues).max()), found
+    return float(np.abs(eigenvalue_pairs(exact.eigenvalues, found.eigenvalues) - exact.eigenvalues).max()), found
 
 
 @pytest.mark.parametrize("name", MOTIONS)

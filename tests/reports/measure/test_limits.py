@@ -16,7 +16,7 @@ from velodrome.reference.kinematics import REAR_ANGLE
 from velodrome.reference.stability import linearise
 from velodrome.reference.surface import Paraboloid
 from velodrome.reports.measure.limits import Scale, eigenvalue_limits, noise, order_limit, ride_limits, step_force
-from velodrome.reports.measure.metrics import metrics
+from velodrome.reports.measure.metrics import compute_metrics
 from velodrome.reports.measure.steady import steady_trajectory
 from velodrome.scenarios.gate.verdict import RIDE_QUANTITIES
 
@@ -77,7 +77,7 @@ def test_a_bounded_disturbance_tilts_a_line_by_no_more_than_the_limit_says(distu
     # ride_limits() lets a slope move by 3 b / T where the samples move by b.
     qd = EXACT.qd.copy()
     qd[:, REAR_ANGLE] += disturbance
-    measured = metrics(replace(EXACT, qd=qd), EXACT, BICYCLE, BOWL, -1.0, 1.0, circular=True)
+    measured = compute_metrics(replace(EXACT, qd=qd), EXACT, BICYCLE, BOWL, -1.0, 1.0, circular=True)
     scale = replace(SCALE, rear_rate=float(np.abs(disturbance).max()), duration=float(EXACT.time[-1]))
     round_off = 18 * 2.0**-50  # of rates of size 18
     assert abs(measured["rear_rate_drift_rate"]) <= ride_limits(scale, 1.0)["rear_rate_drift_rate"] + round_off

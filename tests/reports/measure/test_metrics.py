@@ -17,9 +17,15 @@ from velodrome.reference.contact import observe
 from velodrome.reference.families import find_motion
 from velodrome.reference.kinematics import LEAN, REAR_ANGLE, YAW
 from velodrome.reference.surface import Paraboloid
-from velodrome.reports.measure.consistency import follow
+from velodrome.reports.measure.consistency import evaluate_ride
 from velodrome.reports.measure.fall import fell_at, until_fall
-from velodrome.reports.measure.metrics import horizon, least_normal_force, metrics, orientation_errors, position_errors
+from velodrome.reports.measure.metrics import (
+    compute_metrics,
+    find_horizon,
+    least_normal_force,
+    orientation_errors,
+    position_errors,
+)
 from velodrome.reports.measure.steady import steady_trajectory
 
 BICYCLE = Bicycle()
@@ -37,7 +43,7 @@ ROUND_OFF = 8 * 2.0**-52 * RADIUS
 def measure(
     trajectory: Trajectory, reference: Trajectory | None = EXACT, growth_rate: float = -1.0, circular: bool = True
 ) -> dict[str, Any]:
-    return metrics(trajectory, reference, BICYCLE, BOWL, growth_rate, RADIUS, circular)
+    return compute_metrics(trajectory, reference, BICYCLE, BOWL, growth_rate, RADIUS, circular)
 
 
 def moved(offset: np.ndarray) -> Trajectory:
@@ -179,7 +185,7 @@ def test_the_rate_error_is_the_largest_of_the_nine_relative_to_the_motions_sizes
 def test_horizon_is_where_the_growing_error_reaches_the_motions_size(exponent: float, rate: float) -> None:
     seed = 10.0**exponent
     growing = moved(np.outer(np.minimum(seed * np.exp(rate * TIMES), 10 * RADIUS), [0.0, 0.0, 1.0]))
-    found = horizon(growing, EXACT, rate, RADIUS)
+    found = find_horizon(growing, EXACT, rate, RADIUS)
     # Round-off makes the smallest error wrong by ROUND_OFF / seed; its logarithm moves the horizon by that / rate.
     assert found == pytest.approx(np.log(RADIUS / seed) / rate, rel=1e-12, abs=2 * ROUND_OFF / seed / rate)
 
@@ -188,16 +194,16 @@ def test_an_error_that_has_grown_large_says_nothing_of_its_seed() -> None:
     seed, rate = 1e-6, 4.0
     error = seed * np.exp(rate * TIMES)
     error[error > 0.05 * RADIUS] *= 0.01  # the law holds for small errors only
-    found = horizon(moved(np.outer(error, [0.0, 0.0, 1.0])), EXACT, rate, RADIUS)
+    found = find_horizon(moved(np.outer(error, [0.0, 0.0, 1.0])), EXACT, rate, RADIUS)
     assert found == pytest.approx(np.log(RADIUS / seed) / rate, rel=1e-12, abs=2 * ROUND_OFF / seed / rate)
 
 
 def test_an_error_that_outruns_the_law_ends_the_horizon() -> None:
     error = 1e-6 * np.exp(0.1 * TIMES)
     error[TIMES >= 1.0] = 2 * RADIUS  # a fall, say
-    assert horizon(moved(np.outer(error, [0.0, 0.0, 1.0])), EXACT, 0.1, RADIUS) == 1.0
+    assert find_horizon(moved(np.outer(error, [0.0, 0.0, 1.0])), EXACT, 0.1, RADIUS) == 1.0
     everywhere = moved(np.full((len(TIMES), 3), RADIUS))
-    assert horizon(everywhere, EXACT, 0.1, RADIUS) == 0.0
+    assert find_horizon(everywhere, EXACT, 0.1, RADIUS) == 0.0
 
 
 def test_least_normal_force_sees_a_ground_that_pulls() -> None:
@@ -214,7 +220,7 @@ def test_least_normal_force_sees_a_ground_that_pulls() -> None:
 
 @pytest.mark.parametrize("rate", [0.0, -0.4])
 def test_a_motion_that_amplifies_nothing_has_no_horizon(rate: float) -> None:
-    assert horizon(moved(np.array([1e-3, 0, 0])), EXACT, rate, RADIUS) is None
+    assert find_horizon(moved(np.array([1e-3, 0, 0])), EXACT, rate, RADIUS) is None
 
 
 def test_a_bicycle_falls_when_its_frame_is_down() -> None:
@@ -225,7 +231,7 @@ def test_a_bicycle_falls_when_its_frame_is_down() -> None:
     sinking = TIMES > 1.5
     # At 1 m/s, through a tenth of 0.9 m between two samples.
     q[sinking, 2] = (rest + ground + 0.09 + 1.9963 - TIMES)[sinking]
-    falling = follow(replace(EXACT, q=q), BICYCLE, BOWL)
+    falling = evaluate_ride(replace(EXACT, q=q), BICYCLE, BOWL)
     assert fell_at(falling, BICYCLE, BOWL) == pytest.approx(1.9963, abs=1e-14)
     assert until_fall(falling, BICYCLE, BOWL).time[-1] == TIMES[199] == 1.99
     assert until_fall(falling, BICYCLE, BOWL, beyond=1).time[-1] == TIMES[200]
@@ -235,7 +241,7 @@ def test_a_bicycle_falls_when_its_frame_is_down() -> None:
     assert measure(after)["fell_at"] == fell_at(falling, BICYCLE, BOWL)
     for height, fall in ((0.089, 0.0), (0.091, None)):
         q[:, 2] = rest + ground + height
-        assert fell_at(follow(replace(EXACT, q=q), BICYCLE, BOWL), BICYCLE, BOWL) == fall
+        assert fell_at(evaluate_ride(replace(EXACT, q=q), BICYCLE, BOWL), BICYCLE, BOWL) == fall
 
 
 def shorter(count: int) -> Trajectory:

@@ -23,15 +23,21 @@ from velodrome.engines.engine import REFERENCE, Trajectory
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.height_field import HeightField
 from velodrome.reference.surface import Paraboloid
-from velodrome.reports.drawing.palette import PALETTE, colours
+from velodrome.reports.drawing.palette import PALETTE, assign_colours
 from velodrome.reports.drawing.plots import PLOTS
-from velodrome.reports.drawing.summary import COLUMNS, cell, verdict_line
-from velodrome.reports.measure.metrics import metrics
-from velodrome.reports.page import page
-from velodrome.reports.page.curves import GROUPS, curve, kept
-from velodrome.reports.page.ink import CONTRAST, DASHES, css, dashes, luminance, on_paper
-from velodrome.reports.page.trust import MEANINGS, trust
-from velodrome.reports.page.words import bicycle, disturbance, ground, motion, setting
+from velodrome.reports.drawing.summary import COLUMNS, format_cell, format_verdict
+from velodrome.reports.measure.metrics import compute_metrics
+from velodrome.reports.page import make_page
+from velodrome.reports.page.curves import GROUPS, choose_samples, make_curve
+from velodrome.reports.page.ink import CONTRAST, DASHES, line_dashes, luminance, make_css, paper_colour
+from velodrome.reports.page.trust import COLUMN_MEANINGS, explain_columns
+from velodrome.reports.page.words import (
+    describe_bicycle,
+    describe_disturbance,
+    describe_ground,
+    describe_motion,
+    describe_setting,
+)
 
 BOWL = Paraboloid(0.005)
 HOSTILE = "<script>alert(1)</script>"
@@ -84,7 +90,7 @@ RUNS = {
 def measured(runs: dict[str, Trajectory]) -> dict[str, dict[str, Any]]:
     reference = runs.get(REFERENCE)
     where = (Bicycle(), BOWL, GROWTH, 2.4, True)
-    return {name: metrics(run, None if run is reference else reference, *where) for name, run in runs.items()}
+    return {name: compute_metrics(run, None if run is reference else reference, *where) for name, run in runs.items()}
 
 
 def made(runs: dict[str, Trajectory] | None = None, verdicts: Any = (), **changes: Any) -> str:
@@ -116,7 +122,7 @@ def made(runs: dict[str, Trajectory] | None = None, verdicts: Any = (), **change
         "simulation": {"duration": 3.0, "output_rate": 100.0},
     } | changes.pop("tables", {})
     surface = changes.pop("surface", BOWL)
-    return page(manifest | changes, scenario, measured(runs), verdicts, runs, surface)
+    return make_page(manifest | changes, scenario, measured(runs), verdicts, runs, surface)
 
 
 class Parsed(HTMLParser):
@@ -164,11 +170,11 @@ def test_the_table_has_the_summarys_figures(parsed: Parsed):
     values = measured(RUNS)
     cells = [found for _, found in parsed.all("td")]
     for name in RUNS:
-        row = [cell(values[name], metric, part) for _, _, metric, part in COLUMNS]
+        row = [format_cell(values[name], metric, part) for _, _, metric, part in COLUMNS]
         assert any(cells[k : k + len(row)] == row for k in range(len(cells))), name
     heads = [found for _, found in parsed.all("th")]
     assert {title for title, *_ in COLUMNS} <= set(heads)
-    assert {metric for _, _, metric, _ in COLUMNS} == set(MEANINGS)
+    assert {metric for _, _, metric, _ in COLUMNS} == set(COLUMN_MEANINGS)
 
 
 def test_input_is_text_and_never_markup():
@@ -235,8 +241,8 @@ def test_what_went_wrong_is_said():
         )
     )
     said = [found for _, found in parsed.all("li")]
-    assert f"✗ {verdict_line(verdicts[0])}" in said
-    assert f"✓ {verdict_line(verdicts[1])}" in said
+    assert f"✗ {format_verdict(verdicts[0])}" in said
+    assert f"✓ {format_verdict(verdicts[1])}" in said
     assert "✗ broken did not run: no luck" in said
     assert "– flat left out: rolls on a plane only" in said
     assert any("interrupted" in found for _, found in parsed.all("dd"))
@@ -296,7 +302,7 @@ def test_the_horizon_is_marked_on_the_error(parsed: Parsed):
 )
 def test_no_extreme_is_lost(values: np.ndarray, most: int):
     values = values.astype(float)
-    chosen = kept(values, most)
+    chosen = choose_samples(values, most)
     finite = np.flatnonzero(np.isfinite(values))
     assert len(chosen) <= most
     assert np.all(np.diff(chosen) > 0)
@@ -309,7 +315,7 @@ def test_no_extreme_is_lost(values: np.ndarray, most: int):
 
 def test_a_gap_in_a_curve_stays_a_gap():
     values = np.array([1.0, 2.0, np.nan, np.nan, 3.0, 4.0])
-    assert curve(np.arange(6.0), values, 10) == {"t": [0, 1, 4, 4, 5], "v": [1, 2, None, 3, 4]}
+    assert make_curve(np.arange(6.0), values, 10) == {"t": [0, 1, 4, 4, 5], "v": [1, 2, None, 3, 4]}
 
 
 def test_the_page_stays_under_two_megabytes():
@@ -323,25 +329,25 @@ def test_the_page_stays_under_two_megabytes():
 
 def test_engines_are_told_apart_on_paper():
     names = [REFERENCE, *"abcdefgh"]
-    for name, colour in colours(names).items():
-        assert 1.05 / (luminance(on_paper(name, colour)) + 0.05) >= CONTRAST
-    assert len({on_paper("a", colour) for colour in PALETTE}) == len(PALETTE)
+    for name, colour in assign_colours(names).items():
+        assert 1.05 / (luminance(paper_colour(name, colour)) + 0.05) >= CONTRAST
+    assert len({paper_colour("a", colour) for colour in PALETTE}) == len(PALETTE)
     assert luminance((255, 255, 255)) == pytest.approx(1.0, abs=1e-12)
-    patterns = dashes(names)
+    patterns = line_dashes(names)
     assert patterns[REFERENCE] == ""
     assert [patterns[name] for name in "abcdefgh"] == list(DASHES)
 
 
 def test_what_ran_is_said_in_words():
-    assert ground({"kind": "plane"}) == "level plane"
-    assert ground({"kind": "sphere", "radius": 20.0}) == "sphere, radius 20.0"
-    assert len(ground({"kind": "height-field", "heights": [[0.0] * 100] * 100})) < 120
-    assert motion({"kind": "upright", "speed": 4.6}) == "straight and upright, 4.6 m/s"
-    assert motion({"kind": "circular", "rear_rate": 18.0}) == "circle with the rear wheel at 18 rad/s"
-    assert disturbance({"x": 0.0, "lean_rate": -0.1}) == "lean rate -0.1 rad/s"
-    assert disturbance({}) == "nothing"
-    assert bicycle({"wheelbase": 1.1}).endswith("with wheelbase 1.1")
-    assert [setting(value) for value in (None, True, 0.001, [0.9, 2.0], "dop853")] == [
+    assert describe_ground({"kind": "plane"}) == "level plane"
+    assert describe_ground({"kind": "sphere", "radius": 20.0}) == "sphere, radius 20.0"
+    assert len(describe_ground({"kind": "height-field", "heights": [[0.0] * 100] * 100})) < 120
+    assert describe_motion({"kind": "upright", "speed": 4.6}) == "straight and upright, 4.6 m/s"
+    assert describe_motion({"kind": "circular", "rear_rate": 18.0}) == "circle with the rear wheel at 18 rad/s"
+    assert describe_disturbance({"x": 0.0, "lean_rate": -0.1}) == "lean rate -0.1 rad/s"
+    assert describe_disturbance({}) == "nothing"
+    assert describe_bicycle({"wheelbase": 1.1}).endswith("with wheelbase 1.1")
+    assert [describe_setting(value) for value in (None, True, 0.001, [0.9, 2.0], "dop853")] == [
         *("not set", "true", "0.001", "0.9, 2.0", "dop853")
     ]
 
@@ -357,7 +363,7 @@ def test_what_ran_is_said_in_words():
     ],
 )
 def test_trust_follows_from_the_metrics(growth: float, horizon: float | None, error: Any, says: str):
-    assert says in trust("one", {"horizon": horizon, "position_error": error}, growth, 20.0)
+    assert says in explain_columns("one", {"horizon": horizon, "position_error": error}, growth, 20.0)
 
 
 @pytest.mark.parametrize(
@@ -376,15 +382,15 @@ def test_trust_goes_no_further_than_the_ride(
     growth: float, horizon: float | None, changes: dict[str, Any], end: float | None, says: str
 ):
     values = {"horizon": horizon, "position_error": {"max": 1.0}, "fell_at": None, "ended": None} | changes
-    assert says in trust("one", values, growth, 20.0, end)
+    assert says in explain_columns("one", values, growth, 20.0, end)
 
 
 def test_bounds_of_the_reference_are_rounded_up():
     values = {"energy_drift": 5.01e-13, "max_gap": 1.3004e-14, "max_slip": 9.91e-12}
-    said = trust(REFERENCE, values, 0.4, 20.0)
+    said = explain_columns(REFERENCE, values, 0.4, 20.0)
     for words in ("at most 5.1e-13 of itself", "within 1.4e-14 m", "within 1e-11 m/s"):
         assert words in said
-    said = trust(REFERENCE, {"energy_drift": 0.0, "max_gap": 1.3e-14, "max_slip": None}, 0.4, 20.0)
+    said = explain_columns(REFERENCE, {"energy_drift": 0.0, "max_gap": 1.3e-14, "max_slip": None}, 0.4, 20.0)
     assert "at most 0 of itself, its gaps stay within 1.3e-14 m." in said
 
 
@@ -419,8 +425,8 @@ def pixels(path: Path) -> dict[str, int]:
 @needs_browser
 @pytest.mark.parametrize("dark", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["light", "dark"])
 def test_an_engine_that_is_switched_off_is_not_seen(address: str, dark: bool, tmp_path: Path):
-    paint = colours(RUNS)
-    ink = {name: css(paint[name] if dark else on_paper(name, paint[name])) for name in RUNS}
+    paint = assign_colours(RUNS)
+    ink = {name: make_css(paint[name] if dark else paper_colour(name, paint[name])) for name in RUNS}
     size = (1280, 7000 if dark else 3600)  # the tables, the toolbar, the ride from above and some curves; or all
     assert headless.picture(address, tmp_path / "all.png", dark, size) == []
     everything = pixels(tmp_path / "all.png")

@@ -20,8 +20,8 @@ from velodrome.reference.families import find_motion
 from velodrome.reference.kinematics import LEAN, STEER, WHEELS, YAW, body_positions, quaternions, rotations
 from velodrome.reference.surface import Paraboloid, Plane, evaluate
 from velodrome.reports.drawing import bicycle_shape, ground
-from velodrome.reports.drawing.palette import PALETTE, REFERENCE_COLOUR, colours
-from velodrome.reports.drawing.plots import CHANGE, ERROR, FORCES, PLOTS, SMALLEST_SIZE, log_size, nanoseconds
+from velodrome.reports.drawing.palette import PALETTE, REFERENCE_COLOUR, assign_colours
+from velodrome.reports.drawing.plots import CHANGE, ERROR, FORCES, PLOTS, SMALLEST_SIZE, log_size, to_nanoseconds
 from velodrome.reports.recording import rerun_file as recording
 from velodrome.reports.recording.rerun_file import write_recording
 
@@ -152,7 +152,7 @@ def test_times_round_to_the_nearest_nanosecond() -> None:
     milliseconds = np.arange(20001)
     # Many of these lie just below the whole nanosecond as floats: cutting off would lose one.
     assert ((milliseconds * 1e-3 * 1e9).astype(np.int64) != milliseconds * 1_000_000).any()
-    np.testing.assert_array_equal(nanoseconds(milliseconds * 1e-3), milliseconds * 1_000_000)
+    np.testing.assert_array_equal(to_nanoseconds(milliseconds * 1e-3), milliseconds * 1_000_000)
 
 
 def test_bodies_stand_where_the_engine_put_them(content: Content, runs: dict[str, Trajectory]) -> None:
@@ -321,7 +321,7 @@ def test_shape_touches_the_ground_where_the_wheels_do() -> None:
 
 def test_long_straight_ride_gets_a_strip_along_it() -> None:
     path = np.outer(np.linspace(0, 160, 500), [np.cos(0.3), np.sin(0.3)])
-    shown = ground.ground_of_ride(Plane(), path)
+    shown = ground.make_ground(Plane(), path)
     assert not shown.disc
     assert shown.radius == pytest.approx(ground.STRIP_MARGIN)
     along = shown.vertices[:, :2] @ [np.cos(0.3), np.sin(0.3)]
@@ -330,17 +330,17 @@ def test_long_straight_ride_gets_a_strip_along_it() -> None:
 
 
 def test_a_standing_bicycle_has_ground_too() -> None:
-    shown = ground.ground_of_ride(Plane(), np.zeros((1, 2)))
+    shown = ground.make_ground(Plane(), np.zeros((1, 2)))
     assert shown.radius == pytest.approx(ground.STRIP_MARGIN)
     assert np.isfinite(shown.vertices).all()
 
 
 def test_engine_colours_last() -> None:
     names = [REFERENCE, "first", "second", "third"]
-    assert colours(names)[REFERENCE] == REFERENCE_COLOUR
-    assert len(set(colours(names).values())) == len(names)
-    assert colours(["second"])["second"] == colours(["second", REFERENCE])["second"]
-    many = colours([f"engine {k}" for k in range(2 * len(PALETTE))])
+    assert assign_colours(names)[REFERENCE] == REFERENCE_COLOUR
+    assert len(set(assign_colours(names).values())) == len(names)
+    assert assign_colours(["second"])["second"] == assign_colours(["second", REFERENCE])["second"]
+    many = assign_colours([f"engine {k}" for k in range(2 * len(PALETTE))])
     assert set(many.values()) == set(PALETTE)
 
 
@@ -357,7 +357,7 @@ def test_picture_shows_every_engine(rrd: Path, runs: dict[str, Trajectory]) -> N
         seen = viewer.pixels(client, 1.5)
         assert viewer.complaints(client) == []
     scene, plots = seen[:, :SCENE], seen[:, 1160:]
-    for name, colour in colours(runs).items():
+    for name, colour in assign_colours(runs).items():
         # Curves are drawn unlit in the very colour; tubes are shaded, so the ride shows darker tones of it.
         assert (np.abs(plots - colour).max(-1) < 24).sum() > 100, name
         assert alike(scene, colour).sum() > 400, name
@@ -402,7 +402,7 @@ def test_every_engine_of_a_real_run_can_be_seen_and_switched_off(real: tuple[Pat
             changed[:, SCENE:] = False
             # The ground's grey has the reference's hue, but is darker.
             least = 1.2 * float(np.linalg.norm(recording.GROUND_HIGH)) if name == REFERENCE else 120.0
-            mine = [alike(window[changed], colours(names)[name], least).sum() for window in (shown, hidden)]
+            mine = [alike(window[changed], assign_colours(names)[name], least).sum() for window in (shown, hidden)]
             assert mine[0] > 2000, name
             assert mine[1] < 0.01 * mine[0], name
         viewer.open_tabs(client, ["Overview (arrows: contact force, 1 m = 500 N)", "Modes"])

@@ -22,8 +22,8 @@ from velodrome.engines.engine import Engine, EngineError, Settings, Trajectory, 
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.families import find_motion
 from velodrome.reference.surface import Paraboloid
-from velodrome.scenarios.gate import checks as gate
-from velodrome.scenarios.gate.verdict import Verdict, missing
+from velodrome.scenarios import gate
+from velodrome.scenarios.gate.verdict import Verdict, missing_verdict
 from velodrome.scenarios.run import runner
 from velodrome.scenarios.scenario.schema import library_names
 
@@ -159,8 +159,8 @@ def breaking(after: Callable[[Trajectory], Trajectory], monkeypatch: pytest.Monk
         engine, settings = original(name, values)
         return (Altered(engine, after=after) if name == "mujoco-native" else engine), settings
 
-    original = runner.configure
-    monkeypatch.setattr(runner, "configure", configure)
+    original = runner.configure_engine
+    monkeypatch.setattr(runner, "configure_engine", configure)
 
 
 def test_an_engine_that_breaks_is_status_1(velodrome, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -254,7 +254,7 @@ def test_no_arguments_show_the_commands(velodrome) -> None:
 
 def judged(monkeypatch: pytest.MonkeyPatch, *verdicts: Verdict) -> None:
     """Make the gate come to these verdicts."""
-    monkeypatch.setattr(gate, "check", lambda *_: ([("q2", verdict) for verdict in verdicts], {"q2": {}}))
+    monkeypatch.setattr(gate, "check_gate", lambda *_: ([("q2", verdict) for verdict in verdicts], {"q2": {}}))
 
 
 WORSE = Verdict("exudyn", "short_error", 2e-5, 1e-5, 1e-7, "worse", "1e-05 -> 2e-05")
@@ -280,7 +280,7 @@ def test_check_is_status_1_when_a_verdict_fails(
 
 
 def test_update_writes_no_baseline_of_an_engine_that_did_not_run(velodrome, monkeypatch: pytest.MonkeyPatch) -> None:
-    judged(monkeypatch, missing("exudyn", "did not run: no licence"))
+    judged(monkeypatch, missing_verdict("exudyn", "did not run: no licence"))
     monkeypatch.setattr(gate, "update_baselines", lambda *_: pytest.fail("written"))
     result = velodrome("check", "--update")
     assert (result.status, result.stdout) == (2, "")
@@ -309,7 +309,7 @@ def test_check_writes_its_verdicts_for_a_ci_service(velodrome, monkeypatch: pyte
 def test_check_refuses_a_file_without_a_folder_before_its_work(
     velodrome, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, option: str
 ) -> None:
-    monkeypatch.setattr(gate, "check", lambda *_: pytest.fail("the gate ran"))
+    monkeypatch.setattr(gate, "check_gate", lambda *_: pytest.fail("the gate ran"))
     for path, words in (("absent/x.xml", "there is no folder absent"), (str(tmp_path), "it is a folder; name a file")):
         result = velodrome("check", option, path)
         assert (result.status, result.stderr) == (2, f"velodrome: {option} {path}: {words}\n")
@@ -424,7 +424,7 @@ def test_families_refuses_a_shape_that_is_none(velodrome, tmp_path: Path) -> Non
 )
 def test_a_command_imports_only_what_it_needs(arguments: list[str], unwanted: tuple[str, ...]) -> None:
     """What a command waits for before it starts: counted in imports, since a machine's seconds vary."""
-    script = f"import sys\nfrom scenarios import cli\nsys.argv[1:] = {arguments!r}\ntry:\n    cli.main()\nfinally:\n"
+    script = f"import sys\nfrom velodrome.scenarios import cli\nsys.argv[1:] = {arguments!r}\ntry:\n    cli.main()\nfinally:\n"
     script += f"    print([name for name in {unwanted!r} if name in sys.modules], file=sys.stderr)"
     result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert result.stderr.strip() == "[]"

@@ -18,7 +18,7 @@ from velodrome.scenarios.commands import options
 from velodrome.scenarios.gate import checks as gate
 from velodrome.scenarios.gate.verdict import CHANGES, Verdict
 from velodrome.scenarios.run import runner
-from velodrome.scenarios.run.runner import configure
+from velodrome.scenarios.run.runner import configure_engine
 
 DEEDS = {
     "sys.exit(0)": "it called sys.exit(0)",
@@ -249,7 +249,7 @@ def test_a_reader_who_has_gone_does_not_change_the_status(show: str, tmp_path: P
 
 def test_an_exit_from_nowhere_is_no_success(velodrome, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(options, "print_json", lambda _: None)
-    monkeypatch.setattr(gate, "check", lambda *_: sys.exit(0))
+    monkeypatch.setattr(gate, "check_gate", lambda *_: sys.exit(0))
     result = velodrome("check", "--json")
     assert (result.status, result.stdout) == (1, "")
     assert result.stderr == "velodrome: something called sys.exit(0) before the command was done\n"
@@ -265,8 +265,8 @@ def test_bad_input_leaves_no_file_of_verdicts(velodrome, tmp_path: Path) -> None
     "left", [[], [Verdict("reference", CHANGES, None, None, None, "holds", "since the baseline")]], ids=["none", "told"]
 )
 def test_an_engine_of_which_nothing_was_judged_fails(left: list[Verdict], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gate, "judge", lambda *_: left)
-    verdicts, _ = gate.check(lambda *_: None, ["plane-circle"], ["reference"])
+    monkeypatch.setattr(gate, "judge_sample", lambda *_: left)
+    verdicts, _ = gate.check_gate(lambda *_: None, ["plane-circle"], ["reference"])
     _, last = verdicts[-1]
     assert (last.engine, last.status) == ("reference", "missing")
     assert last.reason == "did not run: none of its quantities was judged"
@@ -283,10 +283,10 @@ def test_a_ctrl_c_that_an_engine_swallows_still_ends_the_run(
         raise AssertionError
 
     def swallowing(name: str, values: Any) -> tuple[Engine, Settings]:
-        engine, settings = configure(name, values)
+        engine, settings = configure_engine(name, values)
         return Altered(engine, after=swallow), settings
 
-    monkeypatch.setattr(runner, "configure", swallowing)
+    monkeypatch.setattr(runner, "configure_engine", swallowing)
     result = velodrome("run", "q2", "plane-circle", "--engine", "reference", "--duration", "0.1", "--out", "runs")
     assert result.status == 130
     assert len(list((tmp_path / "runs").iterdir())) == 1

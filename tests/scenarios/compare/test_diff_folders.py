@@ -18,9 +18,9 @@ from rich.console import Console
 
 from velodrome.engines.storage import read_trajectory, write_trajectory
 from velodrome.scenarios.commands.present_diff import show_diff
-from velodrome.scenarios.compare.folders import diff, read_pair, write_diff
+from velodrome.scenarios.compare.folders import diff_runs, read_pair, write_diff
 from velodrome.scenarios.error import ScenarioError
-from velodrome.scenarios.run.runner import plan_run, run
+from velodrome.scenarios.run.runner import plan_run, run_plan
 from velodrome.scenarios.scenario.schema import load_scenario
 
 NATIVE = "mujoco-native"
@@ -30,7 +30,7 @@ def ride(out: Path, changes: dict[str, Any] | None = None) -> Path:
     """A folder of half a second in the reference and MuJoCo."""
     settings = {"simulation.duration": 0.5, "simulation.output_rate": 50.0} | (changes or {})
     plan = plan_run(*load_scenario("q2-plus", settings), wanted=[NATIVE])
-    return run(plan, out, lambda *_: None, lambda _: None).folder
+    return run_plan(plan, out, lambda *_: None, lambda _: None).folder
 
 
 @pytest.fixture(scope="module")
@@ -56,14 +56,14 @@ def shown(document: dict[str, Any], width: int = 100) -> str:
 
 
 def test_a_repeated_run_is_the_same_to_the_bit(folder: Path, tmp_path: Path) -> None:
-    found = diff(read_pair(folder, ride(tmp_path)))
+    found = diff_runs(read_pair(folder, ride(tmp_path)))
     assert found["same"]
     assert {entry["verdict"] for entry in found["engines"].values()} == {"same to the bit"}
     assert "the engines in both runs are the same within round-off" in shown(found)
 
 
 def test_a_changed_setting_differs_and_is_named(folder: Path, halved: Path) -> None:
-    found = diff(read_pair(folder, halved))
+    found = diff_runs(read_pair(folder, halved))
     assert (found["same"], found["engines"]["reference"]["verdict"]) == (False, "same to the bit")
     entry = found["engines"][NATIVE]
     assert (entry["verdict"], entry["settings"]) == ("differs", {"step": [0.002, 0.001]})
@@ -78,7 +78,7 @@ def test_a_changed_setting_differs_and_is_named(folder: Path, halved: Path) -> N
 
 
 def test_the_table_tears_no_verdict_at_eighty_columns(folder: Path, halved: Path) -> None:
-    found = diff(read_pair(folder, halved))
+    found = diff_runs(read_pair(folder, halved))
     found["engines"]["reference"]["verdict"] = "same within round-off"
     long = found["engines"].pop(NATIVE)
     # As long as the longest name of the suite's own engines, which must not fold, and as long as a name may be.
@@ -92,7 +92,7 @@ def test_the_table_tears_no_verdict_at_eighty_columns(folder: Path, halved: Path
 
 def test_document_page_and_recording_are_written(folder: Path, halved: Path, tmp_path: Path) -> None:
     pair = read_pair(folder, halved)
-    found = diff(pair)
+    found = diff_runs(pair)
     paths = write_diff(pair, found, tmp_path / "out")
     assert [path.name for path in paths] == ["diff.json", "diff.md", "diff.rrd"]
     assert json.loads(paths[0].read_text()) == found
@@ -109,7 +109,7 @@ def test_document_page_and_recording_are_written(folder: Path, halved: Path, tmp
 
 
 def test_one_engine_beside_the_reference(folder: Path, halved: Path) -> None:
-    assert list(diff(read_pair(folder, halved, [NATIVE]))["engines"]) == ["reference", NATIVE]
+    assert list(diff_runs(read_pair(folder, halved, [NATIVE]))["engines"]) == ["reference", NATIVE]
     with pytest.raises(ScenarioError, match="engine 'exudyn' is not in both runs; there are reference"):
         read_pair(folder, halved, ["exudyn"])
 
@@ -120,7 +120,7 @@ def test_an_engine_that_is_gone_is_held_to_round_off(folder: Path, copy: Path) -
         assert NATIVE in manifest["engines"]
     manifest["engines"][NATIVE]["settings"]["unheard_of"] = 1
     (copy / "manifest.json").write_text(json.dumps(manifest))
-    found = diff(read_pair(folder, copy))
+    found = diff_runs(read_pair(folder, copy))
     assert found["notes"] == [
         f"{NATIVE} is not installed here with such settings; its steps are allowed round-off only"
     ]
@@ -150,7 +150,7 @@ def test_another_start_is_refused(folder: Path, copy: Path) -> None:
     # The root's own error is 1e-11 at the most.
     manifest["start"]["q"][0] += 5e-12
     (copy / "manifest.json").write_text(json.dumps(manifest))
-    assert diff(read_pair(folder, copy))["same"]
+    assert diff_runs(read_pair(folder, copy))["same"]
     manifest["start"]["q"][0] += 1e-9
     (copy / "manifest.json").write_text(json.dumps(manifest))
     with pytest.raises(ScenarioError, match="different starts: coordinates differ by up to 1e-09"):

@@ -17,9 +17,9 @@ from velodrome.reference.families import find_motion
 from velodrome.reference.kinematics import LEAN, REAR_ANGLE, YAW
 from velodrome.reference.surface import Paraboloid
 from velodrome.reports.measure.limits import START_ERROR, Scale
-from velodrome.reports.measure.metrics import metrics
+from velodrome.reports.measure.metrics import compute_metrics
 from velodrome.reports.measure.steady import steady_trajectory
-from velodrome.scenarios.compare.differences import Ground, StoredRun, diff_document, diff_markdown
+from velodrome.scenarios.compare.differences import StoredGround, StoredRun, diff_document, diff_markdown
 
 BICYCLE, BOWL = Bicycle(), Paraboloid(0.005)
 _, MOTION = find_motion(BICYCLE, BOWL, 18.0, 2, (0.74, 2.84))
@@ -77,7 +77,7 @@ def stored(name: str, *rides: Trajectory, failed: tuple[str, ...] = (), **change
         "platform": {"machine": "x86_64"},
     }
     measured = {
-        ride.engine: metrics(ride, EXACT, BICYCLE, BOWL, SCALE.growth_rate, SCALE.radius, circular=True)
+        ride.engine: compute_metrics(ride, EXACT, BICYCLE, BOWL, SCALE.growth_rate, SCALE.radius, circular=True)
         for ride in rides
     }
     return StoredRun(name, manifest | changed, measured, {ride.engine: ride for ride in rides})
@@ -85,7 +85,7 @@ def stored(name: str, *rides: Trajectory, failed: tuple[str, ...] = (), **change
 
 def compare(before: StoredRun, after: StoredRun, scale: Scale = SCALE) -> dict[str, Any]:
     names = {*before.manifest["engines"], *after.manifest["engines"]}
-    return diff_document(before, after, Ground(BICYCLE, BOWL, scale), dict.fromkeys(names, STEP_NOISE))
+    return diff_document(before, after, StoredGround(BICYCLE, BOWL, scale), dict.fromkeys(names, STEP_NOISE))
 
 
 def test_a_ride_is_the_same_to_the_bit_as_itself() -> None:

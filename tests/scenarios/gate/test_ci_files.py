@@ -5,11 +5,11 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 from velodrome.scenarios.gate.ci_files import junit_xml, markdown_page
-from velodrome.scenarios.gate.verdict import Verdict, missing
+from velodrome.scenarios.gate.verdict import Verdict, missing_verdict
 
 HOLDS = Verdict("exudyn", "short_error", 1e-5, 1e-5, 1e-7, "holds", "1e-05 -> 1e-05, limit 1e-07")
 WORSE = Verdict("mujoco-native", "max_slip", 0.2, 0.1, 1e-3, "worse", "0.1 -> 0.2, limit 0.001; step 0.002 -> 0.004")
-GONE = missing("warp", "did not run: <no> \x07 *engine* | of that name")
+GONE = missing_verdict("warp", "did not run: <no> \x07 *engine* | of that name")
 VERDICTS = [("q2", HOLDS), ("q2", WORSE), ("plane-circle", GONE)]
 
 

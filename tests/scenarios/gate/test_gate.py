@@ -26,7 +26,7 @@ from gating import (
 )
 from numba import cfunc
 
-from velodrome.engines.admission import ride
+from velodrome.engines.admission import ride_engine
 from velodrome.engines.engine import (
     REFERENCE,
     Engine,
@@ -47,7 +47,7 @@ from velodrome.scenarios.gate import checks as gate
 from velodrome.scenarios.gate import sample as gate_sample
 from velodrome.scenarios.gate.exact import find_exact, scale_of
 from velodrome.scenarios.gate.verdict import ABSOLUTE, HELD_CPU, RIDE_QUANTITIES, SHOWN, Verdict
-from velodrome.scenarios.run.runner import configure
+from velodrome.scenarios.run.runner import configure_engine
 from velodrome.scenarios.scenario.schema import LIBRARY, Gate, Perturbation, Scenario, load_scenario
 from velodrome.scenarios.scenario.start import make_start
 
@@ -114,14 +114,14 @@ def test_a_clean_repeat_passes_in_every_quantity(name: str) -> None:
 
 @pytest.mark.usefixtures("rides_only")
 def test_an_engine_that_no_gated_motion_suits_fails_only_if_it_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    ((_, verdict),) = gate.check(lambda *_: None, ["q2"], ["exudyn-builtin"])[0]
+    ((_, verdict),) = gate.check_gate(lambda *_: None, ["q2"], ["exudyn-builtin"])[0]
     assert (verdict.status, "rolls on the level plane only" in verdict.reason) == ("missing", True)
-    monkeypatch.setattr(gate, "installed", lambda: ["reference", "exudyn-builtin"])
+    monkeypatch.setattr(gate, "installed_engines", lambda: ["reference", "exudyn-builtin"])
     monkeypatch.setattr(gate, "read_baseline", lambda *_: {})
-    assert {verdict.engine for _, verdict in gate.check(lambda *_: None, ["q2"])[0]} == {"reference"}
-    monkeypatch.setattr(gate, "installed", lambda: ["exudyn-builtin"])
+    assert {verdict.engine for _, verdict in gate.check_gate(lambda *_: None, ["q2"])[0]} == {"reference"}
+    monkeypatch.setattr(gate, "installed_engines", lambda: ["exudyn-builtin"])
     with pytest.raises(ScenarioError, match="nothing was judged"):
-        gate.check(lambda *_: None, ["q2"])
+        gate.check_gate(lambda *_: None, ["q2"])
 
 
 @pytest.mark.usefixtures("rides_only")
@@ -350,7 +350,7 @@ def test_looser_iterations_get_no_more_room() -> None:
         return replace(problem, bicycle=replace(problem.bicycle, gravity=1.0001 * problem.bicycle.gravity))
 
     def chosen(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
-        engine, settings = configure(name, {**values, "tolerance": 1e-6})
+        engine, settings = configure_engine(name, {**values, "tolerance": 1e-6})
         return Altered(engine, heavier), settings
 
     verdicts = verdicts_on("mujoco-exact-contact", chosen)
@@ -362,7 +362,7 @@ def test_another_motion_of_the_same_name_is_not_held_against_the_baseline(tmp_pa
     text = (LIBRARY / "q2.toml").read_text(encoding="utf-8").replace("rear_rate = 18.0", "rear_rate = 17.5")
     (tmp_path / "q2.toml").write_text(text, encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"q2\.json: not the baseline of this q2: its motion"):
-        gate.check(lambda *_: None, [str(tmp_path / "q2.toml")])
+        gate.check_gate(lambda *_: None, [str(tmp_path / "q2.toml")])
 
 
 def stored(entries: dict[str, Any], folder: Path) -> None:
@@ -371,21 +371,21 @@ def stored(entries: dict[str, Any], folder: Path) -> None:
 
 def test_an_engine_of_the_baseline_that_is_gone_fails(tmp_path: Path) -> None:
     stored({"warp": {"version": "1", "settings": {}, "quantities": {}}}, tmp_path)
-    ((scenario, verdict),) = gate.check(lambda *_: None, ["q2"], ["warp"], tmp_path)[0]
+    ((scenario, verdict),) = gate.check_gate(lambda *_: None, ["q2"], ["warp"], tmp_path)[0]
     assert (scenario, verdict.status, verdict.quantity) == ("q2", "missing", "run")
     assert "did not run: engine 'warp' is not installed" in verdict.reason
 
 
 def test_an_engine_that_is_nowhere_is_refused() -> None:
     with pytest.raises(ScenarioError, match=r"'warp' is not installed; there are reference"):
-        gate.check(lambda *_: None, ["q2"], ["warp"])
+        gate.check_gate(lambda *_: None, ["q2"], ["warp"])
 
 
 def test_a_scenario_that_the_reference_does_not_ride_to_its_end_is_refused(tmp_path: Path) -> None:
     text = (LIBRARY / "waves-pushed.toml").read_text(encoding="utf-8").replace("duration = 1.6", "duration = 9.6")
     (tmp_path / "further.toml").write_text(text, encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"further: the reference ends at \d\.\d+ s: .* the ground ends"):
-        gate.check(lambda *_: None, [str(tmp_path / "further.toml")], ["reference"])
+        gate.check_gate(lambda *_: None, [str(tmp_path / "further.toml")], ["reference"])
 
 
 def test_a_disturbed_ride_is_held_against_the_references_with_its_known_error() -> None:
@@ -393,7 +393,7 @@ def test_a_disturbed_ride_is_held_against_the_references_with_its_known_error() 
     exact = find_exact(start)
     # At a tolerance of 1e-13 a step, and some 70 of them.
     assert 1e-14 < exact.error < 70 * 1e-13
-    finest = ride(load_engine(REFERENCE), start.problem, LagrangeSettings(tolerance=1e-15), lambda _: None)
+    finest = ride_engine(load_engine(REFERENCE), start.problem, LagrangeSettings(tolerance=1e-15), lambda _: None)
     apart = relative_differences(exact.trajectory, finest, scale_of(start))
     assert np.abs(apart).max() < exact.error
     # An undisturbed circle is known in closed form.
@@ -403,14 +403,14 @@ def test_a_disturbed_ride_is_held_against_the_references_with_its_known_error() 
 
 def test_an_engine_that_cannot_any_more_fails_where_it_could(tmp_path: Path) -> None:
     stored({"exudyn-builtin": {"version": "1", "settings": {}, "quantities": {}}}, tmp_path)
-    ((_, verdict),) = gate.check(lambda *_: None, ["q2"], ["exudyn-builtin"], tmp_path)[0]
+    ((_, verdict),) = gate.check_gate(lambda *_: None, ["q2"], ["exudyn-builtin"], tmp_path)[0]
     assert (verdict.status, verdict.passes) == ("missing", False)
     assert "rolls on the level plane only" in verdict.reason
 
 
 def test_an_engine_without_a_baseline_fails(tmp_path: Path) -> None:
     stored({}, tmp_path)
-    ((_, verdict),) = gate.check(lambda *_: None, ["q2"], ["reference"], tmp_path)[0]
+    ((_, verdict),) = gate.check_gate(lambda *_: None, ["q2"], ["reference"], tmp_path)[0]
     assert (verdict.engine, verdict.status) == ("reference", "missing")
     assert "no baseline" in verdict.reason
 
@@ -427,7 +427,7 @@ def test_updated_baselines_hold_the_next_run(tmp_path: Path) -> None:
     folder = tmp_path / "baselines"
 
     def check(chosen: Chosen, engine: str = "mujoco-native") -> tuple[list[tuple[str, Verdict]], dict[str, Any]]:
-        return gate.check(lambda *_: None, ["q2"], [engine], folder, chosen)
+        return gate.check_gate(lambda *_: None, ["q2"], [engine], folder, chosen)
 
     verdicts, fresh = check(set_to(step=0.004))
     (path,) = gate.update_baselines(fresh, verdicts, None, folder)
@@ -438,11 +438,11 @@ def test_updated_baselines_hold_the_next_run(tmp_path: Path) -> None:
     assert document["engines"]["mujoco-native"]["settings"]["step"] == 0.004
     assert {verdict.status for _, verdict in check(set_to(step=0.004))[0]} == {"holds", "shown"}
     # And the step that was right before is a change now; an error that it halves is an improvement.
-    statuses = {verdict.quantity: verdict.status for _, verdict in check(configure)[0]}
+    statuses = {verdict.quantity: verdict.status for _, verdict in check(configure_engine)[0]}
     assert (statuses["short_error"], statuses["energy_drift"], statuses["steps"]) == ("better", "better", "changed")
     assert statuses["settings"] == "holds"
     # Another engine's update leaves this one alone, and somebody's words stand as they are.
-    verdicts, fresh = check(configure, "mujoco-multipliers")
+    verdicts, fresh = check(configure_engine, "mujoco-multipliers")
     gate.update_baselines(fresh, verdicts, "a second engine", folder)
     document = json.loads(path.read_text())
     assert (document["reason"], set(document["engines"])) == (
@@ -454,7 +454,7 @@ def test_updated_baselines_hold_the_next_run(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("rides_only")
 def test_progress_names_the_engine_and_stays_within_the_run() -> None:
     seen: list[tuple[str, float, float]] = []
-    gate.check(lambda *report: seen.append(report), ["q2"], ["mujoco-native"])
+    gate.check_gate(lambda *report: seen.append(report), ["q2"], ["mujoco-native"])
     assert {engine for engine, _, _ in seen} == {"mujoco-native"}
     assert {duration for _, _, duration in seen} == {Gate().duration}
     assert max(time for _, time, _ in seen) <= Gate().duration
@@ -467,7 +467,7 @@ def test_cpu_time_is_judged_if_asked_for(
 ) -> None:
     def check(ratio: float, hold_cpu: bool = True) -> dict[str, Verdict]:
         monkeypatch.setattr(gate_sample, "_cpu_ratio", lambda *_: ratio)
-        verdicts, fresh = gate.check(lambda *_: None, ["q2"], [REFERENCE], tmp_path, hold_cpu=hold_cpu)
+        verdicts, fresh = gate.check_gate(lambda *_: None, ["q2"], [REFERENCE], tmp_path, hold_cpu=hold_cpu)
         if not (tmp_path / "q2.json").exists():
             gate.update_baselines(fresh, verdicts, None, tmp_path)
         return {verdict.quantity: verdict for _, verdict in verdicts}
@@ -481,7 +481,7 @@ def test_cpu_time_is_judged_if_asked_for(
 
 
 def test_a_baseline_without_a_held_cpu_time_does_not_hold_it() -> None:
-    verdicts, _ = gate.check(lambda *_: None, ["p3"], [REFERENCE], hold_cpu=True)
+    verdicts, _ = gate.check_gate(lambda *_: None, ["p3"], [REFERENCE], hold_cpu=True)
     (verdict,) = (verdict for _, verdict in verdicts if not verdict.passes)
     assert (verdict.quantity, verdict.status) == (HELD_CPU, "missing")
     assert "not in the baseline" in verdict.reason

@@ -8,8 +8,8 @@ from altered import Altered
 
 from velodrome.engines.engine import Problem
 from velodrome.scenarios.gate.exact import find_exact
-from velodrome.scenarios.gate.sample import Sample, sample
-from velodrome.scenarios.run.runner import configure
+from velodrome.scenarios.gate.sample import Sample, take_sample
+from velodrome.scenarios.run.runner import configure_engine
 from velodrome.scenarios.scenario.schema import Gate, load_scenario
 from velodrome.scenarios.scenario.start import make_start
 
@@ -20,7 +20,7 @@ INERTIAS = ["rear_frame_Ixx", "rear_frame_Iyy", "rear_frame_Izz", "front_frame_I
 @cache
 def sampled(inertia: str | None) -> Sample:
     start = make_start(load_scenario("q2", {"simulation.duration": 3.0})[1])
-    engine, settings = configure("mujoco-exact-contact", {})
+    engine, settings = configure_engine("mujoco-exact-contact", {})
 
     def heavier(problem: Problem) -> Problem:
         if inertia is None:
@@ -29,7 +29,7 @@ def sampled(inertia: str | None) -> Sample:
         return replace(problem, bicycle=replace(bicycle, **{inertia: 1.001 * getattr(bicycle, inertia)}))
 
     rides_only = Gate(order=False, eigenvalues=False)
-    return sample(start, find_exact(start), rides_only, Altered(engine, heavier), settings, lambda _: None)
+    return take_sample(start, find_exact(start), rides_only, Altered(engine, heavier), settings, lambda _: None)
 
 
 @pytest.mark.parametrize("inertia", INERTIAS)

@@ -271,7 +271,7 @@ def shows(problem: Problem, fault: Fault) -> bool:
 def test_a_planted_fault_closes_the_gate_and_is_named(what: str) -> None:
     fault = FAULTS[what]
     found = verdicts_of(fault.engine, fault.chosen, fault.scenarios)
-    problems = {name: gate.make_start(gate.as_gated(name)[1]).problem for name in found}
+    problems = {name: gate.make_start(gate.load_gated(name)[1]).problem for name in found}
     failed = {name: failing(verdicts) for name, verdicts in found.items()}
     expected = {name for name in found if shows(problems[name], fault)}
     assert expected, "nothing is gated that shows it"
@@ -290,8 +290,8 @@ def test_a_planted_fault_closes_the_gate_and_is_named(what: str) -> None:
 
 @pytest.fixture
 def plain_baselines(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    monkeypatch.setattr(gate, "installed", lambda: [REFERENCE, "plain"])
-    verdicts, fresh = gate.check(lambda *_: None, WEAVE, ["plain"], tmp_path, plain(PlainEngine()))
+    monkeypatch.setattr(gate, "installed_engines", lambda: [REFERENCE, "plain"])
+    verdicts, fresh = gate.check_gate(lambda *_: None, WEAVE, ["plain"], tmp_path, plain(PlainEngine()))
     gate.update_baselines(fresh, verdicts, "first", tmp_path)
     assert not failing(verdicts_of("plain", plain(PlainEngine()), WEAVE, tmp_path)["iftomm-2"])
     errors = json.loads((tmp_path / "iftomm-2.json").read_text())["engines"]["plain"]["quantities"]

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from velodrome.scenarios.gate.verdict import BELOW_NOISE, CHANGES, HELD_CPU, Verdict, judge, missing
+from velodrome.scenarios.gate.verdict import BELOW_NOISE, CHANGES, HELD_CPU, Verdict, judge_sample, missing_verdict
 
 SETTINGS = {"step": 0.001, "tolerance": 1e-10}
 ENTRY = {"version": "1.0", "settings": SETTINGS, "quantities": {"short_error": 1e-5, "max_slip": None}}
@@ -18,7 +18,7 @@ def judged(value: float | None, entry: dict[str, Any] | None = ENTRY, **changes:
     """Verdicts on quantities."""
     values = {"short_error": value, "max_slip": None}
     run = {"settings": SETTINGS, "version": "1.0"} | changes
-    return of_quantities(judge("exudyn", values, entry, ALLOWED, run["settings"], run["version"]))
+    return of_quantities(judge_sample("exudyn", values, entry, ALLOWED, run["settings"], run["version"]))
 
 
 def of_quantities(verdicts: list[Verdict]) -> list[Verdict]:
@@ -58,7 +58,7 @@ def test_an_improvement_needs_another_version_or_other_settings() -> None:
 
 def test_what_an_engine_never_gave_is_not_judged_and_what_is_new_is_missing() -> None:
     assert [verdict.quantity for verdict in judged(1e-5)] == ["short_error"]
-    verdicts = judge("exudyn", {"short_error": 1e-5, "max_slip": 1e-9}, ENTRY, ALLOWED, SETTINGS, "1.0")
+    verdicts = judge_sample("exudyn", {"short_error": 1e-5, "max_slip": 1e-9}, ENTRY, ALLOWED, SETTINGS, "1.0")
     assert [(verdict.quantity, verdict.status) for verdict in verdicts] == [
         ("short_error", "holds"),
         ("max_slip", "missing"),
@@ -80,7 +80,7 @@ def test_a_failure_says_what_else_changed() -> None:
 
 
 def test_verdicts_are_json() -> None:
-    rows = [verdict.as_json() for verdict in [*judged(1e-5), missing("ghost", "did not run: gone")]]
+    rows = [verdict.as_json() for verdict in [*judged(1e-5), missing_verdict("ghost", "did not run: gone")]]
     assert json.loads(json.dumps(rows, allow_nan=False)) == rows
     assert [row["passes"] for row in rows] == [True, False]
 
@@ -99,9 +99,9 @@ def test_an_earlier_fall_is_worse_and_one_that_is_new_too(
     value: float | None, before: float | None, status: str
 ) -> None:
     entry = ENTRY | {"quantities": {"fell_at": before}}
-    (verdict,) = judge("exudyn", {"fell_at": value}, entry, {"fell_at": 1e-3}, SETTINGS, "1.0")
+    (verdict,) = judge_sample("exudyn", {"fell_at": value}, entry, {"fell_at": 1e-3}, SETTINGS, "1.0")
     assert (verdict.status, verdict.passes) == (status, status == "holds")
-    (verdict,) = of_quantities(judge("exudyn", {"fell_at": value}, entry, {"fell_at": 1e-3}, SETTINGS, "1.1"))
+    (verdict,) = of_quantities(judge_sample("exudyn", {"fell_at": value}, entry, {"fell_at": 1e-3}, SETTINGS, "1.1"))
     assert verdict.status == ("better" if status == "changed" else status)
 
 
@@ -109,37 +109,39 @@ def test_a_lower_order_is_worse() -> None:
     entry = ENTRY | {"quantities": {"observed_order": 2.0}}
     found = {}
     for value in (1.0, 1.995, 1.9, 4.0):
-        _, verdict = judge("exudyn", {"observed_order": value}, entry, {"observed_order": 0.01}, SETTINGS, "1.1")
+        _, verdict = judge_sample("exudyn", {"observed_order": value}, entry, {"observed_order": 0.01}, SETTINGS, "1.1")
         found[value] = verdict.status
     # 1.9 is an order of two as well, of another version; of the same it is a fault.
     assert found == {1.0: "worse", 1.995: "holds", 1.9: "holds", 4.0: "better"}
-    (verdict,) = judge("exudyn", {"observed_order": 1.9}, entry, {"observed_order": 0.01}, SETTINGS, "1.0")
+    (verdict,) = judge_sample("exudyn", {"observed_order": 1.9}, entry, {"observed_order": 0.01}, SETTINGS, "1.0")
     assert verdict.status == "worse"
 
 
 def test_another_number_of_steps_is_neither_worse_nor_better() -> None:
     entry = ENTRY | {"quantities": {"steps": 3000}}
     for value, status in ((3001, "holds"), (1500, "changed"), (6000, "changed")):
-        _, verdict = judge("exudyn", {"steps": value}, entry, {"steps": 1.0}, SETTINGS, "1.1")
+        _, verdict = judge_sample("exudyn", {"steps": value}, entry, {"steps": 1.0}, SETTINGS, "1.1")
         assert verdict.status == status
 
 
 def test_what_this_run_cannot_tell_from_noise_is_missing() -> None:
     entry = ENTRY | {"quantities": {"observed_order": 2.0}}
-    (verdict,) = judge("exudyn", {"observed_order": None}, entry, {"observed_order": None}, SETTINGS, "1.0")
+    (verdict,) = judge_sample("exudyn", {"observed_order": None}, entry, {"observed_order": None}, SETTINGS, "1.0")
     assert (verdict.status, verdict.share) == ("missing", None)
     arguments = ("exudyn", {"observed_order": None}, entry, {"observed_order": None}, SETTINGS)
     # Errors that another version has brought below the noise are an improvement; of the same it is a fault.
     for version, status in (("1.0", "missing"), ("1.1", "better")):
-        verdict = judge(*arguments, version, {"observed_order": BELOW_NOISE})[-1]
+        verdict = judge_sample(*arguments, version, {"observed_order": BELOW_NOISE})[-1]
         assert verdict.status == status
         assert verdict.reason.startswith(BELOW_NOISE)
-    verdict = judge(*arguments, "1.1", {"observed_order": "a step that does not divide"})[-1]
+    verdict = judge_sample(*arguments, "1.1", {"observed_order": "a step that does not divide"})[-1]
     assert (verdict.status, "a step that does not divide" in verdict.reason) == ("missing", True)
 
 
 def test_other_settings_are_told_even_if_all_holds() -> None:
-    change, held = judge("exudyn", {"short_error": 1e-5}, ENTRY, {"short_error": 1e-7}, SETTINGS | {"step": 2}, "1.0")
+    change, held = judge_sample(
+        "exudyn", {"short_error": 1e-5}, ENTRY, {"short_error": 1e-7}, SETTINGS | {"step": 2}, "1.0"
+    )
     assert (change.quantity, change.status, change.passes) == (CHANGES, "holds", True)
     assert "step 0.001 -> 2" in change.reason
     assert held.status == "holds"
@@ -154,7 +156,7 @@ def test_the_baselines_date_is_told() -> None:
 def test_what_is_shown_is_not_judged() -> None:
     entry = ENTRY | {"quantities": ENTRY["quantities"] | {"required_friction": 0.5}}
     values = {"short_error": 1e-5, "required_friction": 0.9, "cpu_ratio": 30.0}
-    verdicts = judge("exudyn", values, entry, ALLOWED, SETTINGS, "1.0")
+    verdicts = judge_sample("exudyn", values, entry, ALLOWED, SETTINGS, "1.0")
     shown = {verdict.quantity: verdict for verdict in verdicts if verdict.status == "shown"}
     assert set(shown) == {"required_friction", "cpu_ratio"}
     assert all(verdict.passes and not verdict.moved and not verdict.told for verdict in shown.values())
@@ -165,5 +167,5 @@ def test_what_is_shown_is_not_judged() -> None:
 @pytest.mark.parametrize(("value", "status"), [(0.1, "holds"), (1.9, "holds"), (2.1, "worse")])
 def test_less_cpu_time_is_no_fault(value: float, status: str) -> None:
     entry = ENTRY | {"quantities": {HELD_CPU: 1.0}}
-    (verdict,) = judge("exudyn", {HELD_CPU: value}, entry, {HELD_CPU: 0.5 * value}, SETTINGS, "1.0")
+    (verdict,) = judge_sample("exudyn", {HELD_CPU: value}, entry, {HELD_CPU: 0.5 * value}, SETTINGS, "1.0")
     assert verdict.status == status

@@ -17,17 +17,17 @@ from velodrome.scenarios.paper.ledger import (
     Threshold,
     above,
     below,
-    count,
+    claim_line,
     count_by_cut,
-    document,
+    count_line,
     equals,
-    figure,
+    figure_line,
+    ledger_document,
     source,
-    untestable,
-    words,
+    untestable_line,
 )
-from velodrome.scenarios.paper.printed import printed
-from velodrome.scenarios.paper.table import markdown, show_ledger
+from velodrome.scenarios.paper.printed import read_printed
+from velodrome.scenarios.paper.table import ledger_markdown, show_ledger
 
 GOOD, BAD = Check("residual", 1e-14, 1e-12), Check("residual", 1e-3, 1e-12)
 HOLDS, FALLS = below("a length", 1.0, 2.0, "m"), below("a length", 3.0, 2.0, "m")
@@ -49,27 +49,27 @@ SEEN = source("something", json.dumps, command="velodrome critical", search="fro
     ],
 )
 def test_a_figure_rounds_to_the_print_or_is_cut_off_or_fails(value: float, text: str, verdict: str) -> None:
-    assert figure("3", "a figure", text, value, 1e-12, SEEN).verdict == verdict
+    assert figure_line("3", "a figure", text, value, 1e-12, SEEN).verdict == verdict
 
 
 def test_a_figure_too_uncertain_to_tell_is_ours() -> None:
-    line = figure("3", "a figure", "2.79", 2.7851, 1e-3, SEEN)
+    line = figure_line("3", "a figure", "2.79", 2.7851, 1e-3, SEEN)
     assert (line.verdict, line.fault) == (FAILS, "ours")
 
 
 def test_what_fails_is_the_papers_only_if_the_measurement_passes_its_tests() -> None:
-    assert words("3", "a claim", [HOLDS], "", SEEN, [GOOD]).verdict == REPRODUCED
-    assert words("3", "a claim", [HOLDS], "", SEEN, [GOOD]).fault is None
-    assert words("3", "a claim", [FALLS], "", SEEN, [GOOD]).fault == "paper"
-    assert words("3", "a claim", [HOLDS, FALLS], "", SEEN, [GOOD]).fault == "paper"
-    assert words("3", "a claim", [FALLS], "", SEEN, [GOOD, BAD]).fault == "ours"
-    assert words("3", "a claim", [FALLS], "", SEEN, []).fault == "ours"
-    failed = words("3", "a claim", [HOLDS], "", SEEN, [BAD])
+    assert claim_line("3", "a claim", [HOLDS], "", SEEN, [GOOD]).verdict == REPRODUCED
+    assert claim_line("3", "a claim", [HOLDS], "", SEEN, [GOOD]).fault is None
+    assert claim_line("3", "a claim", [FALLS], "", SEEN, [GOOD]).fault == "paper"
+    assert claim_line("3", "a claim", [HOLDS, FALLS], "", SEEN, [GOOD]).fault == "paper"
+    assert claim_line("3", "a claim", [FALLS], "", SEEN, [GOOD, BAD]).fault == "ours"
+    assert claim_line("3", "a claim", [FALLS], "", SEEN, []).fault == "ours"
+    failed = claim_line("3", "a claim", [HOLDS], "", SEEN, [BAD])
     assert failed.fault == "ours", "a measurement that fails its tests proves nothing"
-    assert words("3", "a claim", [HOLDS], "", SEEN, [Check("no number", float("nan"), 1.0)]).fault == "ours"
-    assert words("3", "a claim", [], "", SEEN, [GOOD]).verdict == FAILS, "no condition, no proof"
-    assert words("3", "a claim", [below("no number", float("nan"), 1.0)], "", SEEN, [GOOD]).verdict == FAILS
-    assert count("3", "a count", 4, 5, "", SEEN, [GOOD]).fault == "paper"
+    assert claim_line("3", "a claim", [HOLDS], "", SEEN, [Check("no number", float("nan"), 1.0)]).fault == "ours"
+    assert claim_line("3", "a claim", [], "", SEEN, [GOOD]).verdict == FAILS, "no condition, no proof"
+    assert claim_line("3", "a claim", [below("no number", float("nan"), 1.0)], "", SEEN, [GOOD]).verdict == FAILS
+    assert count_line("3", "a count", 4, 5, "", SEEN, [GOOD]).fault == "paper"
 
 
 @pytest.mark.parametrize(
@@ -88,10 +88,10 @@ def test_a_threshold_says_what_it_wants(threshold: Threshold, met: bool, text: s
 
 
 def test_a_figures_threshold_is_half_a_unit_of_its_last_digit_or_the_digits() -> None:
-    (rounds,) = figure("3", "a figure", "17.2", 17.2122, 1e-12, SEEN).thresholds
+    (rounds,) = figure_line("3", "a figure", "17.2", 17.2122, 1e-12, SEEN).thresholds
     assert (rounds.limit, rounds.relation) == (0.05, "<=")
     assert rounds.value == pytest.approx(0.0122)
-    misses, beyond, less = figure("3", "a figure", "-2.78", -2.78570, 1e-12, SEEN).thresholds
+    misses, beyond, less = figure_line("3", "a figure", "-2.78", -2.78570, 1e-12, SEEN).thresholds
     assert (misses.met, beyond.met, less.met) == (False, True, True)
     assert (misses.limit, less.limit) == (0.005, 0.01)
 
@@ -110,16 +110,18 @@ def test_a_count_may_depend_on_the_cut(counts: dict[str, int], verdict: str) -> 
 
 def test_the_document_and_the_tables_hold_every_line() -> None:
     lines = [
-        words("3", "a claim that holds", [HOLDS], "seen", SEEN, [GOOD]),
-        words("4", "a claim that does not", [FALLS], "not seen", SEEN, [GOOD]),
-        untestable("5", "a claim on a picture", "no picture"),
+        claim_line("3", "a claim that holds", [HOLDS], "seen", SEEN, [GOOD]),
+        claim_line("4", "a claim that does not", [FALLS], "not seen", SEEN, [GOOD]),
+        untestable_line("5", "a claim on a picture", "no picture"),
     ]
-    found = json.loads(json.dumps(document(lines), allow_nan=False))
+    found = json.loads(json.dumps(ledger_document(lines), allow_nan=False))
     assert [line["verdict"] for line in found["lines"]] == ["reproduced", "does not hold", "not testable"]
     assert found["faults"] == {"paper": 1, "ours": 0}
     assert not found["holds"]
-    assert document(lines[::2])["holds"]
-    lost = document([words("3", "a claim", [below("?", float("nan"), 1)], "", SEEN, [Check("?", float("nan"), 1)])])
+    assert ledger_document(lines[::2])["holds"]
+    lost = ledger_document(
+        [claim_line("3", "a claim", [below("?", float("nan"), 1)], "", SEEN, [Check("?", float("nan"), 1)])]
+    )
     (line,) = json.loads(json.dumps(lost, allow_nan=False))["lines"]
     assert line["checks"][0]["value"] is None
     assert line["thresholds"][0]["value"] is None
@@ -133,14 +135,14 @@ def test_the_document_and_the_tables_hold_every_line() -> None:
         "3 lines: 1 repro",
     ):
         assert part in text.getvalue()
-    page = markdown(lines)
+    page = ledger_markdown(lines)
     assert "**does not hold**: the paper's" in page
     for part in ("a length < 2 m", "something. from here and there", "`velodrome critical`, `json.dumps`"):
         assert part in page
 
 
 def test_a_line_in_json_names_its_threshold_and_where_it_comes_from() -> None:
-    line = words("3", "a claim", [HOLDS], "seen", SEEN, [GOOD]).as_json()
+    line = claim_line("3", "a claim", [HOLDS], "seen", SEEN, [GOOD]).as_json()
     # What readers of the document know already, and what has come since.
     before = {"section", "claim", "kind", "printed", "measured", "value", "verdict", "holds", "fault", "checks"}
     assert set(line) == before | {"threshold", "thresholds", "computed", "functions", "command", "search"}
@@ -149,13 +151,13 @@ def test_a_line_in_json_names_its_threshold_and_where_it_comes_from() -> None:
     assert threshold == {"what": "a length", "value": 1.0, "relation": "<", "limit": 2.0, "unit": "m", "met": True}
     assert (line["computed"], line["functions"]) == ("something", ["json.dumps"])
     assert (line["command"], line["search"]) == ("velodrome critical", "from here and there")
-    lone = untestable("5", "a claim on a picture", "no picture").as_json()
+    lone = untestable_line("5", "a claim on a picture", "no picture").as_json()
     assert (lone["threshold"], lone["functions"], lone["command"]) == ("", [], None)
 
 
 def test_the_printed_figures_are_those_the_tests_hold() -> None:
     """Two copies, one in the package, one beside the tests: a slip in either shows."""
-    other, ours = published("xiong2020"), printed()
+    other, ours = published("xiong2020"), read_printed()
     for name in ("A", "B", "C", "D", "G", "P1", "P2", "P3", "P4", "Q1", "Q2"):
         for key in set(other[name]) & set(ours[name]) - {"eigenvalues"}:
             if key != "steer" or other[name][key] != "pi":

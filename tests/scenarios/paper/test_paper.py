@@ -19,7 +19,15 @@ from velodrome.scenarios.cli import app
 from velodrome.scenarios.paper.claims import make_ledger
 from velodrome.scenarios.paper.configurations import configuration_lines, named_motion
 from velodrome.scenarios.paper.evidence import Evidence
-from velodrome.scenarios.paper.fast import expand, follow_flat_end, pivot_at, pivoting, solve, squared_rates, with_angle
+from velodrome.scenarios.paper.fast import (
+    expand_flat,
+    follow_flat_end,
+    pivot_at,
+    pivoting,
+    solve_flat,
+    squared_rates,
+    with_angle,
+)
 from velodrome.scenarios.paper.ledger import (
     DEPENDS,
     FAILS,
@@ -28,20 +36,20 @@ from velodrome.scenarios.paper.ledger import (
     ROUNDS,
     TRUNCATED,
     UNTESTABLE,
-    Line,
-    document,
+    LedgerLine,
+    ledger_document,
 )
-from velodrome.scenarios.paper.limits import limit
+from velodrome.scenarios.paper.limits import find_limit
 from velodrome.scenarios.paper.model import model_check
 from velodrome.scenarios.paper.named import plane_lines
 from velodrome.scenarios.paper.pencil import generalised_eigenvalues, linearised_dae, number_of_finite, spurious
 from velodrome.scenarios.paper.points import point_lines
-from velodrome.scenarios.paper.printed import printed
-from velodrome.scenarios.paper.profile import apart, nearest
+from velodrome.scenarios.paper.printed import read_printed
+from velodrome.scenarios.paper.profile import curve_distance, nearest_point
 from velodrome.scenarios.paper.rates import rate_lines
 from velodrome.scenarios.paper.reduction import reduction_lines
 from velodrome.scenarios.paper.rides import ride_lines
-from velodrome.scenarios.paper.search import OTHER_GRID, mirrored, missing, search
+from velodrome.scenarios.paper.search import OTHER_GRID, find_missing, mirrored, search_motions
 from velodrome.scenarios.paper.stability import section_lines
 from velodrome.scenarios.paper.structure import structure_lines
 from velodrome.scenarios.paper.unseen import unseen_lines
@@ -53,13 +61,13 @@ def evidence() -> Evidence:
     return Evidence()
 
 
-def failing(lines: Iterator[Line]) -> dict[str, str | None]:
+def failing(lines: Iterator[LedgerLine]) -> dict[str, str | None]:
     return {line.claim: line.fault for line in lines if not line.holds}
 
 
 def altered(evidence: Evidence, *path: Any, value: Any) -> Evidence:
     """Evidence that knows all that is computed, with one printed figure changed."""
-    figures = deepcopy(dict(printed()))
+    figures = deepcopy(dict(read_printed()))
     place: Any = figures
     for key in path[:-1]:
         place = place[key]
@@ -68,7 +76,7 @@ def altered(evidence: Evidence, *path: Any, value: Any) -> Evidence:
     return replace(evidence, figures=figures)
 
 
-def all_say_how(lines: list[Line]) -> None:
+def all_say_how(lines: list[LedgerLine]) -> None:
     """Every line has thresholds that no round-off can move, and a source whose functions and commands exist."""
     commands: Any = typer.main.get_command(app)
     for line in lines:
@@ -130,7 +138,7 @@ def test_fast_equations_are_the_steady_ones(evidence: Evidence) -> None:
     family = evidence.family(0.2, 2)
     unknowns = family.points[len(family.points) // 2].unknowns
     chosen = with_angle(unknowns)
-    here = expand(family.equations, chosen)
+    here = expand_flat(family.equations, chosen)
     # The point's own residual is some 1e-14, of accelerations of order 10.
     assert np.abs(here.rows).max() < 1e-11
     at = unknowns[CHOSEN].copy()
@@ -139,16 +147,20 @@ def test_fast_equations_are_the_steady_ones(evidence: Evidence) -> None:
     angle[6] = np.arctan(3.7)
     scale = np.where(np.arange(8) < 6, 1.0, np.cos(angle[6]))
     # Sums of terms of up to a hundred.
-    assert expand(family.equations, angle).rows == pytest.approx(scale * rows, abs=1e-12)
+    assert expand_flat(family.equations, angle).rows == pytest.approx(scale * rows, abs=1e-12)
     changes = np.array(
         [
-            (expand(family.equations, chosen + 1e-6 * e).rows - expand(family.equations, chosen - 1e-6 * e).rows) / 2e-6
+            (
+                expand_flat(family.equations, chosen + 1e-6 * e).rows
+                - expand_flat(family.equations, chosen - 1e-6 * e).rows
+            )
+            / 2e-6
             for e in np.eye(9)
         ]
     ).T
     assert here.jacobian == pytest.approx(changes, rel=1e-6, abs=1e-6 * np.abs(here.jacobian).max())
     lean = float(chosen[3])
-    again = solve(family.equations, chosen + 1e-3, lambda x, _: (float(x[3]) - lean, np.eye(9)[3]))
+    again = solve_flat(family.equations, chosen + 1e-3, lambda x, _: (float(x[3]) - lean, np.eye(9)[3]))
     assert again == pytest.approx(chosen, abs=1e-10)
 
 
@@ -169,7 +181,7 @@ def test_no_pivoting_motion_between_two_alphas(evidence: Evidence) -> None:
     rest, still = pivot_at(bicycle, start, 0.2, towards=0.41, angle=0.0)
     assert rest == pytest.approx(0.41962074367657, abs=1e-12)
     for shape, sign in ((rest - 1e-3, 1), (rest + 1e-3, -1)):
-        moved = solve(Steady(bicycle, Paraboloid(shape)), still, pivoting)
+        moved = solve_flat(Steady(bicycle, Paraboloid(shape)), still, pivoting)
         assert np.sign(squared_rates(moved)) == sign
     # The same by the equations in sigma.
     full, _ = newton(
@@ -182,7 +194,7 @@ def test_no_pivoting_motion_between_two_alphas(evidence: Evidence) -> None:
     fast, quick = pivot_at(bicycle, with_angle(evidence.found(1.0).pivoting[0]), 1.0, towards=0.47, angle=np.pi / 2)
     assert fast == pytest.approx(0.46360209675220, abs=1e-12)
     for shape, sign in ((fast + 1e-3, 1), (fast - 1e-3, -1)):
-        moved = solve(Steady(bicycle, Paraboloid(shape)), quick, pivoting)
+        moved = solve_flat(Steady(bicycle, Paraboloid(shape)), quick, pivoting)
         assert np.sign(squared_rates(moved)) == sign
         assert abs(squared_rates(moved)) > 5000
     assert evidence.found(0.44).pivoting == []
@@ -214,13 +226,13 @@ def test_the_reduced_system_is_the_linearised_dae(evidence: Evidence) -> None:
 
 def test_a_second_grid_of_starts_finds_the_same(evidence: Evidence) -> None:
     found = evidence.found(0.2)
-    again = search(found.equations, OTHER_GRID)
-    assert missing(found, again) == 0
+    again = search_motions(found.equations, OTHER_GRID)
+    assert find_missing(found, again) == 0
     assert again.described != found.described
     # A search that has lost a curve or found another motion shows.
-    assert missing(replace(found, curves=found.curves[1:]), again) > 0
-    assert missing(replace(found, pivoting=[]), again) > 0
-    assert missing(replace(found, static=[*found.static, found.static[0] + 0.01]), again) > 0
+    assert find_missing(replace(found, curves=found.curves[1:]), again) > 0
+    assert find_missing(replace(found, pivoting=[]), again) > 0
+    assert find_missing(replace(found, static=[*found.static, found.static[0] + 0.01]), again) > 0
 
 
 @pytest.mark.parametrize(
@@ -241,7 +253,7 @@ def test_a_second_grid_of_starts_finds_the_same(evidence: Evidence) -> None:
     ],
 )
 def test_a_wrong_print_is_found(
-    evidence: Evidence, lines_of: Callable[[Evidence], Iterator[Line]], path: tuple, value: Any, claim: str
+    evidence: Evidence, lines_of: Callable[[Evidence], Iterator[LedgerLine]], path: tuple, value: Any, claim: str
 ) -> None:
     found = failing(lines_of(altered(evidence, *path, value=value)))
     assert any(claim in line for line in found), found
@@ -256,12 +268,12 @@ def test_another_bicycle_is_not_the_papers_fault(evidence: Evidence) -> None:
 def test_limits_of_flat_bicycles_follow_their_power_laws(evidence: Evidence) -> None:
     family = evidence.family(0.0, 2)
     ends = [family.points[0].unknowns, family.points[-1].unknowns]
-    far = limit(family.equations, ends, 1)
+    far = find_limit(family.equations, ends, 1)
     # At a distance d the laws' relative corrections are of order d = 1e-3.
     assert far.rate_exponent == pytest.approx(-0.5, abs=1e-3)
     assert far.steer_exponent == pytest.approx(1, abs=1e-3)
     with pytest.raises(ValueError, match="no flat end"):
-        limit(family.equations, ends, -1)
+        find_limit(family.equations, ends, -1)
 
 
 def test_a_search_finds_the_families_without_their_anchors(evidence: Evidence) -> None:
@@ -276,10 +288,10 @@ def test_a_search_finds_the_families_without_their_anchors(evidence: Evidence) -
 
 def test_distances_of_curves() -> None:
     line = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
-    gaps, feet = nearest(np.array([[0.5, 3, 4], [2.5, 0, 0]]), line)
+    gaps, feet = nearest_point(np.array([[0.5, 3, 4], [2.5, 0, 0]]), line)
     assert gaps == pytest.approx([5, 0.5])
     assert feet == pytest.approx(np.array([[0.5, 0, 0], [2, 0, 0]]))
-    assert apart(line, line[:2]) == 1
+    assert curve_distance(line, line[:2]) == 1
 
 
 @pytest.mark.slow
@@ -301,7 +313,7 @@ def test_the_whole_ledger() -> None:
         "so at alpha = 1 families 1, 3 and 4 are one combined family",
         "there always are one static equilibrium and one pivoting motion",
     ]
-    assert document(lines)["faults"] == {"paper": 5, "ours": 0}
+    assert ledger_document(lines)["faults"] == {"paper": 5, "ours": 0}
     # The count under each cut: on the plane 3, 4 and 4.
     (cut,) = [line for line in lines if line.verdict == DEPENDS]
     assert cut.claim == "at alpha = 1 there still are four families"

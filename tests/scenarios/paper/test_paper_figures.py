@@ -18,15 +18,15 @@ from tests.literature import published
 from velodrome.reference.kinematics import REAR_ANGLE
 from velodrome.reference.surface import Paraboloid
 from velodrome.reports.figures.families import family_figure, solution_figure
-from velodrome.reports.figures.solution_curve import Curve, curves, scaled_speed
-from velodrome.reports.figures.style import new_figure, style, write_figure
+from velodrome.reports.figures.solution_curve import SolutionCurve, make_curves, scaled_speed
+from velodrome.reports.figures.style import new_figure, use_style, write_figure
 from velodrome.scenarios.motions.families import families_document
 from velodrome.scenarios.paper.figures.captions import families_caption, settled_rate
 from velodrome.scenarios.paper.figures.configurations import Configuration, configurations_figure
 from velodrome.scenarios.paper.figures.folder import (
     ALPHAS,
     DEPARTURE,
-    DISTURBED,
+    DISTURBED_SCENARIO,
     SETTLING,
     circle_of_equal_energy,
     linearised_point,
@@ -46,7 +46,7 @@ document = cache(families_document)
 
 @cache
 def drawn(alpha: float) -> Figure:
-    with style():
+    with use_style():
         return solution_figure(document(alpha), RADIUS, {})
 
 
@@ -70,7 +70,7 @@ def test_the_abscissa_is_the_papers_and_blind_to_the_sign() -> None:
 
 def test_a_curve_is_cut_where_the_least_push_is_zero() -> None:
     line = np.arange(4.0)
-    curve = Curve((1,), line, line, line, np.array([3.0, 1.0, -1.0, 2.0]), (), ())
+    curve = SolutionCurve((1,), line, line, line, np.array([3.0, 1.0, -1.0, 2.0]), (), ())
     assert curve.pieces() == [(0.0, 1.5, True), (1.5, 2 + 1 / 3, False), (2 + 1 / 3, 3.0, True)]
     assert curve.line("lean", 0.5, 2.25).tolist() == [[0.5, 0.5], [1.0, 1.0], [2.0, 2.0], [2.25, 2.25]]
 
@@ -88,7 +88,7 @@ def test_each_panel_has_the_papers_letters_and_families(alpha: float) -> None:
 @pytest.mark.parametrize("alpha", ALPHAS.values())
 def test_labels_stay_off_one_another_and_letters_off_the_curves(alpha: float) -> None:
     figure = drawn(alpha)
-    with style():
+    with use_style():
         figure.draw_without_rendering()
         for axes in panels(figure):
             texts = [text for text in axes.texts if isinstance(text, Annotation) and text.get_text()]
@@ -143,7 +143,7 @@ def test_axes_run_over_all_that_there_can_be(alpha: float) -> None:
 
 
 def test_families_that_join_share_one_curve() -> None:
-    found = sorted(curve.families for curve in curves(document(1.0)["families"], RADIUS))
+    found = sorted(curve.families for curve in make_curves(document(1.0)["families"], RADIUS))
     assert found == [(1,), (1, 3), (2, 4), (3,), (4,)]
     caption = families_caption(document(1.0), RADIUS)
     assert "2 with 4 and 1 with 3" in caption
@@ -167,7 +167,7 @@ def test_a_figure_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     assert first.endswith(b"</svg>\n")
     family_figure(path, document(0.05), RADIUS)
     assert path.read_bytes() == first  # no date, no random names
-    with style():
+    with use_style():
         figure = new_figure(1.0)
         figure.text(0.5, 0.5, "$\\nonsense$")
         with pytest.raises(ValueError, match="nonsense"):
@@ -202,7 +202,7 @@ def test_a_picture_hides_what_is_behind() -> None:
 def test_a_bicycle_stands_in_its_bowl() -> None:
     start = start_named("p4")
     assert start.motion is not None
-    with style():
+    with use_style():
         figure = configurations_figure(start.problem.bicycle, Paraboloid(0.2), [Configuration("P4", 4, start.motion)])
     (axes,) = figure.axes
     assert axes.get_title() == "(a)  P4, family 4, clockwise"
@@ -226,7 +226,7 @@ def test_q1_leaves_its_circle_later_the_smaller_the_errors() -> None:
     # Errors of 1e-6 of the paper's integrator against some 1e-13 of round-off: ln(1e7) / 0.384 is 42 s.
     assert 30 < precise - paper < 50
     assert "leaves the ground" in (ride.paper.ended or "")
-    with style():
+    with use_style():
         figure = departure_figure(ride, start.motion, start.growth_rate)
     path, rates, growth = figure.axes
     for axes in (path, rates, growth):
@@ -239,7 +239,7 @@ def test_q1_leaves_its_circle_later_the_smaller_the_errors() -> None:
 def test_disturbed_q2_settles_on_the_circle_of_its_energy() -> None:
     circle = start_named("q2").motion
     assert circle is not None
-    starts = {words: start_named(name, SETTLING) for words, name in DISTURBED.items()}
+    starts = {words: start_named(name, SETTLING) for words, name in DISTURBED_SCENARIO.items()}
     rides = [ride_from(words, start) for words, start in starts.items()]
     neighbours = {words: circle_of_equal_energy(start, circle) for words, start in starts.items()}
     for ride in rides:
@@ -249,7 +249,7 @@ def test_disturbed_q2_settles_on_the_circle_of_its_energy() -> None:
         late = ride.precise.qd[ride.precise.time > SETTLING - 10, REAR_ANGLE]
         swing = float(np.ptp(late)) / 2
         assert abs(settled_rate(ride) - circle.rear_rate - away) < swing < 0.1 * abs(away)
-    with style():
+    with use_style():
         figure = disturbed_figure(rides, circle, neighbours)
     rates = figure.axes[1]
     levels = [line[0, 1] for line in lines(rates, "neighbour")]

@@ -15,21 +15,21 @@ from typer.testing import CliRunner
 
 from velodrome.engines import engine as registry
 from velodrome.engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory, engine_names
-from velodrome.reports.drawing.summary import remarks
-from velodrome.reports.measure.consistency import describe
+from velodrome.reports.drawing.summary import make_remarks
+from velodrome.reports.measure.consistency import describe_mismatch
 from velodrome.scenarios.cli import app
 from velodrome.scenarios.gate import checks as gate
 from velodrome.scenarios.gate import sample as gate_sample
-from velodrome.scenarios.run.folder import Plan
-from velodrome.scenarios.run.runner import configure, plan_run, run
+from velodrome.scenarios.run.folder import RunPlan
+from velodrome.scenarios.run.runner import configure_engine, plan_run, run_plan
 from velodrome.scenarios.scenario.schema import Gate, library_names, load_scenario
-from velodrome.scenarios.sweep.rows import flat
+from velodrome.scenarios.sweep.rows import flatten_metrics
 
 OWN = "own"
 HONEST = [("q2-plus", 1.0), ("iftomm-2", 1.0), ("plane-circle", 0.3)]
 
 
-def plan_with(engine: Engine, name: str = "q2-plus", duration: float = 0.5) -> Plan:
+def plan_with(engine: Engine, name: str = "q2-plus", duration: float = 0.5) -> RunPlan:
     """A run of the reference and one more engine, which is built upon the reference."""
     plan = plan_run(*load_scenario(name, {"simulation.duration": duration}), [REFERENCE])
     return replace(plan, engines=plan.engines | {OWN: (engine, plan.engines[REFERENCE][1])})
@@ -38,22 +38,22 @@ def plan_with(engine: Engine, name: str = "q2-plus", duration: float = 0.5) -> P
 @pytest.fixture(autouse=True)
 def no_recording(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the recording, which takes the longest."""
-    monkeypatch.setattr("velodrome.scenarios.run.runner.record", lambda *_: None)
+    monkeypatch.setattr("velodrome.scenarios.run.runner.write_run_recording", lambda *_: None)
 
 
 @pytest.mark.parametrize("what", CONTRADICTIONS)
 def test_a_run_names_every_report_that_contradicts_the_coordinates(what: str, tmp_path: Path) -> None:
     after, named = CONTRADICTIONS[what]
-    inner, _ = configure(REFERENCE, {})
-    outcome = run(plan_with(Altered(inner, after=after, called=OWN)), tmp_path, lambda *_: None, lambda _: None)
+    inner, _ = configure_engine(REFERENCE, {})
+    outcome = run_plan(plan_with(Altered(inner, after=after, called=OWN)), tmp_path, lambda *_: None, lambda _: None)
     assert not outcome.failures
     measured = json.loads((outcome.folder / "metrics.json").read_text())
     assert measured[REFERENCE]["inconsistent_reports"] == []
     found = measured[OWN]["inconsistent_reports"]
     assert {report["quantity"] for report in found} == named
-    lines = remarks(OWN, measured[OWN], 0.5)
-    assert [f"{OWN}: {describe(report)}" for report in found] == [line for line in lines if "from" in line]
-    assert set(flat(measured[OWN])["inconsistent_reports"].split(", ")) == named
+    lines = make_remarks(OWN, measured[OWN], 0.5)
+    assert [f"{OWN}: {describe_mismatch(report)}" for report in found] == [line for line in lines if "from" in line]
+    assert set(flatten_metrics(measured[OWN])["inconsistent_reports"].split(", ")) == named
     # What is shown is what follows from the coordinates.
     if "qd" in named:
         assert measured[OWN]["max_slip"] > 1e-3
@@ -65,10 +65,10 @@ def test_a_run_names_every_report_that_contradicts_the_coordinates(what: str, tm
 
 
 def test_an_engine_that_reports_nothing_has_slip_gaps_and_energies(tmp_path: Path) -> None:
-    inner, _ = configure(REFERENCE, {})
+    inner, _ = configure_engine(REFERENCE, {})
     optional = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
     silent = Altered(inner, after=lambda one: replace(one, **dict.fromkeys(optional)), called=OWN)
-    measured = run(plan_with(silent), tmp_path, lambda *_: None, lambda _: None).metrics[OWN]
+    measured = run_plan(plan_with(silent), tmp_path, lambda *_: None, lambda _: None).metrics[OWN]
     assert measured["max_slip"] < 1e-13
     assert measured["max_gap"] < 1e-12
     assert measured["energy_drift"] < 1e-12
@@ -89,10 +89,12 @@ def test_no_engine_is_accused_in_the_whole_library(name: str, tmp_path: Path) ->
 
 def accused(name: str, duration: float | None, out: Path) -> None:
     changes = {} if duration is None else {"simulation.duration": duration}
-    outcome = run(plan_run(*load_scenario(name, changes)), out, lambda *_: None, lambda _: None)
+    outcome = run_plan(plan_run(*load_scenario(name, changes)), out, lambda *_: None, lambda _: None)
     assert not outcome.failures
     assert len(outcome.metrics) >= len(engine_names()) - 1  # one rides on the level plane only
-    assert [describe(report) for found in outcome.metrics.values() for report in found["inconsistent_reports"]] == []
+    assert [
+        describe_mismatch(report) for found in outcome.metrics.values() for report in found["inconsistent_reports"]
+    ] == []
 
 
 @pytest.fixture
@@ -104,7 +106,7 @@ def rides_only(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def chosen_with(after: Any) -> gate.Chosen:
     def chosen(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
-        engine, settings = configure(name, values)
+        engine, settings = configure_engine(name, values)
         return (Altered(engine, after=after) if name == REFERENCE else engine), settings
 
     return chosen
@@ -115,7 +117,7 @@ def chosen_with(after: Any) -> gate.Chosen:
 @pytest.mark.parametrize("what", [what for what in CONTRADICTIONS if what != "late energies"])
 def test_no_baseline_is_written_of_an_engine_that_contradicts_itself(what: str, tmp_path: Path) -> None:
     chosen = chosen_with(CONTRADICTIONS[what][0])
-    verdicts, fresh = gate.check(lambda *_: None, ["q2"], [REFERENCE, "mujoco-multipliers"], tmp_path, chosen)
+    verdicts, fresh = gate.check_gate(lambda *_: None, ["q2"], [REFERENCE, "mujoco-multipliers"], tmp_path, chosen)
     ((name, verdict),) = gate.refused_verdicts(verdicts)
     assert (name, verdict.engine, verdict.status, verdict.limit) == ("q2", REFERENCE, "worse", 1.0)
     assert " from " in verdict.reason
@@ -126,10 +128,10 @@ def test_no_baseline_is_written_of_an_engine_that_contradicts_itself(what: str, 
 @pytest.mark.usefixtures("rides_only")
 def test_no_baseline_excuses_a_contradiction_and_the_old_one_stays(tmp_path: Path) -> None:
     after, _ = CONTRADICTIONS["bodies 1 mm high"]
-    _, fresh = gate.check(lambda *_: None, ["q2"], [REFERENCE], tmp_path, chosen_with(after))
+    _, fresh = gate.check_gate(lambda *_: None, ["q2"], [REFERENCE], tmp_path, chosen_with(after))
     # Whoever writes it by hand gains nothing.
     (tmp_path / "q2.json").write_text(json.dumps(fresh["q2"]))
-    again, fresh = gate.check(lambda *_: None, ["q2"], [REFERENCE], tmp_path, chosen_with(after))
+    again, fresh = gate.check_gate(lambda *_: None, ["q2"], [REFERENCE], tmp_path, chosen_with(after))
     assert [verdict.quantity for _, verdict in again if not verdict.passes] == ["report_mismatch"]
     assert gate.update_baselines(fresh, again, None, tmp_path) == []
 
@@ -137,7 +139,7 @@ def test_no_baseline_excuses_a_contradiction_and_the_old_one_stays(tmp_path: Pat
 BROKEN = """
 import numpy as np
 from dataclasses import replace
-from engines.lagrange import LagrangeEngine
+from velodrome.engines.lagrange import LagrangeEngine
 
 class Own(LagrangeEngine):
     name = "own"
@@ -182,10 +184,10 @@ def test_an_order_that_cannot_be_measured_costs_only_itself(after: Any) -> None:
             return otherwise(problem, self.inner.simulate(problem, settings, progress))
 
     def chosen(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
-        engine, settings = configure(name, values)
+        engine, settings = configure_engine(name, values)
         return Fragile(engine), settings
 
-    verdicts, _ = gate.check(lambda *_: None, ["q2"], [REFERENCE], chosen=chosen)
+    verdicts, _ = gate.check_gate(lambda *_: None, ["q2"], [REFERENCE], chosen=chosen)
     fails = {verdict.quantity: verdict for _, verdict in verdicts if not verdict.passes}
     assert set(fails) == {"observed_order", *gate_sample.EIGENVALUE_QUANTITIES}
     for verdict in fails.values():

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from velodrome.engines.admission import ride
+from velodrome.engines.admission import ride_engine
 from velodrome.engines.engine import REFERENCE, Trajectory, UnsuitableProblem, engine_names, load_engine
 from velodrome.reference.simulate import simulate
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.scenario.schema import library_names, load_scenario
 from velodrome.scenarios.scenario.start import make_start
 
-CASES = Path(__file__).parents[1] / "cases"
+CASES = Path(__file__).parents[2] / "cases"
 TOUCH = re.compile(r"^the front rim touches the ground at a second place at t = (\S+) s$")
 
 
@@ -26,7 +26,7 @@ def ridden(case: str, engine: str) -> Trajectory:
     problem, rider = make_start(scenario).problem, load_engine(engine)
     settings = rider.settings()
     rider.check(problem, settings)
-    return ride(rider, problem, settings, lambda _: None)
+    return ride_engine(rider, problem, settings, lambda _: None)
 
 
 @pytest.mark.parametrize("engine", [name for name in engine_names() if name != REFERENCE])

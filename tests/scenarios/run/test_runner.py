@@ -17,8 +17,8 @@ from altered import RAISED_AT, Altered, pressing_ctrl_c, raising
 from velodrome.engines.engine import REFERENCE, EngineError, Trajectory
 from velodrome.engines.storage import read_trajectory
 from velodrome.scenarios.error import ScenarioError
-from velodrome.scenarios.run.folder import LIBRARIES, Plan
-from velodrome.scenarios.run.runner import Outcome, configure, plan_run, run
+from velodrome.scenarios.run.folder import LIBRARIES, RunPlan
+from velodrome.scenarios.run.runner import RunOutcome, configure_engine, plan_run, run_plan
 from velodrome.scenarios.scenario.schema import load_scenario
 
 NATIVE = "mujoco-native"
@@ -54,26 +54,26 @@ METRICS = {
 
 
 @cache
-def plain() -> Plan:
+def plain() -> RunPlan:
     return plan(changes={})
 
 
-def plan(name: str = "q2", changes: dict[str, Any] | None = None, engine: str = NATIVE) -> Plan:
+def plan(name: str = "q2", changes: dict[str, Any] | None = None, engine: str = NATIVE) -> RunPlan:
     return plan_run(*load_scenario(name, {"simulation.duration": 0.1} | (changes or {})), wanted=[engine])
 
 
-def with_engine(base: Plan, name: str, after: Callable[[Trajectory], Trajectory]) -> Plan:
+def with_engine(base: RunPlan, name: str, after: Callable[[Trajectory], Trajectory]) -> RunPlan:
     """The plan with one engine's result altered."""
     inner, settings = base.engines[name]
     return replace(base, engines=base.engines | {name: (Altered(inner, after=after), settings)})
 
 
-def ridden(what: Plan, out: Path) -> tuple[Outcome, list[str]]:
+def ridden(what: RunPlan, out: Path) -> tuple[RunOutcome, list[str]]:
     notes: list[str] = []
-    return run(what, out, lambda *_: None, notes.append), notes
+    return run_plan(what, out, lambda *_: None, notes.append), notes
 
 
-def read(outcome: Outcome, name: str) -> Any:
+def read(outcome: RunOutcome, name: str) -> Any:
     def refuse(constant: str) -> None:
         raise AssertionError(f"{name} holds {constant}")
 
@@ -291,7 +291,7 @@ def test_only_wanted_engines_run_beside_the_reference() -> None:
 
 def test_arrays_and_dates_of_a_scenario_file_reach_an_engines_settings() -> None:
     impedance = [0.9, 0.95, 0.001, 0.5, 2.0]
-    settings: Any = configure(NATIVE, {"impedance": impedance})[1]
+    settings: Any = configure_engine(NATIVE, {"impedance": impedance})[1]
     assert settings.impedance == tuple(impedance)
     with pytest.raises(ScenarioError, match=r"engines\.mujoco-native\.step: .*2024-01-01"):
-        configure(NATIVE, {"step": date(2024, 1, 1)})
+        configure_engine(NATIVE, {"step": date(2024, 1, 1)})

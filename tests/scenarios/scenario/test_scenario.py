@@ -16,7 +16,7 @@ from tests.literature import published, rounds_to
 from velodrome.reference.contact import observe
 from velodrome.reference.kinematics import LEAN, REAR_ANGLE, STEER
 from velodrome.scenarios.error import ScenarioError
-from velodrome.scenarios.scenario.schema import Scenario, library_names, load_scenario, validate
+from velodrome.scenarios.scenario.schema import Scenario, library_names, load_scenario, validate_scenario
 from velodrome.scenarios.scenario.start import make_start
 
 GOOD = """
@@ -50,7 +50,7 @@ def data(**changes: Any) -> dict[str, Any]:
 
 def complaint(tables: dict[str, Any]) -> str:
     with pytest.raises(ScenarioError) as caught:
-        make_start(validate(tables, "a.toml"))
+        make_start(validate_scenario(tables, "a.toml"))
     line = str(caught.value)
     assert "\n" not in line
     return line
@@ -82,9 +82,9 @@ def test_the_papers_points_are_the_librarys(name: str) -> None:
 
 
 def test_a_perturbation_moves_what_it_names_and_solves_the_rest() -> None:
-    plain = make_start(validate(data(), "a.toml")).problem
+    plain = make_start(validate_scenario(data(), "a.toml")).problem
     changes = {"x": 0.01, "y": -0.02, "lean": 0.03, "steer": -0.04, "lean_rate": 0.1, "steer_rate": 0.2, "rear_rate": 1}
-    moved = make_start(validate(data(perturbation=changes), "a.toml")).problem
+    moved = make_start(validate_scenario(data(perturbation=changes), "a.toml")).problem
     assert moved.q[[0, 1, LEAN, STEER]] - plain.q[[0, 1, LEAN, STEER]] == pytest.approx([0.01, -0.02, 0.03, -0.04])
     assert moved.qd[[LEAN, STEER, REAR_ANGLE]] - plain.qd[[LEAN, STEER, REAR_ANGLE]] == pytest.approx([0.1, 0.2, 1.0])
     seen = observe(moved.bicycle, moved.surface, moved.q[None], moved.qd[None])
@@ -93,7 +93,7 @@ def test_a_perturbation_moves_what_it_names_and_solves_the_rest() -> None:
 
 
 def test_an_override_reaches_the_bicycle() -> None:
-    scenario = validate(data(bicycle={"rear_frame_mass": 80, "trail": 0.06}), "a.toml")
+    scenario = validate_scenario(data(bicycle={"rear_frame_mass": 80, "trail": 0.06}), "a.toml")
     bicycle = scenario.make_bicycle()
     assert (bicycle.rear_frame_mass, bicycle.trail, bicycle.wheelbase) == (80.0, 0.06, 1.02)
 
@@ -187,7 +187,7 @@ def test_of_several_faults_the_first_is_said_and_the_rest_counted() -> None:
 def test_any_value_anywhere_is_taken_or_refused_in_one_line(value: Any, key: str) -> None:
     refusal, scenario = "a.toml: ", None
     try:
-        scenario = validate(data() | {key: value}, "a.toml")
+        scenario = validate_scenario(data() | {key: value}, "a.toml")
     except ScenarioError as error:
         refusal = str(error)
     assert refusal.startswith("a.toml: ")

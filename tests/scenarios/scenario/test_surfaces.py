@@ -21,10 +21,10 @@ from velodrome.reference.surface import Paraboloid, Plane, Surface
 from velodrome.scenarios.commands import present
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.motions.families import families_document
-from velodrome.scenarios.paper.search import distance, search
-from velodrome.scenarios.scenario.schema import load_scenario, validate
+from velodrome.scenarios.paper.search import distance, search_motions
+from velodrome.scenarios.scenario.schema import load_scenario, validate_scenario
 from velodrome.scenarios.scenario.start import make_start
-from velodrome.scenarios.scenario.surfaces import bowl, describe, named, parse_surface
+from velodrome.scenarios.scenario.surfaces import describe_surface, make_bowl, name_surface, parse_surface
 
 GRID = [[0.1 * i * j for j in range(6)] for i in range(7)]
 SURFACES: list[tuple[str, Surface]] = [
@@ -51,12 +51,12 @@ def scenario(surface: dict[str, Any], **motion: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(("text", "surface"), SURFACES, ids=[text.partition("=")[0] for text, _ in SURFACES])
 def test_a_surface_is_what_it_says_in_text_and_file(text: str, surface: Surface) -> None:
     assert parse_surface(text) == surface
-    # As `describe` writes it, a scenario file reads it; as the run folder keeps it, too.
-    resolved = validate(scenario(describe(surface), kind="upright", speed=5.0), "a.toml")
+    # As `describe_surface` writes it, a scenario file reads it; as the run folder keeps it, too.
+    resolved = validate_scenario(scenario(describe_surface(surface), kind="upright", speed=5.0), "a.toml")
     assert resolved.surface.make() == surface
     kept = tomli_w.dumps(resolved.model_dump(exclude_none=True))
-    assert json.loads(json.dumps(describe(surface), allow_nan=False)) == describe(surface)
-    assert validate(tomllib.loads(kept), "a.toml") == resolved
+    assert json.loads(json.dumps(describe_surface(surface), allow_nan=False)) == describe_surface(surface)
+    assert validate_scenario(tomllib.loads(kept), "a.toml") == resolved
 
 
 @pytest.mark.parametrize(
@@ -91,25 +91,25 @@ def test_a_surface_that_is_none_is_refused_in_one_line(text: str, words: list[st
 
 def test_a_file_names_the_field_that_is_wrong() -> None:
     with pytest.raises(ScenarioError, match=r"^a.toml: surface.radius: .*-1"):
-        validate(scenario({"kind": "sphere", "radius": -1.0}), "a.toml")
+        validate_scenario(scenario({"kind": "sphere", "radius": -1.0}), "a.toml")
     with pytest.raises(ScenarioError, match=r"^a.toml: surface: .*all equal"):
-        validate(scenario({"kind": "profile", "radii": [0.0, 1.0], "heights": [1.0, 1.0]}), "a.toml")
+        validate_scenario(scenario({"kind": "profile", "radii": [0.0, 1.0], "heights": [1.0, 1.0]}), "a.toml")
 
 
 def test_circular_motions_ask_for_a_surface_of_revolution() -> None:
     field = SURFACES[-1][1]
     with pytest.raises(ScenarioError, match=r"motion: .*surface of revolution.*height-field"):
-        make_start(validate(scenario(describe(field)), "a.toml"))
+        make_start(validate_scenario(scenario(describe_surface(field)), "a.toml"))
     with pytest.raises(ScenarioError, match="height-field is none"):
         families_document(field)
     with pytest.raises(ScenarioError, match="alpha is -1"):
-        bowl(-1)
+        make_bowl(-1)
 
 
 def test_documents_name_their_surface() -> None:
-    assert named(Plane()) == {"alpha": 0.0}
-    assert named(Paraboloid(0.2)) == {"alpha": 0.2}
-    assert named(Sphere(20.0)) == {"alpha": None, "surface": {"kind": "sphere", "radius": 20.0}}
+    assert name_surface(Plane()) == {"alpha": 0.0}
+    assert name_surface(Paraboloid(0.2)) == {"alpha": 0.2}
+    assert name_surface(Sphere(20.0)) == {"alpha": None, "surface": {"kind": "sphere", "radius": 20.0}}
     found = present.circular(Sphere(20.0), 15.0, 2, None)
     assert (found["alpha"], found["surface"]["radius"]) == (None, 20.0)
     assert found["lyapunov_stable"]
@@ -146,7 +146,7 @@ FOLLOWED = (0.0, 0.005, 0.011, 1 / 33, 0.05, 0.2, 0.36, 0.39, 0.41, 0.44, 0.465,
 )
 def test_a_search_without_anchors_finds_no_curve_that_is_not_followed(alpha: float) -> None:
     equations = Steady(Bicycle(), Paraboloid(alpha))
-    searched = [curve[curve[:, SIGMA] > 0] for curve in search(equations).curves]
+    searched = [curve[curve[:, SIGMA] > 0] for curve in search_motions(equations).curves]
     curves, _ = trace_all(Bicycle(), Paraboloid(alpha), 0.1)
     followed = [np.array([point.unknowns for point in curve.points]) for curve in curves]
     for ones, others in ((searched, followed), (followed, searched)):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from velodrome.engines.admission import ride
+from velodrome.engines.admission import ride_engine
 from velodrome.engines.engine import REFERENCE, load_engine
 from velodrome.reports.measure.metrics import position_errors
 from velodrome.reports.measure.precision import SAME_BITS, Level, engine_document
@@ -18,14 +18,14 @@ from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run.runner import measure_one
 from velodrome.scenarios.scenario.schema import load_scenario
 from velodrome.scenarios.scenario.start import make_start
-from velodrome.scenarios.studies.precision import precision, write_precision
+from velodrome.scenarios.studies.precision import study_precision, write_precision
 
 FIELDS = {"scenario", "horizon", "engines"}
 POINT_FIELDS = {"step", "position_error", "energy_drift", "max_slip", "cpu_time"}
 
 
 def study(name: str, changes: dict[str, Any], engines: list[str], levels: int, eigenvalues: bool = False) -> Any:
-    return precision(*load_scenario(name, changes), engines, levels, eigenvalues, lambda *_: None)
+    return study_precision(*load_scenario(name, changes), engines, levels, eigenvalues, lambda *_: None)
 
 
 @cache
@@ -56,8 +56,8 @@ def test_an_error_is_that_of_a_single_run() -> None:
     engine = load_engine("mujoco-native")
     settings = engine.settings.model_validate({"step": 0.002})
     reference = load_engine(REFERENCE)
-    yardstick = ride(reference, problem, reference.settings(), lambda _: None)
-    errors = position_errors(ride(engine, problem, settings, lambda _: None), yardstick)
+    yardstick = ride_engine(reference, problem, reference.settings(), lambda _: None)
+    errors = position_errors(ride_engine(engine, problem, settings, lambda _: None), yardstick)
     # The study is sampled at every eighth millisecond that both grids share; the error grows smoothly, to its
     # largest at the end, which both have.
     assert point["position_error"] == pytest.approx(errors.max(), rel=1e-6)
@@ -90,7 +90,7 @@ def test_the_references_levels_converge_to_itself() -> None:
 def test_a_step_that_changes_nothing_shows_neither_order_nor_limit() -> None:
     start = make_start(load_scenario("plane-circle", {"simulation.duration": 0.2})[1])
     engine = load_engine(REFERENCE)
-    same = ride(engine, start.problem, engine.settings(), lambda _: None)
+    same = ride_engine(engine, start.problem, engine.settings(), lambda _: None)
     measured = measure_one(start, same, same, step_noise=0.0)
     levels = [Level(step, same, measured) for step in (0.02, 0.01, 0.005)]
     entry = engine_document(levels, [], same, start.size, None)

@@ -16,9 +16,9 @@ from velodrome.scenarios.sweep.store import JOURNAL
 _COMMAND = """
 import sys
 from pathlib import Path
-from scenarios.sweep.command import sweep
+from velodrome.scenarios.commands.run_sweep import run_sweep_command
 path, out, resume = sys.argv[1:]
-sys.exit(sweep(Path(path), None, 2, Path(out), resume == "resume", False))
+sys.exit(run_sweep_command(Path(path), None, 2, Path(out), resume == "resume", False))
 """
 
 

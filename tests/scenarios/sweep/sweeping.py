@@ -8,9 +8,9 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
-from velodrome.scenarios.sweep.plan import Plan, Task, plan_sweep
+from velodrome.scenarios.sweep.plan import SweepPlan, Task, plan_sweep
 from velodrome.scenarios.sweep.pool import Done
-from velodrome.scenarios.sweep.run import Outcome, Work, locally, run_sweep
+from velodrome.scenarios.sweep.run import SweepOutcome, Work, locally, run_sweep
 from velodrome.scenarios.sweep.store import RESULTS
 from velodrome.scenarios.sweep.task import Tasks
 from velodrome.scenarios.sweep.worker import Setup
@@ -31,7 +31,7 @@ def written(folder: Path, text: str, name: str = "small") -> Path:
     return path
 
 
-def planned(folder: Path, text: str) -> Plan:
+def planned(folder: Path, text: str) -> SweepPlan:
     return plan_sweep(written(folder, text))
 
 
@@ -42,7 +42,7 @@ def here(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
         yield Done(task.index, *work.do(task.engine, task.changes))
 
 
-def swept(plan: Plan, out: Path, work: Work | int = here, resume: bool = False) -> Outcome:
+def swept(plan: SweepPlan, out: Path, work: Work | int = here, resume: bool = False) -> SweepOutcome:
     return run_sweep(plan, out, locally(work) if isinstance(work, int) else work, resume, lambda *_: None)
 
 

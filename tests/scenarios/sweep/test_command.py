@@ -28,7 +28,7 @@ def in_process(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
 def test_the_summary_is_the_only_thing_on_stdout(in_process: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = written(in_process, THREE)
-    assert command.sweep(path, None, None, None, resume=False, as_json=True) == 0
+    assert command.run_sweep_command(path, None, None, None, resume=False, as_json=True) == 0
     said = capsys.readouterr()
     document = json.loads(said.out)
     assert document["folder"] == "sweeps/small"
@@ -39,14 +39,14 @@ def test_the_summary_is_the_only_thing_on_stdout(in_process: Path, capsys: pytes
 
 def test_rows_that_broke_are_named_with_their_reason(in_process: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = written(in_process, 'scenario = "q2"\nengines = ["exudyn-builtin"]\ngrid.simulation.duration = [0.1]')
-    assert command.sweep(path, None, None, in_process / "out", resume=False, as_json=False) == 1
+    assert command.run_sweep_command(path, None, None, in_process / "out", resume=False, as_json=False) == 1
     said = " ".join(capsys.readouterr().out.split())
     assert "exudyn-builtin failed: UnsuitableProblem: it rolls on the level plane only" in said
 
 
 def test_workers_belong_to_this_machine(in_process: Path) -> None:
     with pytest.raises(ScenarioError, match="--workers goes without --scheduler"):
-        command.sweep(written(in_process, THREE), "tcp://127.0.0.1:1", 2, None, resume=False, as_json=False)
+        command.run_sweep_command(written(in_process, THREE), "tcp://127.0.0.1:1", 2, None, resume=False, as_json=False)
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,9 @@ def test_what_is_to_be_tried_again_must_be_a_status(
     in_process: Path, retry: list[str], resume: bool, said: str
 ) -> None:
     with pytest.raises(ScenarioError, match=said):
-        command.sweep(written(in_process, THREE), None, None, None, resume=resume, as_json=False, retry=retry)
+        command.run_sweep_command(
+            written(in_process, THREE), None, None, None, resume=resume, as_json=False, retry=retry
+        )
     assert not (in_process / "sweeps").exists()
 
 
@@ -72,9 +74,9 @@ def test_a_stopped_retry_says_how_to_go_on(
         yield
 
     path = written(in_process, THREE)
-    assert command.sweep(path, None, None, None, resume=False, as_json=False) == 0
+    assert command.run_sweep_command(path, None, None, None, resume=False, as_json=False) == 0
     monkeypatch.setattr(command, "_work", lambda *_: interrupted)
-    assert command.sweep(path, None, None, None, resume=True, as_json=False, retry=["done", "fell"]) == 130
+    assert command.run_sweep_command(path, None, None, None, resume=True, as_json=False, retry=["done", "fell"]) == 130
     said = " ".join(capsys.readouterr().out.split())
     assert "--resume --retry done --retry fell" in said
     assert "3 of 3 runs are missing, what is done is kept" in said

@@ -9,14 +9,14 @@ import pytest
 from sweeping import UPRIGHT, planned, written
 
 from velodrome.scenarios.error import ScenarioError
-from velodrome.scenarios.scenario.table import placed
+from velodrome.scenarios.scenario.table import place_error
 from velodrome.scenarios.sweep.file import read_sweep
 from velodrome.scenarios.sweep.plan import plan_sweep
-from velodrome.scenarios.sweep.points import points
+from velodrome.scenarios.sweep.points import make_points
 
 
 def changes(folder: Path, text: str) -> list[dict]:
-    return list(points(read_sweep(written(folder, text))[0]))
+    return list(make_points(read_sweep(written(folder, text))[0]))
 
 
 def test_a_grid_is_every_combination_and_its_last_key_changes_fastest(tmp_path: Path) -> None:
@@ -46,7 +46,7 @@ def test_a_latin_hypercube_has_one_point_in_every_slice_and_is_the_same_again(tm
 
 def test_changes_leave_what_they_are_made_of_alone() -> None:
     data = {"a": {"b": 1}}
-    assert placed(data, {"a.c": 2, "d.e": 3}) == {"a": {"b": 1, "c": 2}, "d": {"e": 3}}
+    assert place_error(data, {"a.c": 2, "d.e": 3}) == {"a": {"b": 1, "c": 2}, "d": {"e": 3}}
     assert data == {"a": {"b": 1}}
 
 

@@ -12,16 +12,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from velodrome.scenarios.error import ScenarioError
-from velodrome.scenarios.sweep.journal import ForeignLine, Journal, Line, finished, parsed
+from velodrome.scenarios.sweep.journal import ForeignLine, Journal, JournalLine, finished_rows, parse_lines
 
 ROWS = [
-    Line("0123abcd", "0000003-aa", 3, {"status": "done", "x": 0.1 + 0.2}, {}),
-    Line("0123abcd", "0000001-bb", 1, {"status": "fell", "reason": "é\n"}, {"cpu_time": 1e-300}),
+    JournalLine("0123abcd", "0000003-aa", 3, {"status": "done", "x": 0.1 + 0.2}, {}),
+    JournalLine("0123abcd", "0000001-bb", 1, {"status": "fell", "reason": "é\n"}, {"cpu_time": 1e-300}),
 ]
 
 
-def kept(path: Path) -> list[Line]:
-    return [line for _, line in finished(path)]
+def kept(path: Path) -> list[JournalLine]:
+    return [line for _, line in finished_rows(path)]
 
 
 def test_rows_come_back_to_the_bit(tmp_path: Path) -> None:
@@ -63,7 +63,7 @@ def test_nothing_is_cut_off_before_there_is_something_to_write(tmp_path: Path) -
 def test_a_whole_line_of_another_kind_is_told_from_a_damaged_one(text: str) -> None:
     body = f"3 {text}".encode()
     with pytest.raises(ForeignLine):
-        parsed(b"%08x %b\n" % (zlib.crc32(body), body))
+        parse_lines(b"%08x %b\n" % (zlib.crc32(body), body))
 
 
 @given(st.data())
@@ -71,7 +71,7 @@ def test_no_altered_line_is_taken_for_a_row(data: st.DataObject) -> None:
     line = ROWS[1].encode()
     place = data.draw(st.integers(0, len(line) - 1))
     bit = 1 << data.draw(st.integers(0, 7))
-    assert parsed(line[:place] + bytes([line[place] ^ bit]) + line[place + 1 :]) is None
+    assert parse_lines(line[:place] + bytes([line[place] ^ bit]) + line[place + 1 :]) is None
 
 
 def test_a_damaged_line_costs_that_row_only(tmp_path: Path) -> None:

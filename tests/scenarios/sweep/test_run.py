@@ -14,18 +14,18 @@ import pyarrow.parquet as pq
 import pytest
 from sweeping import UPRIGHT, data_set, here, planned, rows, swept
 
-from velodrome.engines.admission import ride
+from velodrome.engines.admission import ride_engine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run.runner import claimed_noise, measure_one, plan_run
 from velodrome.scenarios.scenario.schema import load_scenario
 from velodrome.scenarios.sweep import rows as columns
-from velodrome.scenarios.sweep.journal import finished
+from velodrome.scenarios.sweep.journal import finished_rows
 from velodrome.scenarios.sweep.plan import Task, plan_sweep
 from velodrome.scenarios.sweep.pool import Done
 from velodrome.scenarios.sweep.run import Work, run_sweep
 from velodrome.scenarios.sweep.store import JOURNAL, MANIFEST, RESULTS, TIMINGS
-from velodrome.scenarios.sweep.summary import status_of, summary
+from velodrome.scenarios.sweep.summary import status_of, summarise_sweep
 from velodrome.scenarios.sweep.task import Tasks
 from velodrome.scenarios.sweep.worker import Setup
 
@@ -50,13 +50,13 @@ def test_a_row_has_the_parameters_and_the_metrics_of_a_run(tmp_path: Path) -> No
     changes = dict(plan.tasks[-1].changes)
     alone = plan_run(*load_scenario("iftomm-1", changes), wanted=["mujoco-multipliers"])
     rides = {
-        name: ride(engine, alone.start.problem, settings, lambda _: None)
+        name: ride_engine(engine, alone.start.problem, settings, lambda _: None)
         for name, (engine, settings) in alone.engines.items()
     }
     noise = claimed_noise(*alone.engines["mujoco-multipliers"])
     measured = measure_one(alone.start, rides["mujoco-multipliers"], rides["reference"], step_noise=noise)
     differing = set(columns.TIMING)
-    flat = {name: value for name, value in columns.flat(measured).items() if name not in differing}
+    flat = {name: value for name, value in columns.flatten_metrics(measured).items() if name not in differing}
     assert set(flat) == set(columns.METRICS) - {"family", "growth_rate", "size"}
     assert {name: found[1][name] for name in flat} == flat
     assert (found[1]["status"], found[1]["reason"]) == ("done", None)
@@ -126,7 +126,7 @@ def test_what_is_done_is_kept_and_not_done_again(tmp_path: Path, error: BaseExce
     assert json.loads((out / MANIFEST).read_text())["complete"] is True
     swept(plan, tmp_path / "undisturbed")
     assert data_set(out) == data_set(tmp_path / "undisturbed")
-    assert len(list(finished(out / JOURNAL))) == 4
+    assert len(list(finished_rows(out / JOURNAL))) == 4
 
 
 def test_a_disk_that_fills_while_the_data_set_is_written_leaves_no_part_of_it(
@@ -269,7 +269,7 @@ def test_a_point_that_is_none_is_a_row_and_the_others_ride(tmp_path: Path) -> No
             assert "are not those of a rigid body" in row["reason"]
             assert row["version"] is not None
     assert outcome.counts["reference"].keys() == {"done", "refused"}
-    document = summary(plan, outcome)
+    document = summarise_sweep(plan, outcome)
     assert all(reason.startswith("refused: bicycle param") for reason in document["engines"]["reference"]["reasons"])
     again = run_sweep(plan, out, breaking_off(0, OSError("no one is asked")), True, lambda *_: None, ["refused"])
     assert again.missing == 0
@@ -291,10 +291,10 @@ def test_parameters_keep_their_types_and_tables_become_json(tmp_path: Path) -> N
     text = 'scenario = "q2"\ngrid.simulation.duration = [1, 0.5]\ngrid.motion.family = [2]\ngrid.title = ["x"]\n'
     text += "grid.motion.near = [{ lean = 0.74, steer = 2.84 }]"
     plan = planned(tmp_path, text)
-    schema = columns.schema(plan.tasks)
+    schema = columns.row_schema(plan.tasks)
     assert schema.field("simulation.duration").type == pa.float64()
     assert schema.field("motion.family").type == pa.int64()
-    row = columns.record(plan.tasks[0], {}, schema)
+    row = columns.make_record(plan.tasks[0], {}, schema)
     assert row["motion.near"] == '{"lean": 0.74, "steer": 2.84}'
     assert row["title"] == "x"
 
@@ -302,7 +302,7 @@ def test_parameters_keep_their_types_and_tables_become_json(tmp_path: Path) -> N
 def test_the_summary_counts_and_measures(tmp_path: Path) -> None:
     text = 'engines = ["reference", "mujoco-multipliers"]\n' + LEANING + '"engines.mujoco-multipliers.step" = [0.01]'
     plan = planned(tmp_path, text)
-    document = summary(plan, swept(plan, tmp_path / "out"))
+    document = summarise_sweep(plan, swept(plan, tmp_path / "out"))
     json.dumps(document, allow_nan=False)
     entry = document["engines"]["mujoco-multipliers"]
     errors = [row["position_error_max"] for row in rows(tmp_path / "out", "mujoco-multipliers")]

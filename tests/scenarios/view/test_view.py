@@ -19,11 +19,11 @@ from typing import Any
 import pytest
 
 from velodrome.scenarios.error import ScenarioError
-from velodrome.scenarios.run.runner import plan_run, run
+from velodrome.scenarios.run.runner import plan_run, run_plan
 from velodrome.scenarios.scenario.schema import load_scenario
 from velodrome.scenarios.view import viewer as replay
 from velodrome.scenarios.view import viewing as view
-from velodrome.scenarios.view.server import LOOPBACK, Content, PageServer
+from velodrome.scenarios.view.server import LOOPBACK, Content, RunPageServer
 
 VIEWER = {"": Content("text/html", b"<title>viewer</title>"), "re_viewer.js": Content("text/javascript", b"1")}
 LISTENING = "0A"  # state of a socket in /proc/net/tcp
@@ -35,7 +35,7 @@ needs_proc = pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="no /
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of the reference and one engine."""
     plan = plan_run(*load_scenario("q2", {"simulation.duration": 0.1}), wanted=["mujoco-native"])
-    return run(plan, tmp_path_factory.mktemp("runs"), lambda *_: None, lambda _: None).folder
+    return run_plan(plan, tmp_path_factory.mktemp("runs"), lambda *_: None, lambda _: None).folder
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ LOOPBACK_HEX = "0100007F"  # 127.0.0.1, in the machine's order of bytes
 
 
 @contextmanager
-def serving(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[PageServer]:
+def serving(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RunPageServer]:
     monkeypatch.setattr(view, "viewer_files", lambda: VIEWER)
     with view.page_server(folder, 0) as server:
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
@@ -77,7 +77,7 @@ def serving(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[PageServe
             thread.join()
 
 
-def ask(server: PageServer, path: str, method: str = "GET", host: str | None = None) -> tuple[HTTPResponse, bytes]:
+def ask(server: RunPageServer, path: str, method: str = "GET", host: str | None = None) -> tuple[HTTPResponse, bytes]:
     connection = HTTPConnection(LOOPBACK, server.server_port, timeout=10)
     connection.request(method, path, headers={} if host is None else {"Host": host})
     answer = connection.getresponse()
@@ -139,11 +139,11 @@ def test_a_taken_port_is_said(copy: Path, monkeypatch: pytest.MonkeyPatch):
 
 
 def test_serving_ends_with_an_interrupt(copy: Path, monkeypatch: pytest.MonkeyPatch):
-    def interrupted(_: PageServer) -> None:
+    def interrupted(_: RunPageServer) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(view, "viewer_files", lambda: VIEWER)
-    monkeypatch.setattr(PageServer, "serve_forever", interrupted)
+    monkeypatch.setattr(RunPageServer, "serve_forever", interrupted)
     addresses: list[str] = []
     view.serve(copy, 0, addresses.append)
     assert addresses[0].startswith(f"http://{LOOPBACK}:")
