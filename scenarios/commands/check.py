@@ -55,7 +55,8 @@ def check_command(
         update_baselines,
     )
     from ..run import configure_engine, installed_engines
-    from . import present
+    from .present_gate import show_verdicts
+    from .progress import ProgressBars
 
     if reason is not None and not update:
         raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
@@ -65,7 +66,7 @@ def check_command(
             _check_path(option, path)
     files = [(junit, junit_xml), (markdown, markdown_page)]
     unfinished = _unfinished({junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN})
-    with showing_traceback(traceback), unfinished, present.ProgressBars() as progress:
+    with showing_traceback(traceback), unfinished, ProgressBars() as progress:
         trace = print_traceback if traceback else None
         verdicts, fresh = check_gate(progress.watch, scenario, engine, baselines, configure_engine, trace, hold_cpu)
     for path, page in files:
@@ -91,7 +92,7 @@ def check_command(
             print_json({"passes": passes, "updated": written, "verdicts": rows})
         else:
             console = Console()
-            present.show_verdicts(console, verdicts, renewed=update)
+            show_verdicts(console, verdicts, renewed=update)
             for path in written:
                 console.print(f"baseline written: {path}", soft_wrap=True)
             for name, verdict in refused:

@@ -30,16 +30,20 @@ def circular_command(
     """One circular motion: its 21 constants, contact forces, eigenvalues, verdict on stability."""
     from rich.console import Console
 
-    from . import present
+    from ...reference.bicycle import Bicycle
+    from ..motions import solve_circular
+    from ..scenario import make_bowl
+    from .present_motions import show_circular
+    from .progress import show_working
 
     angles, ground = parse_angles(near), parse_ground(alpha, surface)
-    with present.show_working(STARTING):
-        found = present.circular(ground, rear_rate, family, angles)
+    with show_working(STARTING):
+        found = solve_circular(Bicycle(), make_bowl(ground), rear_rate, family, angles).as_json()
     with ending_with(0):
         if as_json:
             print_json(found)
         else:
-            present.show_circular(Console(), found)
+            show_circular(Console(), found)
 
 
 def families_command(
@@ -52,10 +56,11 @@ def families_command(
     from rich.console import Console
 
     from ..motions import families_document, write_families
-    from . import present
+    from .present_motions import show_families
+    from .progress import show_working
 
     ground = parse_ground(alpha, surface)
-    with present.show_working(STARTING):
+    with show_working(STARTING):
         document = families_document(ground)
     if out is not None:
         write_families(document, out)
@@ -63,7 +68,7 @@ def families_command(
         if as_json:
             print_json(document)
         else:
-            present.show_families(Console(), document)
+            show_families(Console(), document)
 
 
 def critical_command(as_json: JsonOption = False) -> None:
@@ -71,15 +76,16 @@ def critical_command(as_json: JsonOption = False) -> None:
     from rich.console import Console
 
     from ..motions import critical_document
-    from . import present
+    from .present_motions import show_critical
+    from .progress import ProgressBars
 
-    with present.ProgressBars() as progress:
+    with ProgressBars() as progress:
         document = critical_document(progress.watch)
     with ending_with(0):
         if as_json:
             print_json(document)
         else:
-            present.show_critical(Console(), document)
+            show_critical(Console(), document)
 
 
 def atlas_command(
@@ -94,12 +100,13 @@ def atlas_command(
     from rich.console import Console
 
     from ..motions import make_atlas
-    from . import present
+    from .present_motions import show_atlas
+    from .progress import ProgressBars
 
-    with present.ProgressBars() as progress:
+    with ProgressBars() as progress:
         document = make_atlas(out, size, largest, lambda done: progress.watch("atlas", done, 1.0))
     with ending_with(0):
         if as_json:
             print_json(document)
         else:
-            present.show_atlas(Console(), document, out)
+            show_atlas(Console(), document, out)

@@ -85,28 +85,29 @@ def run_command(
     from rich.console import Console
 
     from ..run import installed_engines, run_plan
-    from . import present
+    from .present_run import outcome_json, show_outcome
+    from .progress import ProgressBars, show_working
 
     sources = [*(scenario or []), *(_tagged(tag) if tag is not None else [])]
     if not sources:
         raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
     changes = parse_changes(change, duration)
     installed_engines()  # an engine that two packages announce is no scenario's fault
-    with showing_traceback(traceback), present.show_working(STARTING):
+    with showing_traceback(traceback), show_working(STARTING):
         plans = [_plan(source, changes, engine) for source in dict.fromkeys(sources)]
     console = Console(stderr=as_json)
     outcomes = []
     for plan in plans:
-        with present.ProgressBars() as progress:
+        with ProgressBars() as progress:
             outcome = run_plan(plan, out, progress.watch, progress.note, print_traceback if traceback else None)
         outcomes.append((plan, outcome))
         with ending_with(0):  # the next run does not depend on a reader of this one's table
-            present.show_outcome(console, plan, outcome)
+            show_outcome(console, plan, outcome)
         if outcome.interrupted:
             break
     with ending_with(_status_of([outcome for _, outcome in outcomes])):
         if as_json:
-            print_json({"runs": [present.outcome_json(plan, outcome) for plan, outcome in outcomes]})
+            print_json({"runs": [outcome_json(plan, outcome) for plan, outcome in outcomes]})
 
 
 def _status_of(outcomes: Sequence[RunOutcome]) -> int:

@@ -23,7 +23,7 @@ from ..sweep import (
     summarise_sweep,
 )
 from .options import ending_with, print_json
-from .present import show_working
+from .progress import show_working
 
 FOLDER = Path("sweeps")
 

@@ -30,11 +30,11 @@ def paper_command(
 
     from ..files import make_folder
     from ..paper import ledger_document, make_ledger, show_ledger, write_paper
-    from . import present
+    from .progress import ProgressBars
 
     if out is not None:
         make_folder(out)  # before the work: half a minute of it would be for nothing
-    with present.ProgressBars() as progress:
+    with ProgressBars() as progress:
         lines = make_ledger(lambda part, done, parts: progress.watch(part, done, parts))
         written = [] if out is None else write_paper(out, lines, progress.watch)
     found = ledger_document(lines)
@@ -71,13 +71,14 @@ def precision_command(
     from ..files import make_folder
     from ..scenario import load_scenario
     from ..studies import all_ran, study_precision, write_precision
-    from . import present
+    from .present_precision import show_precision
+    from .progress import ProgressBars
 
     changes = parse_changes(change, duration)
     name, loaded = load_scenario(scenario, changes)
     if out is not None:
         make_folder(out)  # before the work
-    with showing_traceback(traceback), present.ProgressBars() as progress:
+    with showing_traceback(traceback), ProgressBars() as progress:
         trace = print_traceback if traceback else None
         document = study_precision(name, loaded, engine, levels, eigenvalues, progress.watch, trace)
     written = [] if out is None else write_precision(document, out)
@@ -85,5 +86,5 @@ def precision_command(
         if as_json:
             print_json(document)
         else:
-            present.show_precision(Console(), document)
+            show_precision(Console(), document)
             show_written(written)

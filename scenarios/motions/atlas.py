@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ...engines.storage import write_columns
 from ...reference.atlas import ATLAS_SIZE, Atlas, Boundary, compute_atlas, spacing
 from ...reference.bicycle import Bicycle
 from ...reference.stability import VARIABLES
@@ -101,6 +100,9 @@ def atlas_columns(found: Atlas) -> dict[str, np.ndarray]:
 
 def write_atlas(columns: dict[str, np.ndarray], path: Path, facts: dict[str, Any]) -> None:
     """Write columns with their units as Parquet, whole or not at all."""
+    # pyarrow, which a circular motion does not need.
+    from ...engines.storage import write_columns
+
     units = {name: "1/s" if name.startswith("eigenvalue") else UNITS.get(name) for name in columns}
     # Neighbours differ in their last bytes only: split, they compress to three quarters.
     repeated = ["alpha", "family"]

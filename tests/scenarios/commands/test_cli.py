@@ -424,7 +424,8 @@ def test_families_refuses_a_shape_that_is_none(velodrome, tmp_path: Path) -> Non
 )
 def test_a_command_imports_only_what_it_needs(arguments: list[str], unwanted: tuple[str, ...]) -> None:
     """What a command waits for before it starts: counted in imports, since a machine's seconds vary."""
-    script = f"import sys\nfrom velodrome.scenarios import cli\nsys.argv[1:] = {arguments!r}\ntry:\n    cli.main()\nfinally:\n"
+    script = "import sys\nfrom velodrome.scenarios import cli\n"
+    script += f"sys.argv[1:] = {arguments!r}\ntry:\n    cli.main()\nfinally:\n"
     script += f"    print([name for name in {unwanted!r} if name in sys.modules], file=sys.stderr)"
     result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert result.stderr.strip() == "[]"

@@ -18,8 +18,8 @@ from velodrome.reference.families import trace_all
 from velodrome.reference.height_field import HeightField
 from velodrome.reference.profile import PolynomialProfile, SplineProfile
 from velodrome.reference.surface import Paraboloid, Plane, Surface
-from velodrome.scenarios.commands import present
 from velodrome.scenarios.error import ScenarioError
+from velodrome.scenarios.motions import solve_circular
 from velodrome.scenarios.motions.families import families_document
 from velodrome.scenarios.paper.search import distance, search_motions
 from velodrome.scenarios.scenario.schema import load_scenario, validate_scenario
@@ -110,7 +110,7 @@ def test_documents_name_their_surface() -> None:
     assert name_surface(Plane()) == {"alpha": 0.0}
     assert name_surface(Paraboloid(0.2)) == {"alpha": 0.2}
     assert name_surface(Sphere(20.0)) == {"alpha": None, "surface": {"kind": "sphere", "radius": 20.0}}
-    found = present.circular(Sphere(20.0), 15.0, 2, None)
+    found = solve_circular(Bicycle(), Sphere(20.0), 15.0, 2).as_json()
     assert (found["alpha"], found["surface"]["radius"]) == (None, 20.0)
     assert found["lyapunov_stable"]
 

@@ -1,0 +1,59 @@
+"""What `velodrome check` shows."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from ..gate import SHOWN, Verdict
+
+STATUS_STYLES = {
+    "holds": "green",
+    "shown": "green",
+    "better": "cyan",
+    "changed": "red",
+    "worse": "red",
+    "missing": "red",
+}
+
+
+def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed: bool = False) -> None:
+    """Print the gate's verdicts: a line an engine, then everything that does not hold in plain lines.
+
+    Of baselines that are ``renewed`` at once there is nothing to pass or fail.
+    """
+    for name, group in groupby(verdicts, key=lambda item: item[0]):
+        console.print(name, style="bold", markup=False)
+        table = Table("engine", box=None, pad_edge=False)
+        table.add_column("hold", justify="right")
+        table.add_column("friction\nneeded", justify="right")
+        table.add_column("CPU time,\nreference 1", justify="right")
+        table.add_column("moved most, against its limit")
+        for engine, rows in groupby((verdict for _, verdict in group), key=lambda verdict: verdict.engine):
+            table.add_row(*_engine_row(engine, list(rows)))
+        console.print(table)
+    for name, verdict in verdicts:
+        if verdict.told:
+            line = f"{name}: {verdict.engine}: {verdict.quantity}: {verdict.status}: {verdict.reason}"
+            console.print(line, style=STATUS_STYLES[verdict.status], markup=False, highlight=False, soft_wrap=True)
+    if renewed:
+        return
+    passes = all(verdict.passes for _, verdict in verdicts)
+    console.print("the gate holds" if passes else "the gate fails", style="bold green" if passes else "bold red")
+
+
+def _engine_row(engine: str, verdicts: list[Verdict]) -> tuple[str, Text, str, str, str]:
+    held = sum(verdict.status == "holds" for verdict in verdicts)
+    judged = sum(verdict.status != "shown" for verdict in verdicts)
+    passes = all(verdict.passes for verdict in verdicts)
+    shares = {verdict.quantity: share for verdict in verdicts if (share := verdict.share) is not None}
+    moved = "nothing moved" if shares else "–"
+    if any(shares.values()):
+        most = max(shares, key=lambda quantity: shares[quantity])
+        moved = f"{most}, {shares[most]:.2g}"
+    values = {verdict.quantity: verdict.value for verdict in verdicts}
+    friction, cpu = ("–" if (value := values.get(name)) is None else f"{value:.2g}" for name in SHOWN)
+    return engine, Text(f"{held} of {judged}", "green" if passes else "red"), friction, cpu, moved

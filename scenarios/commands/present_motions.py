@@ -1,0 +1,103 @@
+"""What `velodrome circular`, `families`, `critical` and `atlas` show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+
+def show_circular(console: Console, found: dict[str, Any]) -> None:
+    """Print a circular motion."""
+    table = Table(box=None, show_header=False, pad_edge=False)
+    if found["alpha"] is not None:
+        table.add_row("alpha", _shown(found["alpha"]), "1/m")
+    else:
+        for name, value in found["surface"].items():
+            table.add_row("surface" if name == "kind" else name, _shown(value))
+    for name, unit in (
+        *(("family", ""), ("rear_rate", "rad/s"), ("front_rate", "rad/s"), ("yaw_rate", "rad/s")),
+        *(("lean", "rad"), ("steer", "rad"), ("pitch", "rad"), ("energy", "J"), ("residual", "")),
+    ):
+        table.add_row(name, f"{found[name]:.12g}", unit)
+    table.add_row("position", _numbers(found["position"]), "m, D in the heading frame")
+    for wheel in ("rear", "front"):
+        table.add_row(f"{wheel} contact", _numbers(found["contact_point"][wheel]), "m")
+        table.add_row(f"{wheel} force", _numbers(found["contact_force"][wheel]), "N, on the wheel")
+        table.add_row(f"{wheel} normal force", f"{found['normal_force'][wheel]:.9g}", "N")
+    for i, (real, imaginary) in enumerate(found["eigenvalues"]):
+        value = (
+            f"{real:.9g}" if imaginary == 0 else f"{real:.9g} {'+' if imaginary > 0 else '-'} {abs(imaginary):.9g} i"
+        )
+        table.add_row("eigenvalues" if i == 0 else "", value, "1/s" if i == 0 else "")
+    console.print(table)
+    stable = "Lyapunov stable" if found["lyapunov_stable"] else "unstable"
+    physical = "both wheels are pushed" if found["physical"] else "not physical: the ground would have to pull a wheel"
+    console.print(f"{stable}; {physical}")
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.12g}" if isinstance(value, float) else str(value)
+
+
+def _numbers(values: list[float]) -> str:
+    return ", ".join(f"{value:.9g}" for value in values)
+
+
+def show_families(console: Console, document: Mapping[str, Any]) -> None:
+    """Print the families: where each runs, its special points, its stable sections."""
+    for family in document["families"]:
+        points = family["points"]
+        console.print(
+            f"family {family['family']}: {len(points['lean'])} points, from {family['ends'][0]} to {family['ends'][1]}",
+            style="bold",
+            markup=False,
+            highlight=False,
+        )
+        table = Table("", "kind", box=None, pad_edge=False)
+        for title in ("rear rate", "front rate", "lean", "steer"):
+            table.add_column(title, justify="right")
+        for name, point in family["special_points"].items():
+            numbers = (f"{point[key]:.9f}" for key in ("rear_rate", "front_rate", "lean", "steer"))
+            table.add_row(name, point["kind"], *numbers)
+        if family["special_points"]:
+            console.print(table)
+        for section in family["stable_sections"]:
+            rates, causes = section["rear_rate"], section["cause"]
+            line = " to ".join(f"{rate:.9f} ({cause})" for rate, cause in zip(rates, causes, strict=True))
+            console.print(f"Lyapunov stable: rear rate {line}", style="green", markup=False, highlight=False)
+    for number, reason in document["absent"].items():
+        console.print(f"family {number}: no curve: {reason}", style="yellow", markup=False, soft_wrap=True)
+
+
+def show_critical(console: Console, document: Mapping[str, Any]) -> None:
+    """Print the critical shapes of the bowl."""
+    table = Table("families", "what happens", box=None, pad_edge=False)
+    for title in ("alpha", "rear rate", "lean", "steer"):
+        table.add_column(title, justify="right", no_wrap=True)
+    rows = [("2, 4", "cusps D, I meet", document["cusp_collision"])]
+    rows += [(", ".join(map(str, point["families"])), "curves touch", point) for point in document["merging"]]
+    rows += [(n, "last stable", point) for n, point in document["last_stable"].items() if point is not None]
+    for families, what, point in rows:
+        numbers = (f"{point[key]:.9f}" for key in ("rear_rate", "lean", "steer"))
+        table.add_row(families, what, f"{point['alpha']:.11f}", *numbers)
+    console.print(table)
+    for number, point in document["last_stable"].items():
+        if point is None:
+            console.print(f"family {number} has no stable section", markup=False, highlight=False)
+
+
+def show_atlas(console: Console, document: Mapping[str, Any], out: Path) -> None:
+    """Print the stable regions of the atlas, and where it is."""
+    table = Table("family", box=None, pad_edge=False)
+    for title in ("stable from alpha", "to alpha", "where at rear rate"):
+        table.add_column(title, justify="right")
+    for region in document["stable"]:
+        end = region["vanishing"]
+        last = ("and on", "") if end is None else (f"{end['alpha']:.10f}", f"{end['rear_rate']:.6f}")
+        table.add_row(str(region["family"]), f"{region['alpha'][0]:g}", *last)
+    console.print(table)
+    console.print(f"{document['motions']} motions in {out}", markup=False, highlight=False, soft_wrap=True)

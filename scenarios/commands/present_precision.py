@@ -1,0 +1,45 @@
+"""What `velodrome precision` shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from ...reports.measure import compared_time
+
+
+def show_precision(console: Console, document: Mapping[str, Any]) -> None:
+    """Print a work-precision study: a table an engine."""
+    limit = "" if document["horizon"] is None else "; beyond, the motion's own instability leaves nothing to compare"
+    title = f"{document['scenario']}: errors over {compared_time(document):.4g} s{limit}"
+    console.print(title, style="bold", markup=False, soft_wrap=True)
+    for name, entry in document["engines"].items():
+        console.print()
+        console.print(name, style="bold", markup=False)
+        table = Table(box=None, pad_edge=False)
+        for title in ("step", "position error", "energy drift", "largest slip", "CPU time", "order"):
+            table.add_column(title, justify="right", no_wrap=True)
+        orders = ["", "", *("–" if order is None else f"{order:.3f}" for order in entry["orders"])]
+        for point, order in zip(entry["points"], orders, strict=False):
+            keys = ("step", "position_error", "energy_drift", "max_slip", "cpu_time")
+            table.add_row(*("–" if point[key] is None else f"{point[key]:.4g}" for key in keys), order)
+        console.print(table)
+        for line in _precision_lines(entry):
+            console.print(line, markup=False, highlight=False, soft_wrap=True)
+        for failure in entry["failures"]:
+            what = "" if failure["step"] is None else f"step {failure['step']:g}: "
+            console.print(f"{what}{failure['reason']}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+
+
+def _precision_lines(entry: Mapping[str, Any]) -> Iterator[str]:
+    if entry["richardson_error"] is not None:
+        yield (
+            f"limit of the steps: {entry['richardson_error']:.2g} m from the reference over {entry['window']:.4g} s, "
+            f"known to {entry['richardson_uncertainty']:.2g} m"
+        )
+    found = entry["eigenvalues"]
+    if found is not None:
+        yield f"its own eigenvalues: {found['error']:.2g} 1/s from the reference's at the most"

@@ -1,0 +1,139 @@
+"""One circular motion, with its contact forces, eigenvalues and stability."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...reference.bicycle import Bicycle
+from ...reference.circular import CircularMotion
+from ...reference.contact import observe
+from ...reference.families import find_motion
+from ...reference.kinematics import YAW
+from ...reference.stability import growth_rate, linearise
+from ...reference.surface import SurfaceOfRevolution
+from ..error import ScenarioError
+from ..scenario import name_surface
+
+
+@dataclass(frozen=True)
+class CircularSolution:
+    """A circular motion and what follows from it.
+
+    Parameters
+    ----------
+    motion : CircularMotion
+        The 21 constants of the motion (Xiong et al. 2020, Eqs. 9-14).
+    surface : SurfaceOfRevolution
+        The ground.
+    family : int or None
+        1 to 4; None on a curve that has no number.
+    contact_point : numpy.ndarray, shape (2, 3)
+        Contact points of the rear and the front wheel in the heading frame [m].
+    normal_force : numpy.ndarray, shape (2,)
+        Forces along the ground's normals on the rear and the front wheel [N].
+    energy : float
+        Kinetic and potential energy, with the datum z = 0 [J].
+    eigenvalues : numpy.ndarray, shape (7,)
+        Of the reduced linear system, sorted by real part, then imaginary part [1/s].
+    jacobian : numpy.ndarray, shape (7, 7)
+        Matrix of the reduced linear system (Eq. 17), variables in the order of `reference.stability.VARIABLES`.
+    growth_rate : float
+        Largest real part of the eigenvalues that symmetry leaves free [1/s].
+    """
+
+    motion: CircularMotion
+    surface: SurfaceOfRevolution = field(repr=False)
+    family: int | None
+    contact_point: np.ndarray = field(repr=False)
+    normal_force: np.ndarray
+    energy: float
+    eigenvalues: np.ndarray
+    jacobian: np.ndarray = field(repr=False)
+    growth_rate: float
+
+    @property
+    def lyapunov_stable(self) -> bool:
+        """Whether the motion is Lyapunov stable."""
+        return bool(self.growth_rate < 0)
+
+    @property
+    def physical(self) -> bool:
+        """Whether the ground pushes both wheels."""
+        return bool(np.all(self.normal_force > 0))
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the JSON document of `velodrome circular`."""
+        motion = self.motion
+        names = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch")
+        return {
+            **name_surface(self.surface),
+            "family": self.family,
+            **{name: getattr(motion, name) for name in names},
+            "position": motion.position.tolist(),
+            "contact_point": _by_wheel(self.contact_point),
+            "contact_force": _by_wheel(motion.force),
+            "normal_force": _by_wheel(self.normal_force),
+            "energy": self.energy,
+            "residual": motion.residual,
+            "eigenvalues": [[value.real, value.imag] for value in self.eigenvalues.tolist()],
+            "jacobian": self.jacobian.tolist(),
+            "lyapunov_stable": self.lyapunov_stable,
+            "physical": self.physical,
+        }
+
+
+def solve_circular(
+    bicycle: Bicycle,
+    surface: SurfaceOfRevolution,
+    rear_rate: float,
+    family: int | None = None,
+    near: tuple[float, float] | None = None,
+) -> CircularSolution:
+    """Compute one circular motion.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    surface : SurfaceOfRevolution
+        The ground.
+    rear_rate : float
+        Rate of the rear wheel, positive [rad/s].
+    family : int, optional
+        1 to 4. Either this or ``near`` is needed; both where a family has several motions at this rate.
+    near : tuple of float, optional
+        Lean and steer that the motion is near to [rad].
+
+    Returns
+    -------
+    CircularSolution
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such motion.
+    """
+    try:
+        number, motion = find_motion(bicycle, surface, rear_rate, family, near)
+        q, qd = motion.state()
+        reduced = linearise(bicycle, surface, q, qd)
+    except ValueError as error:
+        raise ScenarioError(str(error)) from error
+    seen = observe(bicycle, surface, q[None], qd[None])
+    return CircularSolution(
+        motion=motion,
+        surface=surface,
+        family=number,
+        contact_point=seen.point[0],
+        normal_force=np.einsum("wi,wi->w", motion.force, seen.normal[0]),
+        energy=float(seen.kinetic_energy[0] + seen.potential_energy[0]),
+        eigenvalues=reduced.eigenvalues,
+        jacobian=reduced.jacobian,
+        growth_rate=growth_rate(surface, reduced.eigenvalues, float(qd[YAW])),
+    )
+
+
+def _by_wheel(pair: np.ndarray) -> dict[str, Any]:
+    return dict(zip(("rear", "front"), pair.tolist(), strict=True))
