@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from velodrome.engines.engine import Engine, Problem, Progress, Trajectory, load_engine
+from velodrome.engines.engine import Engine, Problem, Progress, Settings, Trajectory, load_engine
 from velodrome.reference.kinematics import COORDINATES
 from velodrome.reports.measure import evaluate_ride
 
@@ -33,8 +33,27 @@ class Planted:
     before: Before
     after: After
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(object.__getattribute__(self, "inner"), name)
+    @property
+    def name(self) -> str:
+        return self.inner.name
+
+    @property
+    def version(self) -> str:
+        return self.inner.version
+
+    @property
+    def gives(self) -> tuple[str, ...]:
+        return self.inner.gives
+
+    @property
+    def settings(self) -> type[Settings]:
+        return self.inner.settings
+
+    def check(self, problem: Problem, settings: Any) -> None:
+        self.inner.check(problem, settings)
+
+    def step_noise(self, settings: Any) -> float:
+        return self.inner.step_noise(settings)
 
     def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
         """Run the changed problem and change what comes of it."""
@@ -91,6 +110,11 @@ def scaled_rate(name: str, factor: float, both: bool) -> Fault:
     return mapped(np.ones(9), np.ones(9), 1 / factors if both else np.ones(9), factors)
 
 
-def reported(change: Callable[[Trajectory, Problem, float], dict[str, Any]]) -> Fault:
+def reported(change: Callable[[Any, Problem, float], dict[str, Any]]) -> Fault:
     """Fields that are given otherwise than they are."""
     return same, lambda trajectory, problem, step: replace(trajectory, **change(trajectory, problem, step))
+
+
+def changed(*names: str, by: Callable[[np.ndarray], np.ndarray]) -> Fault:
+    """Fields that are given otherwise than they are, each by itself."""
+    return reported(lambda trajectory, *_: {name: by(getattr(trajectory, name)) for name in names})

@@ -21,9 +21,9 @@ from velodrome.testing import ConformanceReport, check_engine, examine_engine
 MEMBERS = ("name", "version", "gives", "settings", "check", "step_noise", "simulate")
 
 
-def variant(**members: Any) -> Any:
-    """The reference with other members."""
-    inner = load_engine(REFERENCE)
+def variant(name: str = REFERENCE, /, **members: Any) -> Any:
+    """An installed engine with other members."""
+    inner = load_engine(name)
     return SimpleNamespace(**{name: getattr(inner, name) for name in MEMBERS} | members)
 
 
@@ -153,10 +153,8 @@ def test_progress_that_falls_is_told() -> None:
 
 
 def test_refusals_are_judged() -> None:
-    inner = load_engine("exudyn")
-
     def with_check(check: Any) -> str:
-        engine = SimpleNamespace(**{name: getattr(inner, name) for name in MEMBERS} | {"check": check})
+        engine = variant("exudyn", check=check)
         return said(examine_engine(engine), "refusals")
 
     def fixed(kind: type[Exception], words: str) -> Any:
@@ -178,7 +176,7 @@ def test_refusals_are_judged() -> None:
     def all_grounds(problem: Problem, settings: Any) -> None:
         raise ValueError("not today")
 
-    engine = SimpleNamespace(**{name: getattr(inner, name) for name in MEMBERS} | {"check": all_grounds})
+    engine = variant("exudyn", check=all_grounds)
     assert "a ground that it does not know is an UnsuitableProblem" in said(examine_engine(engine), "grounds")
 
 
@@ -193,7 +191,7 @@ def test_samples_between_steps_are_held_to_their_times() -> None:
         times = np.round(problem.times[1] / settings.step) * settings.step * np.arange(len(problem.times))
         return replace(inner.simulate(replace(problem, times=times), settings, progress), time=problem.times)
 
-    engine = SimpleNamespace(**{name: getattr(inner, name) for name in MEMBERS} | {"check": check, "simulate": nearest})
+    engine = variant("exudyn", check=check, simulate=nearest)
     report = examine_engine(engine)
     assert "samples between its steps are off by" in said(report, "refusals")
     assert [one.name for one in report.failed] == ["refusals"]

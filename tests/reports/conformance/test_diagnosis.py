@@ -11,6 +11,7 @@ import pytest
 from planted import (
     Fault,
     Planted,
+    changed,
     mapped,
     mirrored,
     mirrored_back,
@@ -92,10 +93,6 @@ def sample_before(values: np.ndarray) -> np.ndarray:
     return np.concatenate([values[:1], values[:-1]])
 
 
-def forces(change: Any) -> Fault:
-    return reported(lambda trajectory, *_: {"contact_force": change(trajectory.contact_force)})
-
-
 def moved_frame(trajectory: Trajectory, problem: Problem, _step: float) -> dict[str, Any]:
     """The rear frame's position given by D."""
     position = trajectory.body_position.copy()
@@ -120,23 +117,23 @@ class Told:
 
 FAULTS = {
     "x, y, z, w": Told(
-        reported(lambda t, *_: {"body_quaternion": t.body_quaternion[..., [1, 2, 3, 0]]}),
+        changed("body_quaternion", by=lambda given: given[..., [1, 2, 3, 0]]),
         {"bodies"},
         "quaternions look to be in the order (x, y, z, w); the suite's is (w, x, y, z)",
     ),
     "conjugate quaternions": Told(
-        reported(lambda t, *_: {"body_quaternion": t.body_quaternion * [1, -1, -1, -1]}),
+        changed("body_quaternion", by=lambda given: given * [1, -1, -1, -1]),
         {"bodies"},
         "quaternions look to turn inertial axes to the body's",
     ),
     "bodies 1 mm high": Told(
-        reported(lambda t, *_: {"body_position": t.body_position + [0, 0, 1e-3]}),
+        changed("body_position", by=lambda given: given + np.array([0, 0, 1e-3])),
         {"bodies"},
         "all bodies look shifted by (0, 0, 0.001) m",
     ),
     "the frame by another point": Told(reported(moved_frame), {"bodies"}, "the rear frame looks given by a point"),
     "bodies in another order": Told(
-        reported(lambda t, *_: {"body_position": t.body_position[:, [1, 0, 2, 3]]}),
+        changed("body_position", by=lambda given: given[:, [1, 0, 2, 3]]),
         {"bodies"},
         "bodies look to be in the order front frame, rear frame, rear wheel, front wheel",
     ),
@@ -160,27 +157,29 @@ FAULTS = {
     ),
     "rates half a step late": Told(rates_late(0.5), {"rates"}, "s late"),
     "samples a step late": Told(reported(samples_late), {"clock", "order"}, "its samples look"),
-    "forces on the ground": Told(forces(lambda force: -force), {"forces"}, "with the wrong sign"),
-    "forces of the other wheel": Told(forces(lambda force: force[:, ::-1].copy()), {"forces"}, "of the other wheel"),
-    "forces in kilonewtons": Told(forces(lambda force: force / 1000), {"forces"}, "in kilonewtons"),
-    "forces by 1.01": Told(forces(lambda force: 1.01 * force), {"forces"}, "scaled by 1.01"),
+    "forces on the ground": Told(changed("contact_force", by=lambda force: -force), {"forces"}, "with the wrong sign"),
+    "forces of the other wheel": Told(
+        changed("contact_force", by=lambda force: force[:, ::-1].copy()), {"forces"}, "of the other wheel"
+    ),
+    "forces in kilonewtons": Told(
+        changed("contact_force", by=lambda force: force / 1000), {"forces"}, "in kilonewtons"
+    ),
+    "forces by 1.01": Told(changed("contact_force", by=lambda force: 1.01 * force), {"forces"}, "scaled by 1.01"),
     "forces without friction": Told(
-        forces(lambda force: force * [0, 0, 1]), {"forces"}, "without their tangential part"
+        changed("contact_force", by=lambda force: force * [0, 0, 1]), {"forces"}, "without their tangential part"
     ),
     "stale energies": Told(
-        reported(
-            lambda t, *_: {name: sample_before(getattr(t, name)) for name in ("kinetic_energy", "potential_energy")}
-        ),
+        changed("kinetic_energy", "potential_energy", by=sample_before),
         {"reports"},
         "kinetic energy looks stale, that of the sample before",
     ),
     "another datum": Told(
-        reported(lambda t, *_: {"potential_energy": t.potential_energy - 100.0}),
+        changed("potential_energy", by=lambda energy: energy - 100.0),
         {"reports"},
         "potential energy looks shifted by -100 J",
     ),
     "contact points of the other wheel": Told(
-        reported(lambda t, *_: {"contact_point": t.contact_point[:, ::-1].copy()}),
+        changed("contact_point", by=lambda point: point[:, ::-1].copy()),
         {"reports"},
         "contact point looks swapped between the rear and the front wheel",
     ),
@@ -314,7 +313,7 @@ def test_ground_that_is_ridden_as_a_plane_is_told() -> None:
 
 
 def test_the_error_lists_all_that_fails() -> None:
-    both = plant("exudyn", forces(lambda force: -force))
+    both = plant("exudyn", changed("contact_force", by=lambda force: -force))
     with pytest.raises(ConformanceError, match="engine 'exudyn' fails 2 of 23 checks") as caught:
         check_engine(both)
     assert isinstance(caught.value, AssertionError)
