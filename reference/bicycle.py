@@ -15,13 +15,13 @@ class Bicycle:
     """Geometry and mass distribution of the Whipple bicycle.
 
     The 25 parameters of Meijaard et al. (2007), Table 1, written for axes x forward, y left and
-    **z up** with the origin in the rear contact point of the upright bicycle: heights and the
-    products of inertia have the opposite sign of the table's. The defaults are the table's values.
+    **z up** with the origin at the rear contact point of the upright bicycle: heights and products
+    of inertia have the opposite sign to the table. The defaults are the table's values.
 
     Parameters
     ----------
     wheelbase, trail : float
-        Distance between the contact points, and trail [m].
+        Wheelbase (distance between the contact points) and trail [m].
     steer_axis_tilt : float
         Tilt of the steering axis from the vertical, backwards [rad].
     gravity : float
@@ -113,7 +113,7 @@ class Bicycle:
         return getattr(self, f"{body}_mass")
 
     def centre(self, body: str) -> np.ndarray:
-        """Centre of mass of a body at rest, shape (3,) [m], origin in the rear contact point."""
+        """Centre of mass of a body at rest, shape (3,) [m], with the origin at the rear contact point."""
         if body == "rear_wheel":
             return np.array([0.0, 0.0, self.rear_wheel_radius])
         if body == "front_wheel":
