@@ -205,7 +205,9 @@ def _four_still_line(evidence: Evidence, found: FoundMotion) -> Iterator[LedgerL
             _check_residual(found),
             evidence.searched_again(evidence.cases[0], _STEEP),
             Check(
-                "how near is the same, over the nearest two curves' distance", _SAME / _smallest_distance(found), 1.0
+                "distance of solutions that count as the same, over the smallest between two curves",
+                _SAME / _smallest_distance(found),
+                1.0,
             ),
         ],
     )

@@ -19,8 +19,8 @@ def unseen_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     yield untestable_line(
         section="2.1",
         claim="Table 1: the values of the 25 parameters",
-        why="the text lacks the table; every line is tested by the accelerations of Basu-Mandal et al., which show that "
-        "the bicycle is the benchmark's",
+        why="the text lacks the table; every line is tested by the accelerations of Basu-Mandal et al., which show "
+        "that the bicycle is the benchmark's",
         kind="number",
     )
     yield untestable_line(
