@@ -1,4 +1,4 @@
-"""What to set in MuJoCo for a wheel that rolls: `python benchmarks/mujoco_settings.py`.
+"""What to set in MuJoCo for a wheel that rolls: `python -m benchmarks.mujoco_settings`.
 
 Five tables: what a step costs beside MuJoCo's own step of the same tree, what single settings do to slip,
 energy and radius on a circle, the slip held against its law, the energy that integrators add, and the drifts
