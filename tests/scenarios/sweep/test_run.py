@@ -247,7 +247,7 @@ def test_another_time_limit_asks_for_the_rows_that_it_ended(tmp_path: Path) -> N
     out = tmp_path / "out"
     swept(planned(tmp_path, LEANING), out, slow(1))
     longer = planned(tmp_path, LEANING.replace("60.0", "600.0"))
-    with pytest.raises(ScenarioError, match=r"status timeout that are of time_limit 60\.0, .* by --retry timeout"):
+    with pytest.raises(ScenarioError, match=r"status timeout under time_limit 60\.0, .* with --retry timeout"):
         swept(longer, out, resume=True)
     assert run_sweep(longer, out, here, True, lambda *_: None, ["timeout"]).counts == {"reference": {"done": 4}}
     assert swept(longer, out, resume=True).stopped is None
