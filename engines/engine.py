@@ -19,6 +19,7 @@ from pydantic import BaseModel, ConfigDict
 from ..reference.bicycle import Bicycle
 from ..reference.surface import Surface
 from .guard import EngineError, GuardedEngine, call_engine, where_raised
+from .names import suggest_name
 
 ENTRY_POINT_GROUP = "velodrome.engines"
 REFERENCE = "reference"
@@ -293,7 +294,7 @@ def load_engine(name: str) -> Engine:
     """
     points = _announced()
     if name not in points:
-        raise ValueError(f"engine {name!r} is not installed; there are {', '.join(engine_names())}")
+        raise ValueError(f"engine {name!r} is not installed ({suggest_name(name, engine_names())})")
     where = f"engine {name!r}, announced as {points[name].value},"
     engine = None
     try:

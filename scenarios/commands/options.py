@@ -40,7 +40,17 @@ JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on s
 
 def parse_changes(change: list[str] | None, duration: float | None) -> dict[str, Any]:
     """Fields that --set and --duration override."""
-    changes = dict(_assignment(text) for text in change or [])
+    changes, faults = {}, []
+    for text in change or []:
+        try:
+            key, value = _assignment(text)
+            changes[key] = value
+        except ScenarioError as error:
+            faults.append(str(error))
+    if faults:
+        from ..scenario import join_complaints
+
+        raise ScenarioError(join_complaints(faults))
     if duration is not None:
         changes["simulation.duration"] = duration
     return changes

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...engines.engine import REFERENCE, Trajectory, load_engine, why_failed
+from ...engines.names import suggest_name
 from ...reference.surface import SurfaceOfRevolution
 from ...reports.drawing import assign_colours
 from ...reports.measure import ROUND_OFF, START_ERROR, Scale, cut_at_fall, evaluate_ride
@@ -65,7 +66,7 @@ def read_pair(first: Path, second: Path, engines: Sequence[str] | None = None) -
         raise ScenarioError(f"{first} and {second} have no engine in common")
     for engine in engines or []:
         if engine not in common:
-            raise ScenarioError(f"engine {engine!r} is not in both runs; there are {', '.join(common)}")
+            raise ScenarioError(f"engine {engine!r} is not in both runs ({suggest_name(engine, common)})")
     return Pair(scenarios[1], runs[0], runs[1], _ground(scenarios[1], runs[1]))
 
 

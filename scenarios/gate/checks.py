@@ -26,6 +26,7 @@ from ..scenario import (
     load_scenario,
     make_start,
     read_toml,
+    refuse_engine,
     show_value,
 )
 from .exact import find_exact
@@ -164,7 +165,7 @@ def _to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[str, Any
     names = [*there, *sorted({name for entries in known.values() for name in entries} - set(there))]
     for engine in wanted or []:
         if engine not in names:
-            raise ScenarioError(f"engine {engine!r} is not installed; there are {', '.join(there)}")
+            raise ScenarioError(refuse_engine(engine, there))
     return [name for name in names if not wanted or name in wanted]
 
 

@@ -110,7 +110,7 @@ def test_document_page_and_recording_are_written(folder: Path, halved: Path, tmp
 
 def test_one_engine_beside_the_reference(folder: Path, halved: Path) -> None:
     assert list(diff_runs(read_pair(folder, halved, [NATIVE]))["engines"]) == ["reference", NATIVE]
-    with pytest.raises(ScenarioError, match="engine 'exudyn' is not in both runs; there are reference"):
+    with pytest.raises(ScenarioError, match=r"engine 'exudyn' is not in both runs \(there are reference"):
         read_pair(folder, halved, ["exudyn"])
 
 

@@ -270,8 +270,8 @@ def test_the_criterion_is_the_energys_variation(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"engines.warp.step": 0.1}, "engine 'warp' is not installed; there are reference"),
-        ({"engines.mujoco-native.speed": 1}, "engines.mujoco-native: unknown key 'speed'; there are step"),
+        ({"engines.warp.step": 0.1}, r"engine 'warp' is not installed \(there are reference"),
+        ({"engines.mujoco-native.speed": 1}, r"engines.mujoco-native: unknown key 'speed' \(there are step"),
         ({"engines.mujoco-native.step": "0.002"}, "engines.mujoco-native.step: .* number"),
         ({"engines.mujoco-native.step": True}, "engines.mujoco-native.step: .* number"),
         ({"engines.mujoco-native.step": 0.003}, "engines.mujoco-native: step is 0.003; .* 0.0025"),
@@ -280,6 +280,27 @@ def test_the_criterion_is_the_energys_variation(tmp_path: Path) -> None:
 def test_a_bad_engine_table_never_reaches_the_engine(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(ScenarioError, match=words):
         plan(changes=changes)
+
+
+def test_all_that_is_wrong_with_engines_is_said_whether_they_ride_or_not() -> None:
+    changes = {
+        "engines.mujoco-default.stepp": 0.1,
+        "engines.exudyn.step": -1.0,
+        "engines.exudyn.solvr": "x",
+        "engines.reference.tolerance": 2,
+    }
+    with pytest.raises(ScenarioError) as caught:
+        plan_run(*load_scenario("q2", changes), ["exudin", NATIVE])
+    line = str(caught.value)
+    for words in (
+        "engine 'exudin' is not installed (did you mean 'exudyn'?)",
+        "engines.reference.tolerance: Input should be less",
+        "engines.mujoco-default: unknown key 'stepp' (did you mean 'step'?)",
+        "engines.exudyn.step: Input should be greater",
+        "engines.exudyn: unknown key 'solvr' (did you mean 'solver'?)",
+    ):
+        assert words in line
+    assert line.count("; ") == 4
 
 
 def test_only_wanted_engines_run_beside_the_reference() -> None:
