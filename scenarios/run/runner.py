@@ -18,7 +18,7 @@ from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, Unsuitabl
 from ...engines.storage import write_trajectory
 from ...reports.measure import ROUND_OFF, compute_metrics, cut_at_fall, evaluate_ride
 from ..error import ScenarioError
-from ..files import write_json, write_text
+from ..files import write_sealed, write_text
 from ..scenario import (
     Scenario,
     Start,
@@ -28,7 +28,7 @@ from ..scenario import (
     make_start,
     refuse_engine,
 )
-from .folder import RunPlan, new_folder, write_manifest, write_page, write_run_recording
+from .folder import RUN_VERSION, RunPlan, new_folder, resolve_scenario, write_manifest, write_page, write_run_recording
 from .installed import installed_engines
 
 # (engine, simulated time reached, duration)
@@ -129,7 +129,7 @@ def run_plan(
     Outcome
     """
     folder = new_folder(out, plan.name)
-    write_text(folder / "scenario.toml", tomli_w.dumps(plan.scenario.model_dump(exclude_none=True)))
+    write_text(folder / "scenario.toml", tomli_w.dumps(resolve_scenario(plan).model_dump(exclude_none=True)))
     trajectories: dict[str, Trajectory] = {}
     failures: dict[str, str] = {}
     interrupted = False
@@ -156,7 +156,7 @@ def run_plan(
         followed = {name: evaluate_ride(one, *where) for name, one in trajectories.items()}
         measured = measure_rides(plan, trajectories, followed)
         verdicts = judge_run(plan, measured)
-        write_json(folder / "metrics.json", measured)
+        write_sealed(folder / "metrics.json", measured, RUN_VERSION)
         shown = {name: cut_at_fall(one, *where) for name, one in followed.items()}
         write_run_recording(folder, plan, shown, measured, failures, verdicts)
         found = write_manifest(folder, plan, trajectories, failures, verdicts, complete=not interrupted)

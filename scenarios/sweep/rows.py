@@ -8,6 +8,7 @@ from typing import Any
 
 import pyarrow as pa
 
+from ...engines.storage import versioned_metadata
 from .plan import Task
 
 COMPUTED = ("done", "fell", "ended", "no-motion")
@@ -78,7 +79,7 @@ def flatten_metrics(metrics: Mapping[str, Any]) -> dict[str, Any]:
 def row_schema(tasks: Sequence[Task]) -> pa.Schema:
     """Columns of the data set beside the engine, which is the partition: facts, parameters, metrics."""
     fields = [*ROW_FACTS.items(), *_parameter_types(tasks).items(), *METRICS.items()]
-    return pa.schema([pa.field(name, kind) for name, kind in fields])
+    return pa.schema([pa.field(name, kind) for name, kind in fields], metadata=versioned_metadata({}))
 
 
 def _parameter_types(tasks: Iterable[Task]) -> dict[str, pa.DataType]:
