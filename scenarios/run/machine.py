@@ -48,9 +48,9 @@ def _git(folder: Path, *arguments: str) -> str | None:
 
 
 @cache
-def describe_machine() -> dict[str, Any]:
-    """Return the platform that results depend on, one text an entry; None where it is not known."""
-    return {
+def describe_machine() -> dict[str, str]:
+    """Return the platform that results depend on, one text an entry; what is not known has none."""
+    found = {
         "system": platform.platform(),
         "machine": platform.machine(),
         "processor": _processor(),
@@ -61,6 +61,7 @@ def describe_machine() -> dict[str, Any]:
         # Chooses OpenBLAS's kernels, and with them the last bits of results.
         "openblas_coretype": os.environ.get("OPENBLAS_CORETYPE"),
     }
+    return {name: text for name, text in found.items() if text is not None}
 
 
 def _processor() -> str | None:
