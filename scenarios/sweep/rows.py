@@ -8,6 +8,7 @@ from typing import Any
 
 import pyarrow as pa
 
+from ...engines.storage import versioned_metadata
 from .plan import Task
 
 COMPUTED = ("done", "fell", "ended", "no-motion")
@@ -65,7 +66,7 @@ TIMING: dict[str, pa.DataType] = {
 def row_schema(tasks: Sequence[Task]) -> pa.Schema:
     """Return the columns of the data set except the engine, which is the partition: facts, parameters, metrics."""
     fields = [*ROW_FACTS.items(), *_parameter_types(tasks).items(), *METRICS.items()]
-    return pa.schema([pa.field(name, kind) for name, kind in fields])
+    return pa.schema([pa.field(name, kind) for name, kind in fields], metadata=versioned_metadata({}))
 
 
 def _parameter_types(tasks: Iterable[Task]) -> dict[str, pa.DataType]:
