@@ -85,7 +85,7 @@ class CanonicalMatrices:
         blocks[:, 2:, :2] = -np.linalg.solve(self.M, self.gravity * self.K0 + speeds**2 * self.K2)
         blocks[:, 2:, 2:] = -np.linalg.solve(self.M, speeds * self.C1)
         values = np.linalg.eigvals(blocks).astype(complex)
-        return np.take_along_axis(values, np.lexsort((values.imag, values.real), axis=-1), axis=-1)
+        return np.take_along_axis(values, np.lexsort((np.imag(values), np.real(values)), axis=-1), axis=-1)
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ def speed_deviations(bicycle: Bicycle, uncertainties: Mapping[str, float]) -> di
             polynomial = _boundary_polynomials(perturbed)[place]
             # d(v^2) = -(dP/dp) / (dP/d(v^2)), at the root.
             change = np.polyval(polynomial, speed**2).imag / _COMPLEX_STEP
-            slope = -change / np.polyval(np.polyder(polynomial.real), speed**2) / (2 * speed)
+            slope = -change / np.polyval(np.polyder(np.real(polynomial)), speed**2) / (2 * speed)
             variance += float(slope * deviation) ** 2
         found[mode] = variance**0.5
     return found
