@@ -1,5 +1,6 @@
 """Scenario files: their schema, the surfaces they can name, and the start they describe."""
 
+from .bicycle_file import BicycleFile, read_bicycle_file
 from .schema import (
     OF_THE_MOTION,
     CircularTable,
@@ -26,6 +27,7 @@ from .table import (
 
 __all__ = [
     "OF_THE_MOTION",
+    "BicycleFile",
     "CircularTable",
     "Gate",
     "Scenario",
@@ -42,6 +44,7 @@ __all__ = [
     "name_surface",
     "parse_surface",
     "place_error",
+    "read_bicycle_file",
     "read_scenario_file",
     "read_toml",
     "refuse_unknown",
