@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from ...reference.bicycle import Bicycle
+from ...reference.bicycle import Bicycle, require_rigid_bodies
 from ..error import ScenarioError
 from .surfaces import SurfaceTable
 from .table import Table, UnknownName, format_validation_error, place_error, read_toml, show_value
@@ -146,7 +146,9 @@ class Scenario(Table):
         if unknown:
             names = ", ".join(Bicycle.__dataclass_fields__)
             raise UnknownName(f"bicycle parameter {show_value(repr(unknown[0]))} is unknown; there are {names}")
-        return Bicycle(**self.bicycle)
+        bicycle = Bicycle(**self.bicycle)
+        require_rigid_bodies(bicycle)
+        return bicycle
 
 
 def _line_of_text(text: str) -> str:
