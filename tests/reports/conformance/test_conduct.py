@@ -141,6 +141,11 @@ def test_a_ride_that_remembers_the_one_before_is_told() -> None:
     assert "its q differs by" in said(examine_engine(variant(simulate=remember)), "same bits")
 
 
+def test_what_is_listed_and_not_given_is_told() -> None:
+    engine = plant("exudyn", reported(lambda *_: {"slip": None}))
+    assert "it lists slip in gives, and gives None" in said(examine_engine(engine), "ride on plane")
+
+
 def test_progress_that_falls_is_told() -> None:
     inner = load_engine(REFERENCE)
 
