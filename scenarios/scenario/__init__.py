@@ -1,6 +1,8 @@
 """Scenario files: their schema, the surfaces they can name, and the start they describe."""
 
 from .engine_settings import configure_engine, list_engine_faults, refuse_engine
+from .parameters import PARAMETERS
+from .resolved import resolve_scenario
 from .schema import (
     OF_THE_MOTION,
     CircularTable,
@@ -27,6 +29,7 @@ from .table import (
 
 __all__ = [
     "OF_THE_MOTION",
+    "PARAMETERS",
     "CircularTable",
     "Gate",
     "Scenario",
@@ -49,6 +52,7 @@ __all__ = [
     "read_scenario_file",
     "read_toml",
     "refuse_engine",
+    "resolve_scenario",
     "show_value",
     "validate_scenario",
 ]

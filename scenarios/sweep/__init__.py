@@ -1,6 +1,7 @@
 """Many runs: a sweep file, its tasks, worker processes or a Dask cluster, one data set."""
 
 from .cluster import on_cluster
+from .file import SweepFile
 from .live import SweepView
 from .plan import plan_sweep
 from .rows import STATUSES
@@ -9,6 +10,7 @@ from .summary import resume_command, show_summary, status_of, summarise_sweep
 
 __all__ = [
     "STATUSES",
+    "SweepFile",
     "SweepView",
     "Work",
     "locally",
