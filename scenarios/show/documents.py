@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -62,10 +63,10 @@ def make_document(name: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``kind`` and ``name``. Of a ``scenario`` its tables as resolved: all parameters of the bicycle, and all
-        settings of all installed engines. Of an ``engine``: ``version``, ``package``, ``description``, ``gives``,
-        ``settings`` by name (see `FieldFacts`). Of the ``bicycle``: ``parameters``, ``units``, ``descriptions``. Of a
-        ``file``: ``tables`` (see `TableFacts`).
+        ``kind`` and ``name``. Of a ``scenario`` its tables as resolved, with all parameters of the bicycle and all
+        settings of all installed engines, and ``units`` by dotted key. Of an ``engine``: ``version``, ``package``,
+        ``description``, ``gives``, ``settings`` by name (see `FieldFacts`). Of the ``bicycle``: ``parameters``,
+        ``units``, ``descriptions``. Of a ``file``: ``tables`` (see `TableFacts`).
 
     Raises
     ------
@@ -120,4 +121,19 @@ def _scenario(source: str) -> dict[str, Any]:
         except ScenarioError:
             continue  # one that cannot be loaded; velodrome list says why
     resolved = resolve_scenario(scenario, settings).model_dump(mode="json", exclude_none=True)
-    return {"kind": "scenario", "name": name} | resolved
+    return {"kind": "scenario", "name": name} | resolved | {"units": _units(resolved)}
+
+
+def _units(resolved: Mapping[str, Any]) -> dict[str, str]:
+    """Units of a resolved scenario's numbers, by dotted key; pure numbers and words have none."""
+    found = {}
+    for table in list_tables(scenario_schema()):
+        values: Any = resolved
+        for key in table.name.split(".") if table.name else ():
+            values = values.get(key, {})
+        # Of several kinds of a table the one that it is of.
+        if table.kind is None or values.get("kind") == table.kind:
+            for key, field in table.fields.items():
+                if key in values and field.unit not in (None, "1"):
+                    found[f"{table.name}.{key}"] = field.unit
+    return found

@@ -42,8 +42,8 @@ class FieldFacts:
     description: str
 
     def as_json(self) -> dict[str, Any]:
-        """As a document has it."""
-        return asdict(self)
+        """As a document has it, with the range in words besides."""
+        return asdict(self) | {"range": self.range}
 
     @property
     def range(self) -> str:
