@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
 from .commands import (
     atlas_command,
+    bicycle_command,
     check_command,
     circular_command,
     critical_command,
@@ -22,6 +23,7 @@ from .commands import (
     list_command,
     paper_command,
     precision_command,
+    print_versions,
     run_command,
     run_supervised,
     show_command,
@@ -38,6 +40,29 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+
+def _print_versions(wanted: bool) -> None:
+    if wanted:
+        print_versions()
+        raise typer.Exit
+
+
+@app.callback()
+def _take_options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            callback=_print_versions,
+            is_eager=True,
+            help="Show the versions of the suite, its engines and libraries, and exit.",
+        ),
+    ] = False,
+) -> None:
+    pass
+
+
 # In the order of the help.
 for _command in (
     list_command,
@@ -47,6 +72,7 @@ for _command in (
     families_command,
     critical_command,
     atlas_command,
+    bicycle_command,
     paper_command,
     precision_command,
     diff_command,

@@ -1,5 +1,6 @@
 """The commands of `velodrome`; each imports what it needs, and none of them waits for the others'."""
 
+from .bicycle import bicycle_command
 from .check import check_command
 from .motions import atlas_command, circular_command, critical_command, families_command
 from .run import list_command, run_command
@@ -8,9 +9,11 @@ from .stored import diff_command, view_command
 from .studies import paper_command, precision_command
 from .supervision import run_supervised
 from .sweep import sweep_command
+from .version import print_versions
 
 __all__ = [
     "atlas_command",
+    "bicycle_command",
     "check_command",
     "circular_command",
     "critical_command",
@@ -19,6 +22,7 @@ __all__ = [
     "list_command",
     "paper_command",
     "precision_command",
+    "print_versions",
     "run_command",
     "run_supervised",
     "show_command",

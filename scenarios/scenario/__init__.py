@@ -1,5 +1,6 @@
 """Scenario files: their schema, the surfaces they can name, and the start they describe."""
 
+from .bicycle_file import BicycleFile, read_bicycle_file
 from .engine_settings import configure_engine, list_engine_faults, refuse_engine
 from .parameters import PARAMETERS
 from .resolved import resolve_scenario
@@ -14,7 +15,7 @@ from .schema import (
     read_scenario_file,
     validate_scenario,
 )
-from .start import Start, make_start
+from .start import Start, make_start, output_times
 from .surfaces import make_bowl, name_surface, parse_surface
 from .table import (
     Table,
@@ -30,6 +31,7 @@ from .table import (
 __all__ = [
     "OF_THE_MOTION",
     "PARAMETERS",
+    "BicycleFile",
     "CircularTable",
     "Gate",
     "Scenario",
@@ -47,8 +49,10 @@ __all__ = [
     "make_bowl",
     "make_start",
     "name_surface",
+    "output_times",
     "parse_surface",
     "place_error",
+    "read_bicycle_file",
     "read_scenario_file",
     "read_toml",
     "refuse_engine",

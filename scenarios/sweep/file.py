@@ -1,4 +1,4 @@
-"""The schema of a sweep file: a base scenario, engines, and what changes from run to run."""
+"""The schema of a sweep file: a base scenario, engines, and changes from run to run."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
 
 
 def flatten_table(table: Any) -> Any:
-    """Dotted keys for tables in tables: ``{"surface": {"alpha": 1}}`` becomes ``{"surface.alpha": 1}``."""
+    """Replace tables in tables by dotted keys: ``{"surface": {"alpha": 1}}`` becomes ``{"surface.alpha": 1}``."""
     if not isinstance(table, Mapping):
         return table  # the schema says what is wrong with it
     found: dict[str, Any] = {}
@@ -50,7 +50,7 @@ class Hypercube(Table):
     """Points of a Latin hypercube."""
 
     count: int = Field(ge=1, description="number of points")
-    seed: int = Field(ge=0, description="of the random numbers")
+    seed: int = Field(ge=0, description="seed of the random numbers")
     ranges: dict[str, _Range] = Field(
         min_length=1,
         description="scenario's keys, dotted or as tables, to [low, high]",

@@ -1,4 +1,4 @@
-"""From a sweep file to its tasks: everything bad input could break is found before anything runs."""
+"""From a sweep file to its tasks; all bad input is found before anything runs."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from ..scenario import (
 from .file import SweepFile, read_sweep
 from .points import count_points, make_points
 
-MOST_TASKS = 5_000_000  # tasks; some 2 GB in the planning process
-# Errors of pydantic that a value of the right type may have.
+MOST_TASKS = 5_000_000  # tasks; about 2 GB in the planning process
+# Types of pydantic's errors that a value of the right type may have.
 _OF_A_POINT = ("value_error", "greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")
 _TOLD = 20  # complaints after which the rest of the points is not looked at
 _CHECKED = 50  # kinds of runs whose engine is asked beforehand; each may need a motion, a tenth of a second
@@ -42,14 +42,14 @@ class Task:
     Attributes
     ----------
     index : int
-        Place in the sweep.
+        Index in the sweep.
     key : str
         Index and hash of the resolved run.
     engine : str
     changes : dict
-        Dotted key to value, of those that concern this engine.
+        Values by dotted key, of the changes that concern this engine.
     refused : str or None
-        Why there is nothing to run at this point; None if there is.
+        Why this point cannot be run; None if it can.
     """
 
     index: int
@@ -81,7 +81,7 @@ class SweepPlan:
     tasks: list[Task]
 
     def facts(self) -> dict[str, Any]:
-        """What must be the same for rows of two sessions to belong to one data set."""
+        """Return what must be the same for rows of two sessions to belong to one data set."""
         digest = hashlib.sha256()
         for task in self.tasks:
             digest.update(f"{task.key} {task.engine}\n".encode())
@@ -94,16 +94,16 @@ class SweepPlan:
 
 
 def plan_sweep(path: Path) -> SweepPlan:
-    """Read a sweep file, validate every run of it, number them.
+    """Read a sweep file, validate all its runs and number them.
 
-    Settings of one engine do not multiply the runs of another: runs that come out the same are one task. A point
-    that is none, such as a drawn inertia that no rigid body has, is a task that is refused.
+    Settings of one engine do not multiply the runs of another: equal runs are one task. An impossible point, such as a
+    drawn inertia that no rigid body has, becomes a task that is refused.
 
     Raises
     ------
     ScenarioError
-        With one line, if the file is wrong: a name that is none, a value that it states and that cannot be, or
-        nothing but points that are refused.
+        If the file is wrong, in one line: an unknown name, a stated value that is impossible, or only points that
+        are refused.
     """
     sweep, base = read_sweep(path)
     names = installed_engines()
@@ -146,12 +146,12 @@ def plan_sweep(path: Path) -> SweepPlan:
 
 
 def concerning(engine: str, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Changes without the settings of other engines; the reference's concern all, who are held against it."""
+    """Select the changes without settings of other engines; the reference's concern all, which are compared with it."""
     return {key: value for key, value in changes.items() if _engine_of(key) in (None, engine, REFERENCE)}
 
 
 def prune_settings(data: dict[str, Any], engine: str) -> dict[str, Any]:
-    """A scenario's data with the settings of this engine and the reference only."""
+    """Return a scenario's data with the settings of this engine and the reference only."""
     engines = data.get("engines", {})
     if not isinstance(engines, Mapping):
         return data
@@ -192,7 +192,7 @@ class _FileError(ScenarioError):
 
 
 class _Checker:
-    """Validates runs, each part once.
+    """Validate runs, each part only once.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ class _Checker:
     base : dict
         The base scenario as resolved.
     drawn : collection of str
-        Dotted keys whose values the file does not state: they are drawn.
+        Dotted keys of values that are not in the file but drawn.
     """
 
     def __init__(self, path: Path, base: dict[str, Any], drawn: Collection[str]) -> None:
@@ -210,7 +210,7 @@ class _Checker:
         self.first_refusal: dict[str, str] = {}
 
     def resolve(self, engine: str, changes: Mapping[str, Any]) -> tuple[str, str | None]:
-        """Validate a run; return the hash of what it is resolved to, and why it is refused, or None if it is not.
+        """Validate a run; return the hash of the resolved run, and why it is refused, or None if it is not.
 
         Raises
         ------
@@ -259,7 +259,7 @@ class _Checker:
             self._settings.add(text)
 
     def _ask(self, engine: str, scenario: Scenario, data: Mapping[str, Any]) -> None:
-        """Let the engine refuse a step that does not divide the output interval, and the like."""
+        """Raise what the engine refuses, such as a step that does not divide the output interval."""
         kind = canonical_text([engine, data["engines"].get(engine, {}), data["simulation"]])
         if kind not in self._kinds and len(self._kinds) < _CHECKED:
             self._kinds[kind] = _why_refused(engine, scenario)
@@ -268,16 +268,16 @@ class _Checker:
 
 
 def _why_refused(engine: str, scenario: Scenario) -> str | None:
-    """Ask an engine whether it takes a run; what only the run itself can tell is no refusal."""
+    """Return why an engine refuses a run, None if it does not; errors that only the run can show do not count."""
     try:
         problem = make_start(scenario).problem
     except ScenarioError:
-        return None  # a motion that does not exist is a row
+        return None  # a motion that does not exist becomes a row
     library, settings = configure_engine(engine, scenario.engines.get(engine, {}))
     try:
         library.check(problem, settings)
     except UnsuitableProblem:
-        return None  # so is ground that the engine does not know
+        return None  # so does ground that is unsuitable for the engine
     except ValueError as error:
         return f"engines.{engine}: {error}"
     except Exception:
@@ -302,5 +302,5 @@ def _is_of_file(cause: BaseException | None, stated: Collection[str], place: tup
 
 
 def canonical_text(data: Any) -> str:
-    """JSON of which there is one for equal data."""
+    """Return JSON that is the same for equal data."""
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
