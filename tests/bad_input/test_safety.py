@@ -86,7 +86,24 @@ def test_a_scenarios_name_stays_inside_the_output_folder(stem: str, tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    "name", ["../x", "a/b", "/tmp/x", "..", ".", "", "a\\b", "a\nb", "a b", "-x", ".x", "é", "x" * 65]
+    "name",
+    [
+        "../x",
+        "a/b",
+        "/tmp/x",
+        "..",
+        ".",
+        "",
+        "a\\b",
+        "a\nb",
+        "a b",
+        "-x",
+        ".x",
+        "é",
+        "x" * 65,
+        "sha256",
+        "schema_version",
+    ],
 )
 def test_an_engines_name_leads_no_file_elsewhere(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     bad = EntryPoint(name=name, value="velodrome.engines.lagrange:ENGINE", group=registry.ENTRY_POINT_GROUP)
