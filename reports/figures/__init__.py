@@ -1,4 +1,4 @@
-"""Figures on paper: solution families, the atlas, work-precision."""
+"""Figures for print: solution families, the atlas, work-precision."""
 
 from .atlas import growth_figure, stable_figure
 from .families import family_figure, solution_figure
