@@ -21,8 +21,10 @@ from ..reference.bicycle import BODIES
 from ..reference.kinematics import COORDINATES, WHEELS
 from .engine import REQUIRED, SHAPES, Trajectory
 from .files import write_whole
+from .format_version import VERSION_KEY, read_version
 
 METADATA_KEY, DIGEST_KEY = b"velodrome", b"velodrome-sha256"
+PARQUET_VERSION = 1  # of the metadata and the columns that they tell of
 
 
 class _Facts(BaseModel):
@@ -72,6 +74,11 @@ _LONGEST_REASON = 300  # letters of what a reader of damaged files says
 
 def write_trajectory(trajectory: Trajectory, path: Path) -> None:
     """Write a trajectory to ``path``, whole or not at all."""
+    _write_table(trajectory_table(trajectory), path)
+
+
+def trajectory_table(trajectory: Trajectory) -> pa.Table:
+    """Return a trajectory as a table: its columns with their units, the rest in the schema's metadata."""
     found = []
     for name, names in trajectory_columns():
         value = getattr(trajectory, name)
@@ -79,7 +86,7 @@ def write_trajectory(trajectory: Trajectory, path: Path) -> None:
             continue
         flat = np.asarray(value, float).reshape(len(trajectory.time), len(names))
         found += [(column, flat[:, j], unit) for j, (column, unit) in enumerate(names)]
-    write_columns(found, path, {key: getattr(trajectory, key) for key in STORED_FACTS})
+    return _make_table(found, {key: getattr(trajectory, key) for key in STORED_FACTS})
 
 
 def write_columns(
@@ -93,19 +100,31 @@ def write_columns(
         Name, values of shape (n,), unit.
     path : Path
     facts : mapping
-        JSON values for the schema's metadata.
+        JSON values for the schema's metadata, which get the format's version besides.
     **options
         Of `pyarrow.parquet.write_table`.
     """
+    _write_table(_make_table(columns, facts), path, **options)
+
+
+def _make_table(columns: Iterable[tuple[str, np.ndarray, str | None]], facts: Mapping[str, Any]) -> pa.Table:
     fields, arrays = [], []
     for name, values, unit in columns:
         metadata = None if unit is None else {b"unit": unit.encode()}
         arrays.append(pa.array(np.ascontiguousarray(values)))
         fields.append(pa.field(name, arrays[-1].type, nullable=False, metadata=metadata))
-    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata={METADATA_KEY: json.dumps(facts).encode()}))
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=versioned_metadata(facts)))
+
+
+def _write_table(table: pa.Table, path: Path, **options: Any) -> None:
     sealed = {**(table.schema.metadata or {}), DIGEST_KEY: digest(table)}
     with write_whole(path) as partial:
         pq.write_table(table.replace_schema_metadata(sealed), partial, **options)
+
+
+def versioned_metadata(facts: Mapping[str, Any]) -> dict[bytes, bytes]:
+    """Metadata of a Parquet schema: facts with the format's version."""
+    return {METADATA_KEY: json.dumps({VERSION_KEY: PARQUET_VERSION, **facts}).encode()}
 
 
 def digest(table: pa.Table) -> bytes:
@@ -127,8 +146,8 @@ def read_trajectory(path: Path) -> Trajectory:
     Raises
     ------
     ValueError
-        If the file is not a trajectory, not a whole one, or was altered since it was written. Only files of
-        earlier versions carry no digest.
+        If the file is not a trajectory, not a whole one, of a newer format, or was altered since it was written. Only
+        files of earlier versions carry no digest.
     """
     table = _table(path)
     facts = _facts(table, path)
@@ -157,13 +176,29 @@ def _table(path: Path) -> pa.Table:
 
 def _facts(table: pa.Table, path: Path) -> _Facts:
     try:
-        return _Facts.model_validate(json.loads((table.schema.metadata or {})[METADATA_KEY]))
+        found = json.loads((table.schema.metadata or {})[METADATA_KEY])
+        if isinstance(found, dict):
+            _refuse_newer(found, path)
+        return _Facts.model_validate(found)
+    except _NewerFormat:
+        raise
     except (KeyError, ValueError, RecursionError) as error:
         what = ""
         if isinstance(error, ValidationError):
             first = error.errors()[0]
             what = f" ({'.'.join(str(part) for part in first['loc'])}: {first['msg']})"
         raise ValueError(f"{path} is not a trajectory: its schema has no whole velodrome metadata{what}") from error
+
+
+class _NewerFormat(ValueError):
+    """A file of a format that this version does not know."""
+
+
+def _refuse_newer(facts: Mapping[str, Any], path: Path) -> None:
+    try:
+        read_version(facts, PARQUET_VERSION)
+    except ValueError as error:
+        raise _NewerFormat(f"{path} cannot be read as a trajectory: {error}") from error
 
 
 def _field(table: pa.Table, name: str, names: list[tuple[str, str]], path: Path) -> np.ndarray | None:

@@ -1,13 +1,13 @@
 """Measurements on rides: errors, drift, falls, friction, modes, orders, and what round-off allows them to differ by."""
 
 from .consistency import LARGEST_NOISE, TURNING, Mismatch, describe_mismatch, evaluate_ride, find_mismatches
-from .convergence import observed_orders
+from .convergence import extrapolate, observed_orders
 from .fall import cut_at_fall, fell_at, until_fall
 from .friction import normal_force, required_friction
 from .identify import DISTURBANCES, IDENTIFY_LEVELS, STENCIL_WEIGHT, Identified, identify, interval_of, jacobian_at
 from .inspection import relative_differences, rms_force_error, state_error
 from .limits import ROUND_OFF, START_ERROR, Scale, eigenvalue_limits, noise, order_limit, ride_limits, step_force
-from .metrics import compute_metrics, position_errors, to_number
+from .metrics import compute_metrics, flatten_metrics, position_errors, to_number
 from .modes import Mode, Modes, find_modes
 from .precision import (
     SAME_BITS,
@@ -45,9 +45,11 @@ __all__ = [
     "eigenvalue_pairs",
     "engine_document",
     "evaluate_ride",
+    "extrapolate",
     "fell_at",
     "find_mismatches",
     "find_modes",
+    "flatten_metrics",
     "identify",
     "interval_of",
     "jacobian_at",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from ...engines.engine import REFERENCE, Trajectory, load_engine, why_failed
+from ...engines.names import suggest_name
 from ...reference.surface import SurfaceOfRevolution
 from ...reports.drawing import assign_colours
 from ...reports.measure import ROUND_OFF, START_ERROR, Scale, cut_at_fall, evaluate_ride
 from ..error import ScenarioError
 from ..files import make_folder, write_json, write_text
-from ..run import configure_engine, find_part, installed_engines, read_document, read_ride
+from ..run import configure_engine, find_part, installed_engines, read_document, read_ride, read_start_state
 from ..scenario import OF_THE_MOTION, CircularTable, Scenario, load_scenario, make_start
 from .differences import DIFFERS, StoredGround, StoredRun, diff_document
 from .markdown import diff_markdown
@@ -66,13 +67,13 @@ def read_pair(first: Path, second: Path, engines: Sequence[str] | None = None) -
         raise ScenarioError(f"{first} and {second} have no engine in common")
     for engine in engines or []:
         if engine not in common:
-            raise ScenarioError(f"engine {engine!r} is not in both runs; there are {', '.join(common)}")
+            raise ScenarioError(f"engine {engine!r} is not in both runs ({suggest_name(engine, common)})")
     return Pair(scenarios[1], runs[0], runs[1], _ground(scenarios[1], runs[1]))
 
 
 def _same_scenario(before: Scenario, after: Scenario, first: Path, second: Path) -> None:
     for name in (*OF_THE_MOTION, "simulation"):
-        tables = [scenario.model_dump(include={name})[name] for scenario in (before, after)]
+        tables = [_dump_table(scenario, name) for scenario in (before, after)]
         for key in dict.fromkeys(table_key for table in tables for table_key in table):
             values = [table.get(key) for table in tables]
             if values[0] != values[1]:
@@ -82,13 +83,18 @@ def _same_scenario(before: Scenario, after: Scenario, first: Path, second: Path)
                 raise ScenarioError(f"{first} and {second}: {what}: {name}.{key} {said}")
 
 
+def _dump_table(scenario: Scenario, name: str) -> dict[str, Any]:
+    """A table of a scenario; the bicycle's with all parameters, which folders of earlier versions do not state."""
+    return asdict(scenario.make_bicycle()) if name == "bicycle" else scenario.model_dump(include={name})[name]
+
+
 def _read(folder: Path, name: str, engines: Sequence[str] | None) -> StoredRun:
     manifest, metrics = read_document(folder, "manifest.json"), read_document(folder, "metrics.json")
     try:
         entries = {engine: manifest["engines"][engine] for engine in manifest["engines"] if _chosen(engine, engines)}
         _ = [manifest[key] for key in ("title", "scenario", "created", "complete", "libraries", "platform")]
         _ = [(entry["version"], dict(entry["settings"])) for entry in entries.values()]
-        _ = [float(manifest["start"]["growth_rate"]), *_state(manifest)]
+        _ = [float(manifest["start"]["growth_rate"]), *read_start_state(manifest)]
         rides = {engine: read_ride(folder, manifest, metrics, engine) for engine in entries if engine in metrics}
     except ScenarioError:
         raise
@@ -103,15 +109,10 @@ def _chosen(engine: str, engines: Sequence[str] | None) -> bool:
     return not engines or engine == REFERENCE or engine in engines
 
 
-def _state(manifest: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    q, qd = (np.array(manifest["start"][key], float) for key in ("q", "qd"))
-    if q.shape != (9,) or qd.shape != (9,):
-        raise ValueError("a start has nine coordinates and nine rates")
-    return q, qd
-
-
 def _same_start(before: StoredRun, after: StoredRun, first: Path, second: Path) -> None:
-    for a, b, what in zip(_state(before.manifest), _state(after.manifest), ("coordinates", "rates"), strict=True):
+    for a, b, what in zip(
+        read_start_state(before.manifest), read_start_state(after.manifest), ("coordinates", "rates"), strict=True
+    ):
         apart = np.abs(b - a)
         # Each start is a root known to this accuracy; the stored numbers do not show which of them is right.
         if np.any(apart > START_ERROR * (1 + np.abs(a))):
@@ -127,7 +128,7 @@ def _same_start(before: StoredRun, after: StoredRun, first: Path, second: Path) 
 
 
 def _ground(scenario: Scenario, run: StoredRun) -> StoredGround:
-    bicycle, (q, qd) = scenario.make_bicycle(), _state(run.manifest)
+    bicycle, (q, qd) = scenario.make_bicycle(), read_start_state(run.manifest)
     circular = isinstance(scenario.motion, CircularTable)
     radius = float(np.hypot(q[0], q[1])) if circular else bicycle.wheelbase
     growth_rate = float(run.manifest["start"]["growth_rate"])

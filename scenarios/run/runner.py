@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import threading
 from collections.abc import Callable, Mapping
@@ -13,17 +12,23 @@ from typing import Any
 
 import numpy as np
 import tomli_w
-from pydantic import ValidationError
 
 from ...engines.admission import ride_engine
-from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, load_engine, why_failed
-from ...engines.guard import call_engine
+from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, why_failed
 from ...engines.storage import write_trajectory
 from ...reports.measure import ROUND_OFF, compute_metrics, cut_at_fall, evaluate_ride
 from ..error import ScenarioError
-from ..files import write_json, write_text
-from ..scenario import Scenario, Start, format_validation_error, make_start, refuse_unknown
-from .folder import RunPlan, new_folder, write_manifest, write_page, write_run_recording
+from ..files import write_sealed, write_text
+from ..scenario import (
+    Scenario,
+    Start,
+    configure_engine,
+    join_complaints,
+    list_engine_faults,
+    make_start,
+    refuse_engine,
+)
+from .folder import RUN_VERSION, RunPlan, new_folder, resolve_scenario, write_manifest, write_page, write_run_recording
 from .installed import installed_engines
 
 # (engine, simulated time reached, duration)
@@ -55,6 +60,46 @@ class RunOutcome:
     interrupted: bool
 
 
+@dataclass(frozen=True)
+class Rides:
+    """What the engines of a plan gave.
+
+    Attributes
+    ----------
+    trajectories : dict
+        By engine, in the order in which they rode.
+    failures : dict
+        Engines that gave no trajectory, with the reason.
+    interrupted : bool
+    """
+
+    trajectories: dict[str, Trajectory]
+    failures: dict[str, str]
+    interrupted: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunResult:
+    """The rides of a plan, measured and judged.
+
+    Attributes
+    ----------
+    trajectories : dict
+        By engine, as the engines gave them.
+    shown : dict
+        The same as they are drawn: with poses and energies that follow from the coordinates, up to a fall.
+    metrics, failures, verdicts, interrupted
+        As in `RunOutcome`.
+    """
+
+    trajectories: dict[str, Trajectory]
+    shown: dict[str, Trajectory]
+    metrics: dict[str, dict[str, Any]]
+    failures: dict[str, str]
+    verdicts: list[dict[str, Any]]
+    interrupted: bool
+
+
 def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> RunPlan:
     """Check engines and settings and compute the start.
 
@@ -71,11 +116,19 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
         If an engine is not installed, a setting is wrong, or the motion does not exist.
     """
     there = installed_engines()
-    for engine in [*(wanted or []), *scenario.engines]:
-        if engine not in there:
-            raise ScenarioError(f"engine {engine!r} is not installed; there are {', '.join(there)}")
+    faults = [refuse_engine(engine, there) for engine in wanted or [] if engine not in there]
     names = [engine for engine in there if engine == REFERENCE or not wanted or engine in wanted]
-    chosen = {engine: configure_engine(engine, scenario.engines.get(engine, {})) for engine in names}
+    chosen: dict[str, tuple[Engine, Settings]] = {}
+    cause: BaseException | None = None
+    for engine in names:
+        try:
+            chosen[engine] = configure_engine(engine, scenario.engines.get(engine, {}))
+        except ScenarioError as error:
+            faults.append(str(error))
+            cause = cause or error.__cause__ or error  # --traceback shows it
+    faults += list_engine_faults(scenario.engines, skipped=names)
+    if faults:
+        raise ScenarioError(join_complaints(faults)) from cause
     start = make_start(scenario)
     left_out: dict[str, str] = {}
     for engine, (library, settings) in chosen.items():
@@ -91,31 +144,6 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
     return RunPlan(name, scenario, start, chosen, left_out)
 
 
-def configure_engine(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
-    """Load an engine and validate its settings.
-
-    Raises
-    ------
-    ScenarioError
-        If it is no engine, or a setting is unknown or out of range.
-    """
-    try:
-        engine = load_engine(name)
-    except ValueError as error:
-        raise ScenarioError(" ".join(str(error).split())) from error
-    try:
-        refuse_unknown(values, engine.settings.model_fields)
-        # As JSON: strictness would refuse a TOML array where a setting is a tuple.
-        text = json.dumps(dict(values), default=str)
-        return engine, call_engine(engine.settings.model_validate_json, text, strict=True)
-    except ValidationError as error:
-        raise ScenarioError(f"engines.{name}.{format_validation_error(error)}") from error
-    except ValueError as error:
-        raise ScenarioError(f"engines.{name}: {error}") from error
-    except Exception as error:  # settings may have code of their own
-        raise ScenarioError(f"engines.{name}: its settings failed: {why_failed(error)}") from error
-
-
 def run_plan(
     plan: RunPlan, out: Path, watch: RunWatch, note: Callable[[str], None], trace: Trace | None = None
 ) -> RunOutcome:
@@ -126,7 +154,7 @@ def run_plan(
 
     Parameters
     ----------
-    plan : Plan
+    plan : RunPlan
     out : Path
         Folder that the run folder is made in.
     watch : callable
@@ -138,42 +166,95 @@ def run_plan(
 
     Returns
     -------
-    Outcome
+    RunOutcome
+    """
+    folder, result = store_run(plan, out, watch, note, trace)
+    return RunOutcome(folder, result.metrics, result.failures, result.verdicts, result.interrupted)
+
+
+def store_run(
+    plan: RunPlan, out: Path, watch: RunWatch, note: Callable[[str], None], trace: Trace | None = None
+) -> tuple[Path, RunResult]:
+    """Run every engine of a plan and write the run folder; return the folder and all that was computed.
+
+    See `run_plan` for the parameters.
     """
     folder = new_folder(out, plan.name)
-    write_text(folder / "scenario.toml", tomli_w.dumps(plan.scenario.model_dump(exclude_none=True)))
-    trajectories: dict[str, Trajectory] = {}
-    failures: dict[str, str] = {}
-    interrupted = False
-    write_manifest(folder, plan, trajectories, failures)
+    write_text(folder / "scenario.toml", tomli_w.dumps(resolve_scenario(plan).model_dump(exclude_none=True)))
+    write_manifest(folder, plan, {}, {})
+
+    def store(name: str, rides: Rides) -> None:
+        if name in rides.trajectories:
+            write_trajectory(rides.trajectories[name], folder / f"{name}.parquet")
+        write_manifest(folder, plan, rides.trajectories, rides.failures)
+
+    rides = ride_plan(plan, watch, note, trace, store)
+    with _deaf_to_interrupts():
+        result = measure_run(plan, rides)
+        write_sealed(folder / "metrics.json", result.metrics, RUN_VERSION)
+        write_run_recording(folder, plan, result.shown, result.metrics, result.failures, result.verdicts)
+        complete = not result.interrupted
+        found = write_manifest(folder, plan, result.trajectories, result.failures, result.verdicts, complete=complete)
+        write_page(folder, plan, result.shown, result.metrics, found)
+    return folder, result
+
+
+def ride_plan(
+    plan: RunPlan,
+    watch: RunWatch,
+    note: Callable[[str], None],
+    trace: Trace | None = None,
+    store: Callable[[str, Rides], None] | None = None,
+) -> Rides:
+    """Ride every engine of a plan.
+
+    Parameters
+    ----------
+    plan : RunPlan
+    watch, note, trace : callable
+        As `run_plan` takes them.
+    store : callable, optional
+        Called with an engine's name and the rides so far when the engine is done or has failed.
+
+    Returns
+    -------
+    Rides
+        Of the engines that were done before Ctrl-C was pressed, if it was.
+    """
+    rides = Rides({}, {})
     problem, duration = plan.start.problem, plan.scenario.simulation.duration
     try:
         for name, (engine, settings) in plan.engines.items():
             try:
                 trajectory = ride_engine(engine, problem, settings, lambda t, name=name: watch(name, t, duration))
             except Exception as error:  # whatever an engine raises must not cost the others' results
-                failures[name] = why_failed(error)
-                note(f"{name}: {failures[name]}")
+                rides.failures[name] = why_failed(error)
+                note(f"{name}: {rides.failures[name]}")
                 if trace is not None:
                     trace(name, error)
             else:
-                write_trajectory(trajectory, folder / f"{name}.parquet")
-                trajectories[name] = trajectory
-            write_manifest(folder, plan, trajectories, failures)
+                rides.trajectories[name] = trajectory
+            if store is not None:
+                store(name, rides)
     except KeyboardInterrupt:
-        interrupted = True
         note("interrupted: finished engines are kept")
-    with _deaf_to_interrupts():
-        where = (problem.bicycle, problem.surface)
-        followed = {name: evaluate_ride(one, *where) for name, one in trajectories.items()}
-        measured = measure_rides(plan, trajectories, followed)
-        verdicts = judge_run(plan, measured)
-        write_json(folder / "metrics.json", measured)
-        shown = {name: cut_at_fall(one, *where) for name, one in followed.items()}
-        write_run_recording(folder, plan, shown, measured, failures, verdicts)
-        found = write_manifest(folder, plan, trajectories, failures, verdicts, complete=not interrupted)
-        write_page(folder, plan, shown, measured, found)
-    return RunOutcome(folder, measured, failures, verdicts, interrupted)
+        return Rides(rides.trajectories, rides.failures, interrupted=True)
+    return rides
+
+
+def measure_run(plan: RunPlan, rides: Rides) -> RunResult:
+    """Measure and judge the rides of a plan."""
+    where = (plan.start.problem.bicycle, plan.start.problem.surface)
+    followed = {name: evaluate_ride(one, *where) for name, one in rides.trajectories.items()}
+    metrics = measure_rides(plan, rides.trajectories, followed)
+    return RunResult(
+        trajectories=rides.trajectories,
+        shown={name: cut_at_fall(one, *where) for name, one in followed.items()},
+        metrics=metrics,
+        failures=rides.failures,
+        verdicts=judge_run(plan, metrics),
+        interrupted=rides.interrupted,
+    )
 
 
 def measure_one(

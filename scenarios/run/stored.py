@@ -7,10 +7,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...engines.engine import Trajectory
+from ...engines.format_version import VERSION_KEY, read_version
 from ...engines.storage import read_trajectory
 from ..error import ScenarioError
+from ..files import DIGEST_KEY, content_digest
 from ..scenario import show_value
+from .folder import RUN_VERSION
 
 
 def find_part(folder: Path, name: str) -> Path:
@@ -31,12 +36,14 @@ def find_part(folder: Path, name: str) -> Path:
 
 
 def read_document(folder: Path, name: str) -> Mapping[str, Any]:
-    """A JSON object of a run folder.
+    """A JSON object of a run folder, without its version and its digest.
+
+    Folders of before there were versions have neither and are read as they stand.
 
     Raises
     ------
     ScenarioError
-        If it is missing, cannot be read, or is something else.
+        If it is missing, cannot be read, is something else, of a newer format, or was changed since it was written.
     """
     path = find_part(folder, name)
     try:
@@ -47,7 +54,17 @@ def read_document(folder: Path, name: str) -> Mapping[str, Any]:
         raise ScenarioError(f"{path}: not a JSON document: {' '.join(str(error).split())}") from error
     if not isinstance(found, dict):
         raise ScenarioError(f"{path}: not a JSON object")
-    return found
+    try:
+        version = read_version(found, RUN_VERSION)
+    except ValueError as error:
+        raise ScenarioError(f"{path}: {error}") from error
+    sealed = version > 1 or DIGEST_KEY in found
+    if sealed and found.get(DIGEST_KEY) != content_digest(found):
+        raise ScenarioError(
+            f"{path}: was changed since it was written: its contents do not match their digest; "
+            "run the scenario again, or take the folder from where it is whole"
+        )
+    return {key: value for key, value in found.items() if key not in (VERSION_KEY, DIGEST_KEY)}
 
 
 def read_json(path: Path) -> Any:
@@ -71,6 +88,20 @@ def read_json(path: Path) -> Any:
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
     return found
+
+
+def read_start_state(manifest: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates and rates at the start of a stored run, shapes (9,).
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If the manifest does not have them.
+    """
+    q, qd = (np.array(manifest["start"][key], float) for key in ("q", "qd"))
+    if q.shape != (9,) or qd.shape != (9,):
+        raise ValueError("a start has nine coordinates and nine rates")
+    return q, qd
 
 
 def read_ride(folder: Path, manifest: Mapping[str, Any], metrics: Mapping[str, Any], engine: str) -> Trajectory:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pyarrow as pa
 
+from ...engines.storage import versioned_metadata
 from .plan import Task
 
 COMPUTED = ("done", "fell", "ended", "no-motion")
@@ -62,23 +63,10 @@ TIMING: dict[str, pa.DataType] = {
 }
 
 
-def flatten_metrics(metrics: Mapping[str, Any]) -> dict[str, Any]:
-    """Metrics as columns: ``position_error`` becomes ``position_error_max`` and ``_end``, names one text or None."""
-    found: dict[str, Any] = {}
-    for name, value in metrics.items():
-        if isinstance(value, Mapping):
-            found |= {f"{name}_{part}": number for part, number in value.items()}
-        elif isinstance(value, list):
-            found[name] = ", ".join(part if isinstance(part, str) else part["quantity"] for part in value) or None
-        else:
-            found[name] = value
-    return found
-
-
 def row_schema(tasks: Sequence[Task]) -> pa.Schema:
     """Return the columns of the data set except the engine, which is the partition: facts, parameters, metrics."""
     fields = [*ROW_FACTS.items(), *_parameter_types(tasks).items(), *METRICS.items()]
-    return pa.schema([pa.field(name, kind) for name, kind in fields])
+    return pa.schema([pa.field(name, kind) for name, kind in fields], metadata=versioned_metadata({}))
 
 
 def _parameter_types(tasks: Iterable[Task]) -> dict[str, pa.DataType]:

@@ -14,6 +14,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ...engines.files import write_whole
+from ...engines.format_version import VERSION_KEY, read_version
+from ...engines.storage import versioned_metadata
 from ..error import ScenarioError
 from ..files import make_folder, write_json
 from ..run import read_json
@@ -23,7 +25,7 @@ from .rows import TIMING, make_record, row_schema
 
 MANIFEST, JOURNAL, RESULTS, TIMINGS = "sweep.json", "journal.txt", "results", "timing.parquet"
 _BLOCK = 20_000  # rows of a row group
-_FORMAT = 2  # of the manifest and the journal
+SWEEP_VERSION = 2  # of the manifest, the journal and the data set; earlier, "format" says it
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ def open_folder(out: Path, plan: SweepPlan, resume: bool) -> Opened:
 
 def write_sweep_manifest(out: Path, plan: SweepPlan, opened: Opened, complete: bool) -> None:
     """Write what the folder's rows are of, and whether all are there."""
-    found = {"format": _FORMAT, "key": opened.key} | opened.facts | {"limits": opened.limits}
+    found = {VERSION_KEY: SWEEP_VERSION, "key": opened.key} | opened.facts | {"limits": opened.limits}
     write_json(out / MANIFEST, found | {"title": plan.file.title, "complete": complete})
 
 
@@ -108,6 +110,10 @@ def _manifest(path: Path) -> dict[str, Any]:
         raise ScenarioError(f"{path}: is not of a sweep: {error}") from error
     if not isinstance(found, dict):
         raise ScenarioError(f"{path}: is not of a sweep")
+    try:
+        read_version(found, SWEEP_VERSION)
+    except ValueError as error:
+        raise ScenarioError(f"{path}: {error}") from error
     return found
 
 
@@ -123,7 +129,8 @@ def _same(path: Path, then: Mapping[str, Any], now: Mapping[str, Any]) -> None:
                     f"{path.parent}: was begun with {name} {old[name]}, but {new[name]} is installed: "
                     "their rows cannot be mixed"
                 )
-    if then.get("format") != _FORMAT or not isinstance(then.get("limits"), dict) or "key" not in then:
+    version = then.get(VERSION_KEY, then.get("format"))
+    if version != SWEEP_VERSION or not isinstance(then.get("limits"), dict) or "key" not in then:
         raise ScenarioError(
             f"{path.parent}: was begun by another version of velodrome, whose rows do not name their sweep; "
             "start it again in another folder by --out"
@@ -158,7 +165,7 @@ def write_results(out: Path, plan: SweepPlan, opened: Opened) -> None:
             _write(part, columns, found)
         every = ((task, line_at(journal, offset)) for task, offset in done)
         clocks = ({"key": task.key, "index": task.index, "engine": task.engine, **line.timing} for task, line in every)
-        _write(out / TIMINGS, pa.schema(list(TIMING.items())), clocks)
+        _write(out / TIMINGS, pa.schema(list(TIMING.items()), metadata=versioned_metadata({})), clocks)
     write_sweep_manifest(out, plan, replace(opened, limits=_limits(plan)), complete=True)
 
 

@@ -13,9 +13,11 @@ import pytest
 from altered import CONTRADICTIONS, Altered, raising
 from typer.testing import CliRunner
 
+from tests.sealing import contents
 from velodrome.engines import engine as registry
 from velodrome.engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory, engine_names
 from velodrome.reports.drawing.summary import make_remarks
+from velodrome.reports.measure import flatten_metrics
 from velodrome.reports.measure.consistency import describe_mismatch
 from velodrome.scenarios.cli import app
 from velodrome.scenarios.gate import checks as gate
@@ -23,7 +25,6 @@ from velodrome.scenarios.gate import sample as gate_sample
 from velodrome.scenarios.run.folder import RunPlan
 from velodrome.scenarios.run.runner import configure_engine, plan_run, run_plan
 from velodrome.scenarios.scenario.schema import Gate, library_names, load_scenario
-from velodrome.scenarios.sweep.rows import flatten_metrics
 
 OWN = "own"
 HONEST = [("q2-plus", 1.0), ("iftomm-2", 1.0), ("plane-circle", 0.3)]
@@ -47,7 +48,7 @@ def test_a_run_names_every_report_that_contradicts_the_coordinates(what: str, tm
     inner, _ = configure_engine(REFERENCE, {})
     outcome = run_plan(plan_with(Altered(inner, after=after, called=OWN)), tmp_path, lambda *_: None, lambda _: None)
     assert not outcome.failures
-    measured = json.loads((outcome.folder / "metrics.json").read_text())
+    measured = contents(outcome.folder / "metrics.json")
     assert measured[REFERENCE]["inconsistent_reports"] == []
     found = measured[OWN]["inconsistent_reports"]
     assert {report["quantity"] for report in found} == named

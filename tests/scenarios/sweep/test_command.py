@@ -53,7 +53,7 @@ def test_workers_belong_to_this_machine(in_process: Path) -> None:
     ("retry", "resume", "said"),
     [
         (["timeout"], False, "--retry: it belongs to --resume"),
-        (["timeout", "late"], True, "--retry late: no row has such a status; there are done, fell, ended, no-motion"),
+        (["timeout", "late"], True, r"--retry late: no row has such a status \(there are done, fell, ended, no-motion"),
     ],
 )
 def test_what_is_to_be_tried_again_must_be_a_status(

@@ -15,7 +15,9 @@ import pytest
 from sweeping import UPRIGHT, data_set, here, planned, rows, swept
 
 from velodrome.engines.admission import ride_engine
+from velodrome.engines.storage import METADATA_KEY
 from velodrome.reference.bicycle import Bicycle
+from velodrome.reports.measure import flatten_metrics
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run.runner import claimed_noise, measure_one, plan_run
 from velodrome.scenarios.scenario.schema import load_scenario
@@ -24,7 +26,7 @@ from velodrome.scenarios.sweep.journal import finished_rows
 from velodrome.scenarios.sweep.plan import Task, plan_sweep
 from velodrome.scenarios.sweep.pool import Done
 from velodrome.scenarios.sweep.run import Work, run_sweep
-from velodrome.scenarios.sweep.store import JOURNAL, MANIFEST, RESULTS, TIMINGS
+from velodrome.scenarios.sweep.store import JOURNAL, MANIFEST, RESULTS, TIMINGS, part_of
 from velodrome.scenarios.sweep.summary import status_of, summarise_sweep
 from velodrome.scenarios.sweep.task import Tasks
 from velodrome.scenarios.sweep.worker import Setup
@@ -56,7 +58,7 @@ def test_a_row_has_the_parameters_and_the_metrics_of_a_run(tmp_path: Path) -> No
     noise = claimed_noise(*alone.engines["mujoco-multipliers"])
     measured = measure_one(alone.start, rides["mujoco-multipliers"], rides["reference"], step_noise=noise)
     differing = set(columns.TIMING)
-    flat = {name: value for name, value in columns.flatten_metrics(measured).items() if name not in differing}
+    flat = {name: value for name, value in flatten_metrics(measured).items() if name not in differing}
     assert set(flat) == set(columns.METRICS) - {"family", "growth_rate", "size"}
     assert {name: found[1][name] for name in flat} == flat
     assert (found[1]["status"], found[1]["reason"]) == ("done", None)
@@ -205,11 +207,25 @@ def test_rows_of_another_sweep_are_refused_and_kept(tmp_path: Path) -> None:
         swept(other, tmp_path / "other", resume=True)
 
 
+def test_every_part_of_the_data_set_says_its_format(tmp_path: Path) -> None:
+    plan, out = planned(tmp_path, LEANING), tmp_path / "out"
+    swept(plan, out)
+    for path in (part_of(out, "reference"), out / TIMINGS):
+        found = json.loads((pq.read_schema(path).metadata or {})[METADATA_KEY])
+        assert found == {"schema_version": 1}
+
+
 def test_a_sweep_of_an_earlier_version_is_refused_with_what_to_do(tmp_path: Path) -> None:
     plan, out = planned(tmp_path, LEANING), tmp_path / "out"
     swept(plan, out)
     manifest = json.loads((out / MANIFEST).read_text())
-    del manifest["format"]
+    assert manifest.pop("schema_version") == 2
+    # As it was called before.
+    (out / MANIFEST).write_text(json.dumps(manifest | {"format": 2}))
+    assert swept(plan, out, resume=True).missing == 0
+    (out / MANIFEST).write_text(json.dumps(manifest | {"schema_version": 3}))
+    with pytest.raises(ScenarioError, match="its schema_version is 3, and this velodrome reads up to 2"):
+        swept(plan, out, resume=True)
     (out / MANIFEST).write_text(json.dumps(manifest))
     with pytest.raises(ScenarioError, match=r"begun by another version of velodrome.* in another folder by --out"):
         swept(plan, out, resume=True)
