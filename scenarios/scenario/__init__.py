@@ -1,5 +1,6 @@
 """Scenario files: their schema, the surfaces they can name, and the start they describe."""
 
+from .bicycle_file import BicycleFile, read_bicycle_file
 from .engine_settings import configure_engine, list_engine_faults, refuse_engine
 from .schema import (
     OF_THE_MOTION,
@@ -27,6 +28,7 @@ from .table import (
 
 __all__ = [
     "OF_THE_MOTION",
+    "BicycleFile",
     "CircularTable",
     "Gate",
     "Scenario",
@@ -47,6 +49,7 @@ __all__ = [
     "output_times",
     "parse_surface",
     "place_error",
+    "read_bicycle_file",
     "read_scenario_file",
     "read_toml",
     "refuse_engine",

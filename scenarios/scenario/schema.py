@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError, ValidatorFunctionWrapHandler, field_validator, model_validator
 
 from ...engines.names import suggest_name
-from ...reference.bicycle import Bicycle
+from ...reference.bicycle import Bicycle, require_rigid_bodies
 from ..error import ScenarioError
 from .engine_settings import list_engine_faults
 from .surfaces import SurfaceTable
@@ -153,7 +153,7 @@ class Scenario(Table):
 def _bicycle_faults(values: Mapping[str, float]) -> list[str]:
     """Say which parameters no bicycle has, or what is wrong with all of them together; nothing if nothing is."""
     try:
-        Bicycle(**values)
+        require_rigid_bodies(Bicycle(**values))
     except ValueError as error:
         together = str(error)
     else:

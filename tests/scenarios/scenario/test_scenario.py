@@ -152,7 +152,7 @@ def test_an_override_reaches_the_bicycle() -> None:
         ({"simulation__duration": 1e5}, ["samples", "5e6"]),
         # Bicycles.
         ({"bicycle__wheels": 3.0}, ["'wheels'", "wheelbase"]),
-        ({"bicycle__rear_frame_mass": -1.0}, ["rear_frame_mass", "-1.0", "positive"]),
+        ({"bicycle__rear_frame_mass": -1.0}, ["rear_frame_mass", "-1.0", "not be negative"]),
         ({"bicycle__rear_frame_mass": True}, ["bicycle.rear_frame_mass", "number"]),
         ({"bicycle__rear_frame_mass": 1e300}, ["bicycle.rear_frame_mass", "1e+300"]),
         ({"bicycle__front_wheel_Iyy": 0.3}, ["front_wheel_I", "rigid body"]),
