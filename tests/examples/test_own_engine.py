@@ -113,7 +113,7 @@ def test_the_guides_smallest_engine_runs_and_gives_only_what_it_has(own: str, tm
 
 def test_the_guides_smallest_engine_is_gated(own: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Its rides stand for all: orders and eigenvalues take the longest.
-    monkeypatch.setattr("velodrome.scenarios.gate.sample._eigenvalues", lambda *_: {})
+    monkeypatch.setattr("velodrome.scenarios.gate.sample._measure_eigenvalues", lambda *_: {})
 
     def check(**settings: float) -> list[Any]:
         found = gate.check_gate(

@@ -102,7 +102,7 @@ def accused(name: str, duration: float | None, out: Path) -> None:
 def rides_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """Measure the ride alone: orders and eigenvalues take the longest."""
     monkeypatch.setattr(gate_sample, "_order", lambda *_: ({}, {}))
-    monkeypatch.setattr(gate_sample, "_eigenvalues", lambda *_: {})
+    monkeypatch.setattr(gate_sample, "_measure_eigenvalues", lambda *_: {})
 
 
 def chosen_with(after: Any) -> gate.Chosen:
