@@ -7,7 +7,7 @@ closest approach of the two (`velodrome.reference.kernels.contact`). The materia
     acceleration  Jp q'' + gamma,    gamma = Jp' q' + w x (r a' t)
 
 where Jp' is the derivative for the material point and r a' t is the velocity of the contact along the rim. MuJoCo's
-contact rows prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `correct` subtracts gamma.
+contact rows prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `correct_reference` subtracts gamma.
 
 `press` does not use MuJoCo's contacts. It solves, for the six force components on two wheels,
 
@@ -15,8 +15,9 @@ contact rows prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were ze
 
 and applies Jp^T F. The stabilisation rate s contributes nothing where the constraints hold.
 
-`watch` only observes: it assesses the solution of MuJoCo's solver when the next evaluation begins, the first
-moment after the solution at which a callback is called (the criterion is in `convergence`). `correct` does so too.
+`watch_iterations` only observes: it assesses the solution of MuJoCo's solver when the next evaluation begins, the first
+moment after the solution at which a callback is called (the criterion is in `convergence`). `correct_reference` does
+so too.
 
 The callbacks of a process share one `BLACKBOARD`, which holds numbers and the addresses of arrays that keep their
 place while a model exists. Compiled code gets the blackboard's own address from a function that the linker resolves,
@@ -446,7 +447,7 @@ def judge(boards):
 
 
 @compile_callback(CONTROL, error_model="numpy")
-def watch(model, data):
+def watch_iterations(model, data):
     """Control callback: assess the convergence of MuJoCo's solver and change nothing."""
     board = _blackboard()
     if _is_watched(board, model, data):
@@ -483,7 +484,7 @@ def _start_sticking(board, model, data, rows, softness, target):
 
 
 @compile_callback(CONTROL, error_model="numpy")
-def correct(model, data):
+def correct_reference(model, data):
     """Control callback: subtract the contacts' own acceleration from MuJoCo's reference accelerations.
 
     It also gives MuJoCo's solver its starting point and assesses the solution of the last evaluation.

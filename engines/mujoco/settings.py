@@ -196,12 +196,13 @@ class ExactContactSettings(ContactSettings):
     def solver_options(self) -> dict[str, float]:
         """Options of MuJoCo's contact solver beside its tolerance, for rows as stiff as these.
 
-        Wheels that roll need one iteration from the start that `compiled.correct` gives. The solution for a wheel that
-        slides is found along the curved edge of the cone, on which steps become shorter the stiffer the rows are: this
-        takes some hundred iterations, where MuJoCo's own limit is 100. Between sliding and sticking the cost bends
-        within so short an interval that a line search must bisect down to the last digit, 52 times with up to three
-        evaluations each, where MuJoCo's own limit is 50 evaluations. A line search that ends earlier makes no progress,
-        and the solver stops at arbitrary forces. A line search stops at a slope of the order of the forces' round-off.
+        Wheels that roll need one iteration from the start that `compiled.correct_reference` gives. The solution for a
+        wheel that slides is found along the curved edge of the cone, on which steps become shorter the stiffer the
+        rows are: this takes some hundred iterations, where MuJoCo's own limit is 100. Between sliding and sticking the
+        cost bends within so short an interval that a line search must bisect down to the last digit, 52 times with up
+        to three evaluations each, where MuJoCo's own limit is 50 evaluations. A line search that ends earlier makes no
+        progress, and the solver stops at arbitrary forces. A line search stops at a slope of the order of the forces'
+        round-off.
         """
         return {"iterations": 10_000, "ls_iterations": 200, "ls_tolerance": max(0.01, SLOPE / self.tolerance)}
 
