@@ -33,6 +33,8 @@ class ExudynEngine:
     name : str
     settings : type
         Model of the engine's settings.
+    description : str
+        The engine in one line.
     put_on_ground : callable
         Imports and returns the function that puts the wheels on the ground.
     level_only : bool
@@ -41,6 +43,7 @@ class ExudynEngine:
 
     name: str
     settings: type[SolverSettings]
+    description: str
     put_on_ground: Callable[[], PutOnGround]
     level_only: bool = False
     gives = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
@@ -158,6 +161,19 @@ def _import_roll_discs() -> PutOnGround:
     return roll_discs
 
 
-ENGINE = ExudynEngine("exudyn", ExudynSettings, _import_constrain)
-PLANE_NORMAL = ExudynEngine("exudyn-plane-normal", SolverSettings, _import_roll_discs_on_tangents)
-BUILTIN = ExudynEngine("exudyn-builtin", SolverSettings, _import_roll_discs, level_only=True)
+ENGINE = ExudynEngine(
+    "exudyn", ExudynSettings, "Exudyn with true knife-edge rolling joints on any surface", _import_constrain
+)
+PLANE_NORMAL = ExudynEngine(
+    "exudyn-plane-normal",
+    SolverSettings,
+    "Exudyn with its own rolling discs on moving tangent planes",
+    _import_roll_discs_on_tangents,
+)
+BUILTIN = ExudynEngine(
+    "exudyn-builtin",
+    SolverSettings,
+    "Exudyn with its own rolling discs on the level plane, as it is",
+    _import_roll_discs,
+    level_only=True,
+)
