@@ -120,7 +120,7 @@ def test_the_guides_smallest_engine_conforms(own: str) -> None:
 
 def test_the_guides_smallest_engine_is_gated(own: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Its rides stand for all: orders and eigenvalues take the longest.
-    monkeypatch.setattr("velodrome.scenarios.gate.sample._eigenvalues", lambda *_: {})
+    monkeypatch.setattr("velodrome.scenarios.gate.sample._measure_eigenvalues", lambda *_: {})
 
     def check(**settings: float) -> list[Any]:
         found = gate.check_gate(
