@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -72,10 +73,9 @@ class Ride:
     @cached_property
     def error(self) -> float:
         """Largest error of the coordinates against the reference, relative to the motion's sizes."""
-        sizes = np.array([*3 * [self.motion.size], *6 * [1.0]])
-        return float(np.abs((self.q - self.exact.q) / sizes).max()) + START_ERROR
+        return float(np.abs((self.q - self.exact.q) / self.motion.sizes).max()) + START_ERROR
 
-    def altered(self, **changes: np.ndarray) -> Ride:
+    def altered(self, **changes: Any) -> Ride:
         """The ride with other samples of some fields."""
         return Ride(self.motion, replace(self.trajectory, **changes), self.step_noise)
 
