@@ -18,12 +18,12 @@ from ...reference.bicycle import Bicycle
 from ...reference.surface import Surface
 from .forces import check_forces
 from .maps import check_maps
-from .motions import GROUNDS, OTHER_BICYCLE, Motion, make_motion, make_problem, output_times
+from .motions import GROUNDS, OTHER_BICYCLE, TrialMotion, make_motion, make_problem, trial_times
 from .order import check_order
 from .protocol import check_settings, guard_engine
 from .refusals import check_refusals, suits
 from .repeats import check_bits, check_own_work
-from .report import Check, ConformanceError, ConformanceReport, judge
+from .report import Check, ConformanceError, ConformanceReport, record_check
 from .reports import check_bodies, check_reports
 from .rides import Ride
 from .start import check_start
@@ -108,7 +108,7 @@ class _Examination:
     def step_noise(self) -> float:
         return self.engine.step_noise(self.settings)
 
-    def ride(self, motion: Motion, factor: float = 1.0) -> Ride:
+    def ride(self, motion: TrialMotion, factor: float = 1.0) -> Ride:
         """Ride a motion with a factor on the step; errors as of `ride_engine` and of `Settings.refined`."""
         settings = self.settings if factor == 1.0 else self.settings.refined(factor)
         self.reported.append([])
@@ -118,7 +118,7 @@ class _Examination:
         return Ride(motion, trajectory, self.engine.step_noise(settings))
 
     def checks(self) -> Iterator[Check]:
-        times = output_times(getattr(self.settings, "step", None))
+        times = trial_times(getattr(self.settings, "step", None))
         wrong: list[str] = []
         suitable: dict[str, bool] = {}
         grounds: dict[str, Surface] = {}
@@ -129,7 +129,7 @@ class _Examination:
             wrong += more
         ridden = [name for name, good in suitable.items() if good]
         if not ridden:
-            yield judge(
+            yield record_check(
                 "grounds", "it rides on one ground at least", [*wrong, "it refuses all: a plane, a bowl, waves"]
             )
             return
@@ -137,9 +137,9 @@ class _Examination:
         try:
             first = self.ride(motion)
         except Exception as error:  # another package's code may break in any way
-            yield judge(f"ride on {motion.name}", _RIDE, [why_failed(error)])
+            yield record_check(f"ride on {motion.name}", _RIDE, [why_failed(error)])
             return
-        yield judge(f"ride on {motion.name}", _RIDE, _wrong_facts(first, self.reported[-1]))
+        yield record_check(f"ride on {motion.name}", _RIDE, _wrong_facts(first, self.reported[-1]))
         yield check_refusals(self.engine, self.settings, first, wrong, suitable)
         yield from _judged(first)
         # The other bicycle too: an engine that knows but the benchmark's would pass on one.
@@ -147,14 +147,14 @@ class _Examination:
         try:
             second = self.ride(other)
         except Exception as error:  # another package's code may break in any way
-            yield judge(f"ride on {other.name}", _RIDE, [why_failed(error)])
+            yield record_check(f"ride on {other.name}", _RIDE, [why_failed(error)])
         else:
-            yield judge(f"ride on {other.name}", _RIDE, _wrong_facts(second, self.reported[-1]))
+            yield record_check(f"ride on {other.name}", _RIDE, _wrong_facts(second, self.reported[-1]))
             yield from _judged(second)
         try:
             again = self.ride(motion)
         except Exception as error:  # another package's code may break in any way
-            yield judge("same bits", "a ride can be repeated", [why_failed(error)])
+            yield record_check("same bits", "a ride can be repeated", [why_failed(error)])
         else:
             yield check_bits(first, again.trajectory)
         yield check_own_work(first, self.engine.name)
@@ -197,4 +197,4 @@ def _surroundings() -> dict[str, Any]:
 def _check_surroundings(before: Mapping[str, Any]) -> Check:
     after = _surroundings()
     changed = [f"it changed {what}" for what, value in before.items() if after[what] != value]
-    return judge("surroundings", "it leaves the process as it found it", changed)
+    return record_check("surroundings", "it leaves the process as it found it", changed)

@@ -57,7 +57,7 @@ def _bend(expected: np.ndarray, time: np.ndarray, lag: float) -> float:
     return size_of(0.5 * lag * lag * np.gradient(slope, time, axis=0, edge_order=2)[1:])
 
 
-def explain_columns(given: np.ndarray, expected: np.ndarray, off: Sequence[int], names: Sequence[str]) -> Iterator[str]:
+def explain_wrong(given: np.ndarray, expected: np.ndarray, off: Sequence[int], names: Sequence[str]) -> Iterator[str]:
     """Say of columns what they look like.
 
     Parameters

@@ -20,8 +20,8 @@ from ...engines.engine import Trajectory
 from ...reference.contact import observe
 from ...reference.kinematics import COORDINATES, FRONT_ANGLE, LEAN, PITCH, REAR_ANGLE, STEER, YAW
 from .explain import EXPLAINED, rate_names
-from .motions import Motion
-from .report import Check, judge
+from .motions import TrialMotion
+from .report import Check, record_check
 from .rides import Ride
 
 _HALF = 0.5
@@ -86,7 +86,7 @@ def _mirror(*columns: int) -> np.ndarray:
     return mirror
 
 
-def violation(motion: Motion, q: np.ndarray, qd: np.ndarray) -> float:
+def violation(motion: TrialMotion, q: np.ndarray, qd: np.ndarray) -> float:
     """How far wheels are from rolling on the ground, a mean over samples: slip over speed, and gap over radius.
 
     inf where a wheel has no contact. The first sample is the problem's start, which says nothing of the engine.
@@ -107,10 +107,10 @@ def check_maps(ride: Ride) -> Check:
     if best is not None:
         wrong = [f"{best[0].what}: {told} in its coordinates, and by {best[1]:.2g} with that undone"]
     limit = "a map is wrong if another explains at least half of the slip and the gaps"
-    return judge(f"maps on {motion.name}", CLAIM, wrong, [told], limit)
+    return record_check(f"maps on {motion.name}", CLAIM, wrong, [told], limit)
 
 
-def best_map(motion: Motion, trajectory: Trajectory) -> tuple[CoordinateMap, float] | None:
+def best_map(motion: TrialMotion, trajectory: Trajectory) -> tuple[CoordinateMap, float] | None:
     """The simplest map among those that explain a ride best, with the violation that it leaves; None for the right one.
 
     A pair of mirrored coordinates is named only if it explains what no single one does.
@@ -125,7 +125,7 @@ def best_map(motion: Motion, trajectory: Trajectory) -> tuple[CoordinateMap, flo
     return maps[first], left[first]
 
 
-def scaled_rate(motion: Motion, trajectory: Trajectory) -> str | None:
+def scaled_rate(motion: TrialMotion, trajectory: Trajectory) -> str | None:
     """Which rate looks scaled and by how much, if slip is explained by one: slip is linear in the rates."""
     bicycle, surface, q, qd = motion.problem.bicycle, motion.problem.surface, trajectory.q[1:], trajectory.qd[1:]
     slip = observe(bicycle, surface, q, qd).slip

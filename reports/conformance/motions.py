@@ -47,7 +47,7 @@ OTHER_BICYCLE = replace(
 
 
 @dataclass(frozen=True)
-class Motion:
+class TrialMotion:
     """A problem and the reference's ride of it.
 
     Attributes
@@ -75,7 +75,7 @@ class Motion:
         return self.problem.bicycle.wheelbase
 
 
-def output_times(step: float | None) -> np.ndarray:
+def trial_times(step: float | None) -> np.ndarray:
     """Times of the samples [s]: a grid that a step divides, also a four times longer one."""
     interval = _INTERVAL
     if step is not None:
@@ -98,7 +98,7 @@ def make_problem(surface: Surface, bicycle: Bicycle, times: np.ndarray) -> Probl
     return Problem(bicycle, surface, q, qd, times)
 
 
-def make_motion(name: str, problem: Problem) -> Motion:
+def make_motion(name: str, problem: Problem) -> TrialMotion:
     """Let the reference ride a problem.
 
     Raises
@@ -112,7 +112,7 @@ def make_motion(name: str, problem: Problem) -> Motion:
     upright = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.0, 0.0, (0.0, 0.0, _REAR_RATE))
     growth = growth_rate(Plane(), linearise(bicycle, Plane(), *upright).eigenvalues, 0.0)
     scale = Scale.of(bicycle, qd, bicycle.wheelbase, growth, float(problem.times[-1]))
-    return Motion(name, problem, exact, shifted, scale)
+    return TrialMotion(name, problem, exact, shifted, scale)
 
 
 def _ride(problem: Problem) -> Trajectory:

@@ -10,7 +10,7 @@ import numpy as np
 from ..measure import SAME_BITS, extrapolate, observed_orders, order_limit
 from .explain import EXPLAINED
 from .maps import scaled_rate, violation
-from .report import Check, judge, skip
+from .report import Check, record_check, skip
 from .rides import Ride
 
 FACTORS = (4.0, 2.0, 1.0)
@@ -36,7 +36,7 @@ def check_order(name: str, ride_at: Callable[[float], Ride]) -> Check:
     except ValueError as error:
         return skip(name, CLAIM, " ".join(str(error).split()))
     if any(np.array_equal(one.q, other.q) for one, other in pairwise(rides)):
-        return judge(name, CLAIM, [SAME_BITS])
+        return record_check(name, CLAIM, [SAME_BITS])
     finest = rides[-1]
     sizes = np.array([*3 * [finest.motion.size], *6 * [1.0]])
     samples = min(len(ride.q) for ride in rides)
@@ -50,18 +50,18 @@ def check_order(name: str, ride_at: Callable[[float], Ride]) -> Check:
         order = observed_orders(paths)[-1]
         seen = f"an order of {order:.3g} is seen"
         if not order >= _LEAST_ORDER:
-            return judge(name, CLAIM, [f"{seen}; it does not converge"], tolerance=_LIMIT)
+            return record_check(name, CLAIM, [f"{seen}; it does not converge"], tolerance=_LIMIT)
         found = extrapolate(paths)
         value, uncertain = found.value, found.uncertainty
     if finest.trajectory.friction is not None:
-        return judge(
+        return record_check(
             name, CLAIM, [], [seen, "its contacts have friction: what it converges to is its own model's ride"]
         )
     off, allowed = float(np.abs(value - exact).max()), finest.noise + _ROOM * uncertain
     if off <= allowed:
-        return judge(name, CLAIM, [], [seen, f"what it converges to is {off:.2g} from the reference"])
+        return record_check(name, CLAIM, [], [seen, f"what it converges to is {off:.2g} from the reference"])
     wrong = f"what it converges to is {off:.2g} of the motion's size from the reference, limit {allowed:.2g}"
-    return judge(name, CLAIM, [wrong, *_explain(rides, off)], tolerance=_LIMIT)
+    return record_check(name, CLAIM, [wrong, *_explain(rides, off)], tolerance=_LIMIT)
 
 
 def _explain(rides: Sequence[Ride], off: float) -> list[str]:

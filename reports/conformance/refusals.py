@@ -10,7 +10,7 @@ from ...engines.admission import ride_engine
 from ...engines.engine import Problem, UnsuitableProblem, why_failed
 from ...engines.guard import GuardedEngine
 from .motions import awkward_times, make_motion
-from .report import Check, judge
+from .report import Check, record_check
 from .rides import Ride
 
 _ROOM = 4.0  # of two errors of one computation
@@ -53,7 +53,7 @@ def check_refusals(
     else:
         found += _wrong_ride(engine, settings, ride, awkward)
         seen.append(f"it rides with an output interval of {times[1]:.6g} s")
-    return judge(
+    return record_check(
         "refusals",
         "check refuses what cannot be run, a ground by UnsuitableProblem and times by ValueError, in one line; the "
         "rest is ridden",

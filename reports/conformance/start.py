@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...reference.kinematics import COORDINATES
-from .explain import explain_columns, rate_names
-from .report import Check, judge
+from .explain import explain_wrong, rate_names
+from .report import Check, record_check
 from .rides import Ride, without_turns
 
 # A state goes through rotations and back: some dozens of products and sums, each rounded, none of them cancelling.
@@ -26,8 +26,8 @@ def check_start(ride: Ride) -> Check:
         limit = _ROUNDINGS * ride.round_off * (1 + float(np.abs(asked).max()))
         off = [int(i) for i in np.flatnonzero(~(apart <= limit))]
         worst = max(worst, float(apart.max()))
-        wrong += explain_columns(own[None], asked[None], off, names)
-    return judge(
+        wrong += explain_wrong(own[None], asked[None], off, names)
+    return record_check(
         f"start on {ride.motion.name}",
         "its first sample is the state that the problem starts from, but for whole turns",
         wrong,
