@@ -17,12 +17,12 @@ from ...engines.guard import GuardedEngine, call_engine
 from ...reference.bicycle import Bicycle
 from .forces import check_forces
 from .maps import check_maps
-from .motions import GROUNDS, OTHER_BICYCLE, SAMPLES, Motion, make_motion, make_problem, output_interval
+from .motions import GROUNDS, OTHER_BICYCLE, SAMPLES, TrialMotion, make_motion, make_problem, output_interval
 from .order import check_order
 from .protocol import check_settings, guard_engine, step_noise_of
 from .refusals import check_refusals, suits
 from .repeats import check_bits, check_own_work
-from .report import Check, ConformanceError, ConformanceReport, judge, skip
+from .report import Check, ConformanceError, ConformanceReport, record_check, skip
 from .reports import check_bodies, check_reports
 from .rides import Ride
 from .start import check_start
@@ -105,7 +105,7 @@ class _Examination:
     settings: Settings
     reported: list[list[float]] = field(default_factory=list)
 
-    def ride(self, motion: Motion, settings: Settings | None = None) -> Ride:
+    def ride(self, motion: TrialMotion, settings: Settings | None = None) -> Ride:
         """Ride a motion with the settings, or with others; errors as of `ride_engine`."""
         chosen = self.settings if settings is None else settings
         self.reported.append([])
@@ -113,7 +113,7 @@ class _Examination:
         # Of the settings themselves: what a method leaves at longer steps is its error, not its noise.
         return Ride(motion, trajectory, step_noise_of(self.engine, self.settings))
 
-    def refine(self, motion: Motion, factor: float) -> Settings:
+    def refine(self, motion: TrialMotion, factor: float) -> Settings:
         """Settings with a factor on the step; ValueError where there are none or the engine refuses them."""
         settings = self.settings if factor == 1.0 else call_engine(self.settings.refined, factor)
         self.engine.check(motion.problem, settings)
@@ -125,15 +125,15 @@ class _Examination:
         ridden = [name for name, good in suitable.items() if good]
         if not ridden:
             refused = f"it refuses all: {', '.join(suitable)}"
-            yield judge("grounds", "it rides on one ground at least", [*wrong, refused])
+            yield record_check("grounds", "it rides on one ground at least", [*wrong, refused])
             return
         motion = make_motion(ridden[0], Bicycle(), self.interval)
         try:
             first = self.ride(motion)
         except Exception as error:  # another package's code may break in any way
-            yield judge(f"ride on {motion.name}", _RIDE, [why_failed(error)])
+            yield record_check(f"ride on {motion.name}", _RIDE, [why_failed(error)])
             return
-        yield judge(f"ride on {motion.name}", _RIDE, _wrong_facts(first, self.engine.gives, self.reported[-1]))
+        yield record_check(f"ride on {motion.name}", _RIDE, _wrong_facts(first, self.engine.gives, self.reported[-1]))
         yield check_refusals(self.engine, self.settings, first, wrong, suitable)
         judged = tuple(_judged(first))
         yield from judged
@@ -158,14 +158,14 @@ class _Examination:
             wrong += more
         return wrong, suitable
 
-    def checks_of_another(self, motion: Motion) -> Iterator[Check]:
+    def checks_of_another(self, motion: TrialMotion) -> Iterator[Check]:
         """The checks of a ride of a second motion."""
         try:
             second = self.ride(motion)
         except Exception as error:  # another package's code may break in any way
-            yield judge(f"ride on {motion.name}", _RIDE, [why_failed(error)])
+            yield record_check(f"ride on {motion.name}", _RIDE, [why_failed(error)])
             return
-        yield judge(f"ride on {motion.name}", _RIDE, _wrong_facts(second, self.engine.gives, self.reported[-1]))
+        yield record_check(f"ride on {motion.name}", _RIDE, _wrong_facts(second, self.engine.gives, self.reported[-1]))
         yield from _judged(second)
 
     def checks_of_repeats(self, first: Ride) -> Iterator[Check]:
@@ -173,7 +173,7 @@ class _Examination:
         try:
             again = self.ride(first.motion)
         except Exception as error:  # another package's code may break in any way
-            yield judge("same bits", "a ride can be repeated", [why_failed(error)])
+            yield record_check("same bits", "a ride can be repeated", [why_failed(error)])
         else:
             yield check_bits(first, again.trajectory)
         yield check_own_work(first, self.engine.name)
@@ -247,4 +247,4 @@ def _surroundings() -> dict[str, Any]:
 def _check_surroundings(before: Mapping[str, Any]) -> Check:
     after = _surroundings()
     changed = [f"it changed {what}" for what, value in before.items() if after[what] != value]
-    return judge("surroundings", "it leaves the process as it found it", changed)
+    return record_check("surroundings", "it leaves the process as it found it", changed)

@@ -14,7 +14,7 @@ from ...reference.kinematics import rotations
 from ...reference.surface import unit_normals
 from ..measure import ride_limits
 from .explain import fit_factor, fit_lag, size_of
-from .report import Check, judge, skip
+from .report import Check, record_check, skip
 from .rides import Ride
 
 CLAIM = "its contact forces are those of the ground on the wheels, in inertial axes and newtons"
@@ -41,7 +41,7 @@ def check_forces(ride: Ride) -> Check:
             wrong = [f"they look scaled by {factor:.6g}"]
         elif lag is not None:
             wrong = [f"they look {abs(lag):.3g} s {'late' if lag > 0 else 'early'}"]
-    return judge(
+    return record_check(
         name,
         CLAIM,
         wrong,

@@ -7,7 +7,7 @@ import numpy as np
 from ...engines.engine import REFERENCE, SHAPES, Trajectory
 from ...reference.dae import dynamics
 from ..measure import state_error
-from .report import Check, judge, skip
+from .report import Check, record_check, skip
 from .rides import Ride
 
 _FEWEST = 5  # samples in which two rides cannot agree by chance
@@ -29,7 +29,7 @@ def check_bits(ride: Ride, again: Trajectory) -> Check:
         for name in ("steps", "unconverged_steps", "largest_residual", "ended")
         if getattr(first, name) != getattr(again, name)
     ]
-    return judge("same bits", "a ride is the same to the last bit when it is repeated after another one", wrong)
+    return record_check("same bits", "a ride is the same to the last bit when it is repeated after another one", wrong)
 
 
 def check_own_work(ride: Ride, engine: str) -> Check:
@@ -55,7 +55,7 @@ def check_own_work(ride: Ride, engine: str) -> Check:
     forces = ride.trajectory.contact_force
     if forces is not None and any(np.mean(forces == taken) > _MANY for taken in _forces_of_the_reference(ride)):
         wrong.append("its contact forces are the reference's to the last bit; an engine that has none gives None")
-    return judge(name, claim, wrong, [f"apart from the reference by {apart:.2g}, more than {least:.2g}"])
+    return record_check(name, claim, wrong, [f"apart from the reference by {apart:.2g}, more than {least:.2g}"])
 
 
 def _forces_of_the_reference(ride: Ride) -> list[np.ndarray]:

@@ -98,7 +98,7 @@ class ConformanceError(AssertionError):
         self.report = report
 
 
-def judge(name: str, claim: str, wrong: Iterable[str], seen: Iterable[str] = (), tolerance: str = "") -> Check:
+def record_check(name: str, claim: str, wrong: Iterable[str], seen: Iterable[str] = (), tolerance: str = "") -> Check:
     """Make a check that fails if anything is ``wrong``, and else says what was ``seen``."""
     faults = tuple(wrong)
     return Check(name, "failed" if faults else "passed", claim, faults or tuple(seen), tolerance)

@@ -15,7 +15,7 @@ from ...reference.bicycle import BODIES
 from ...reference.kinematics import WHEELS
 from ..measure import describe_mismatch
 from .explain import EXPLAINED, explains, fit_factor, fit_lag
-from .report import Check, judge, skip
+from .report import Check, record_check, skip
 from .rides import Ride
 
 LIMIT = "error of the start, step_noise and four times the error of the coordinates themselves"
@@ -30,7 +30,7 @@ def check_bodies(ride: Ride) -> Check:
     for one in ride.mismatch(["body_position", "body_quaternion"]):
         wrong.append(describe_mismatch(one.as_json()))
         wrong += _explain_positions(ride) if one.quantity == "body_position" else _explain_quaternions(ride)
-    return judge(
+    return record_check(
         f"bodies on {ride.motion.name}", "its bodies are where its coordinates put them", wrong, tolerance=LIMIT
     )
 
@@ -50,7 +50,7 @@ def check_reports(ride: Ride) -> Check:
         explanation = _explain_report(ride, one.quantity)
         if explanation is not None:
             wrong.append(explanation)
-    return judge(name, claim, wrong, seen, LIMIT)
+    return record_check(name, claim, wrong, seen, LIMIT)
 
 
 def _explain_positions(ride: Ride) -> Iterator[str]:

@@ -12,7 +12,7 @@ import numpy as np
 from ...engines.engine import Trajectory
 from ...reference.kinematics import YAW
 from ..measure import LARGEST_NOISE, ROUND_OFF, START_ERROR, Mismatch, evaluate_ride, find_mismatches, noise
-from .motions import Motion
+from .motions import TrialMotion
 
 _SINGLE = 2.0**-23
 
@@ -30,7 +30,7 @@ class Ride:
         Relative error that a step of the engine may add beyond its method, as it says itself.
     """
 
-    motion: Motion
+    motion: TrialMotion
     trajectory: Trajectory
     step_noise: float
 

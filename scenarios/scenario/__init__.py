@@ -23,8 +23,8 @@ from .table import (
     format_validation_error,
     join_complaints,
     list_complaints,
-    place_error,
     read_toml,
+    set_keys,
     show_value,
 )
 
@@ -52,12 +52,12 @@ __all__ = [
     "name_surface",
     "output_times",
     "parse_surface",
-    "place_error",
     "read_bicycle_file",
     "read_scenario_file",
     "read_toml",
     "refuse_engine",
     "resolve_scenario",
+    "set_keys",
     "show_value",
     "validate_scenario",
 ]

@@ -22,8 +22,8 @@ from ..scenario import (
     list_complaints,
     list_engine_faults,
     make_start,
-    place_error,
     refuse_engine,
+    set_keys,
 )
 from .file import SweepFile, read_sweep
 from .points import count_points, make_points
@@ -219,7 +219,7 @@ class _Checker:
             If the file is wrong.
         """
         try:
-            data = prune_settings(place_error(self._base, changes), engine)
+            data = prune_settings(set_keys(self._base, changes), engine)
         except ValueError as error:
             raise _FileError([str(error)]) from error
         refused = None
