@@ -25,8 +25,8 @@ _Moderate = Annotated[float, Field(ge=-1e6, le=1e6)]
 class Near(Table):
     """Angles that a circular motion is near to."""
 
-    lean: float
-    steer: float
+    lean: float = Field(description="[rad]")
+    steer: float = Field(description="[rad]")
 
 
 class CircularTable(Table):
@@ -34,8 +34,10 @@ class CircularTable(Table):
 
     kind: Literal["circular"] = "circular"
     rear_rate: float = Field(gt=0, le=1e4, description="rear-wheel rate [rad/s]")
-    family: Annotated[int, Field(ge=1, le=4)] | None = None
-    near: Near | None = None
+    family: Annotated[int, Field(ge=1, le=4)] | None = Field(None, description="solution family")
+    near: Near | None = Field(
+        None, description="angles it is near to; with family where the family has several motions at this rate"
+    )
 
     @model_validator(mode="after")
     def _determined(self) -> CircularTable:
@@ -54,20 +56,20 @@ class UprightTable(Table):
 class Perturbation(Table):
     """Added to the independent variables of the start; the rest is solved."""
 
-    x: _Moderate = 0.0
-    y: _Moderate = 0.0
-    lean: _Moderate = 0.0
-    steer: _Moderate = 0.0
-    lean_rate: _Moderate = 0.0
-    steer_rate: _Moderate = 0.0
-    rear_rate: _Moderate = 0.0
+    x: _Moderate = Field(0.0, description="of D [m]")
+    y: _Moderate = Field(0.0, description="of D [m]")
+    lean: _Moderate = Field(0.0, description="to the right [rad]")
+    steer: _Moderate = Field(0.0, description="to the left [rad]")
+    lean_rate: _Moderate = Field(0.0, description="[rad/s]")
+    steer_rate: _Moderate = Field(0.0, description="[rad/s]")
+    rear_rate: _Moderate = Field(0.0, description="of the rear wheel [rad/s]")
 
 
 class Simulation(Table):
     """How long, and how often to report."""
 
-    duration: float = Field(gt=0, le=1e5, description="[s]")
-    output_rate: float = Field(100.0, gt=0, le=1e5, description="[1/s]")
+    duration: float = Field(gt=0, le=1e5, description="simulated time [s]")
+    output_rate: float = Field(100.0, gt=0, le=1e5, description="samples a second [1/s]")
 
     @model_validator(mode="after")
     def _whole_samples(self) -> Simulation:
@@ -85,9 +87,9 @@ class Gate(Simulation):
     """How the drift gate rides a scenario, and what it measures beside the ride."""
 
     # Seconds of work in the slowest engine.
-    duration: float = Field(default=3.0, gt=0, le=1e5, description="[s]")
+    duration: float = Field(default=3.0, gt=0, le=1e5, description="simulated time [s]")
     # An interval that doubled steps divide as well: a coarser step is judged, not refused.
-    output_rate: float = Field(default=50.0, gt=0, le=1e5, description="[1/s]")
+    output_rate: float = Field(default=50.0, gt=0, le=1e5, description="samples a second [1/s]")
     order: bool = Field(default=True, description="measure the order of convergence")
     eigenvalues: bool = Field(default=True, description="measure the engine's own eigenvalues, of a circular motion")
 
@@ -95,22 +97,28 @@ class Gate(Simulation):
 class Criterion(Table):
     """A verdict that a benchmark asks of every engine."""
 
-    energy_variation: float = Field(gt=0, description="limit of 100 (Emax - Emin) / E(0) [percent]")
+    energy_variation: float = Field(gt=0, description="limit of 100 (Emax - Emin) / |E(0)| [percent]")
 
 
 class Scenario(Table):
     """A scenario as its file declares it."""
 
-    title: str
-    tags: Annotated[tuple[str, ...], Field(strict=False)] = ()  # TOML has arrays only
-    surface: SurfaceTable
-    motion: Annotated[CircularTable | UprightTable, Field(discriminator="kind")]
-    perturbation: Perturbation = Perturbation()
-    simulation: Simulation
-    gate: Gate | None = None
-    criterion: Criterion | None = None
-    bicycle: dict[str, _Moderate] = Field(default_factory=dict)
-    engines: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    title: str = Field(description="one line of text")
+    tags: Annotated[tuple[str, ...], Field(strict=False)] = Field(  # TOML has arrays only
+        (), description="words that `velodrome run --tag` selects by"
+    )
+    surface: SurfaceTable = Field(description="ground")
+    motion: Annotated[CircularTable | UprightTable, Field(discriminator="kind")] = Field(
+        description="motion to start from"
+    )
+    perturbation: Perturbation = Field(Perturbation(), description="added to the start")
+    simulation: Simulation = Field(description="how long, and how often to report")
+    gate: Gate | None = Field(None, description="how the drift gate rides it; absent: it does not")
+    criterion: Criterion | None = Field(None, description="verdict asked of every engine")
+    bicycle: dict[str, _Moderate] = Field(
+        default_factory=dict, description="parameters that differ from the benchmark bicycle's, by name"
+    )
+    engines: dict[str, dict[str, Any]] = Field(default_factory=dict, description="settings by engine")
 
     @field_validator("title")
     @classmethod

@@ -67,7 +67,7 @@ class SphereTable(Table):
     """The lower half of a sphere."""
 
     kind: Literal["sphere"]
-    radius: _Length = Field(description="[m]")
+    radius: _Length = Field(description="of the sphere [m]")
 
     def make(self) -> Sphere:
         """The surface."""
@@ -129,7 +129,7 @@ class HeightFieldTable(Table):
     heights: Annotated[tuple[_Numbers, ...], Field(strict=False, max_length=1000)] = Field(
         description="row i, column j at origin + spacing (i, j) [m]"
     )
-    spacing: _Length = Field(description="[m]")
+    spacing: _Length = Field(description="distance of neighbouring points of the grid [m]")
     origin: Annotated[tuple[_Moderate, _Moderate], Field(strict=False)] = Field(
         (0.0, 0.0), description="x and y of the first height [m]"
     )

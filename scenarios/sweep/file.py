@@ -63,14 +63,16 @@ class Hypercube(Table):
 class SweepFile(Table):
     """A sweep as its file declares it."""
 
-    title: str = ""
+    title: str = Field("", description="one line of text")
     scenario: str | dict[str, Any] = Field(description="library name, path from the sweep file, or tables")
-    engines: _Names = (REFERENCE,)
+    engines: _Names = Field((REFERENCE,), description="names of engines; each rides every point")
     time_limit: float = Field(600.0, gt=0, le=1e6, description="of a run, on the clock [s]")
     memory_limit: float | None = Field(None, ge=1, le=1e9, description="that a run may take for itself [MB]")
     grid: dict[str, _Values] = Field(default_factory=dict, description="dotted key to values, all combinations")
-    latin_hypercube: Hypercube | None = None
-    list: Annotated[tuple[dict[str, Any], ...], Field(strict=False)] = ()
+    latin_hypercube: Hypercube | None = Field(None, description="points drawn evenly, with every combination of grid")
+    list: Annotated[tuple[dict[str, Any], ...], Field(strict=False)] = Field(
+        (), description="points one by one, each a table of dotted keys, with every combination of grid"
+    )
 
     @field_validator("grid", mode="before")
     @classmethod
