@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points, version
-from typing import Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -19,6 +19,10 @@ from pydantic import BaseModel, ConfigDict
 from ..reference.bicycle import Bicycle
 from ..reference.surface import Surface
 from .guard import EngineError, GuardedEngine, call_engine, where_raised
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
 
 ENTRY_POINT_GROUP = "velodrome.engines"
 REFERENCE = "reference"
@@ -64,9 +68,11 @@ SHAPES: dict[str, tuple[int, ...]] = {
 REQUIRED = tuple(SHAPES)[:5]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Trajectory:
     """What an engine computed. What it cannot give is None, never made up.
+
+    All fields are given by name.
 
     Attributes
     ----------
@@ -118,14 +124,14 @@ class Trajectory:
     qd: np.ndarray
     body_position: np.ndarray
     body_quaternion: np.ndarray
-    contact_point: np.ndarray | None
-    contact_force: np.ndarray | None
-    gap: np.ndarray | None
-    slip: np.ndarray | None
-    kinetic_energy: np.ndarray | None
-    potential_energy: np.ndarray | None
     steps: int
     cpu_time: float
+    contact_point: np.ndarray | None = None
+    contact_force: np.ndarray | None = None
+    gap: np.ndarray | None = None
+    slip: np.ndarray | None = None
+    kinetic_energy: np.ndarray | None = None
+    potential_energy: np.ndarray | None = None
     ended: str | None = None
     friction: float | None = None
     unconverged_steps: int | None = None
@@ -139,6 +145,37 @@ class Trajectory:
     def until(self, time: float) -> Self:
         """The ride up to a time [s], its first sample at least; steps and CPU time stay those of the whole."""
         return self.first(max(1, int(np.searchsorted(self.time, time, side="right"))))
+
+    def to_arrow(self) -> pa.Table:
+        """Return the trajectory as a table, with the columns of the stored Parquet files.
+
+        Units stand in the metadata of the columns, what is no column in that of the schema.
+
+        Returns
+        -------
+        pyarrow.Table
+            With n rows, in double precision.
+        """
+        from .storage import trajectory_table
+
+        return trajectory_table(self)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the trajectory as a data frame, with the columns of the stored Parquet files.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With n rows; the index is the time [s].
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
+        from .frames import trajectory_frame
+
+        return trajectory_frame(self)
 
     def not_finite(self) -> list[str]:
         """Names of what is given and is not finite in some samples."""

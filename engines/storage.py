@@ -72,6 +72,11 @@ _LONGEST_REASON = 300  # letters of what a reader of damaged files says
 
 def write_trajectory(trajectory: Trajectory, path: Path) -> None:
     """Write a trajectory to ``path``, whole or not at all."""
+    _write_table(trajectory_table(trajectory), path)
+
+
+def trajectory_table(trajectory: Trajectory) -> pa.Table:
+    """Return a trajectory as a table: its columns with their units, the rest in the schema's metadata."""
     found = []
     for name, names in trajectory_columns():
         value = getattr(trajectory, name)
@@ -79,7 +84,7 @@ def write_trajectory(trajectory: Trajectory, path: Path) -> None:
             continue
         flat = np.asarray(value, float).reshape(len(trajectory.time), len(names))
         found += [(column, flat[:, j], unit) for j, (column, unit) in enumerate(names)]
-    write_columns(found, path, {key: getattr(trajectory, key) for key in STORED_FACTS})
+    return _make_table(found, {key: getattr(trajectory, key) for key in STORED_FACTS})
 
 
 def write_columns(
@@ -97,12 +102,19 @@ def write_columns(
     **options
         Of `pyarrow.parquet.write_table`.
     """
+    _write_table(_make_table(columns, facts), path, **options)
+
+
+def _make_table(columns: Iterable[tuple[str, np.ndarray, str | None]], facts: Mapping[str, Any]) -> pa.Table:
     fields, arrays = [], []
     for name, values, unit in columns:
         metadata = None if unit is None else {b"unit": unit.encode()}
         arrays.append(pa.array(np.ascontiguousarray(values)))
         fields.append(pa.field(name, arrays[-1].type, nullable=False, metadata=metadata))
-    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata={METADATA_KEY: json.dumps(facts).encode()}))
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata={METADATA_KEY: json.dumps(facts).encode()}))
+
+
+def _write_table(table: pa.Table, path: Path, **options: Any) -> None:
     sealed = {**(table.schema.metadata or {}), DIGEST_KEY: digest(table)}
     with write_whole(path) as partial:
         pq.write_table(table.replace_schema_metadata(sealed), partial, **options)

@@ -7,7 +7,7 @@ from .friction import normal_force, required_friction
 from .identify import DISTURBANCES, IDENTIFY_LEVELS, STENCIL_WEIGHT, Identified, identify, interval_of, jacobian_at
 from .inspection import relative_differences, rms_force_error, state_error
 from .limits import ROUND_OFF, START_ERROR, Scale, eigenvalue_limits, noise, order_limit, ride_limits, step_force
-from .metrics import compute_metrics, position_errors, to_number
+from .metrics import compute_metrics, flatten_metrics, position_errors, to_number
 from .modes import Mode, Modes, find_modes
 from .precision import (
     SAME_BITS,
@@ -51,6 +51,7 @@ __all__ = [
     "fell_at",
     "find_mismatches",
     "find_modes",
+    "flatten_metrics",
     "identify",
     "interval_of",
     "jacobian_at",

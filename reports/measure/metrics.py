@@ -6,6 +6,7 @@ reports of them is held against these, see `velodrome.reports.measure.consistenc
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ from .fall import fell_at, until_fall
 from .friction import cone_is_left, normal_force, required_friction
 from .limits import ROUND_OFF
 
+# Quantities that have a largest value and one at the end, where they have any.
+_WITH_PARTS = ("position_error", "orientation_error")
 SETTLED_SHARE = 0.2  # from here on contacts that start unsettled have settled, of any model here [s]
 
 
@@ -88,6 +91,21 @@ def compute_metrics(
     }
     result["horizon"] = None if reference is None else find_horizon(trajectory, reference, growth_rate, size)
     return {name: _finite(value) for name, value in result.items()}
+
+
+def flatten_metrics(metrics: Mapping[str, Any]) -> dict[str, Any]:
+    """Metrics as columns: ``position_error`` becomes ``position_error_max`` and ``_end``, names one text or None."""
+    found: dict[str, Any] = {}
+    for name, value in metrics.items():
+        if isinstance(value, Mapping):
+            found |= {f"{name}_{part}": number for part, number in value.items()}
+        elif name in _WITH_PARTS:
+            found |= dict.fromkeys((f"{name}_max", f"{name}_end"))
+        elif isinstance(value, list):
+            found[name] = ", ".join(part if isinstance(part, str) else part["quantity"] for part in value) or None
+        else:
+            found[name] = value
+    return found
 
 
 def to_number(value: float) -> float | None:

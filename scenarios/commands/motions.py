@@ -75,12 +75,13 @@ def critical_command(as_json: JsonOption = False) -> None:
     """The critical α: cusps collide, families merge, their last stable sections vanish."""
     from rich.console import Console
 
-    from ..motions import critical_document
+    from ...reference.bicycle import Bicycle
+    from ..motions import find_critical_shapes
     from .present_motions import show_critical
     from .progress import ProgressBars
 
     with ProgressBars() as progress:
-        document = critical_document(progress.watch)
+        document = find_critical_shapes(Bicycle(), progress.watch).as_json()
     with ending_with(0):
         if as_json:
             print_json(document)

@@ -16,7 +16,7 @@ from ...reports.drawing import assign_colours
 from ...reports.measure import ROUND_OFF, START_ERROR, Scale, cut_at_fall, evaluate_ride
 from ..error import ScenarioError
 from ..files import make_folder, write_json, write_text
-from ..run import configure_engine, find_part, installed_engines, read_document, read_ride
+from ..run import configure_engine, find_part, installed_engines, read_document, read_ride, read_start_state
 from ..scenario import OF_THE_MOTION, CircularTable, Scenario, load_scenario, make_start
 from .differences import DIFFERS, StoredGround, StoredRun, diff_document, diff_markdown
 
@@ -87,7 +87,7 @@ def _read(folder: Path, name: str, engines: Sequence[str] | None) -> StoredRun:
         entries = {engine: manifest["engines"][engine] for engine in manifest["engines"] if _chosen(engine, engines)}
         _ = [manifest[key] for key in ("title", "scenario", "created", "complete", "libraries", "platform")]
         _ = [(entry["version"], dict(entry["settings"])) for entry in entries.values()]
-        _ = [float(manifest["start"]["growth_rate"]), *_state(manifest)]
+        _ = [float(manifest["start"]["growth_rate"]), *read_start_state(manifest)]
         rides = {engine: read_ride(folder, manifest, metrics, engine) for engine in entries if engine in metrics}
     except ScenarioError:
         raise
@@ -102,15 +102,10 @@ def _chosen(engine: str, engines: Sequence[str] | None) -> bool:
     return not engines or engine == REFERENCE or engine in engines
 
 
-def _state(manifest: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    q, qd = (np.array(manifest["start"][key], float) for key in ("q", "qd"))
-    if q.shape != (9,) or qd.shape != (9,):
-        raise ValueError("a start has nine coordinates and nine rates")
-    return q, qd
-
-
 def _same_start(before: StoredRun, after: StoredRun, first: Path, second: Path) -> None:
-    for a, b, what in zip(_state(before.manifest), _state(after.manifest), ("coordinates", "rates"), strict=True):
+    for a, b, what in zip(
+        read_start_state(before.manifest), read_start_state(after.manifest), ("coordinates", "rates"), strict=True
+    ):
         apart = np.abs(b - a)
         # Each is a root known to this; a table of numbers cannot say which of them is right.
         if np.any(apart > START_ERROR * (1 + np.abs(a))):
@@ -126,7 +121,7 @@ def _same_start(before: StoredRun, after: StoredRun, first: Path, second: Path) 
 
 
 def _ground(scenario: Scenario, run: StoredRun) -> StoredGround:
-    bicycle, (q, qd) = scenario.make_bicycle(), _state(run.manifest)
+    bicycle, (q, qd) = scenario.make_bicycle(), read_start_state(run.manifest)
     circular = isinstance(scenario.motion, CircularTable)
     radius = float(np.hypot(q[0], q[1])) if circular else bicycle.wheelbase
     growth_rate = float(run.manifest["start"]["growth_rate"])

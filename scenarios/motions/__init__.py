@@ -2,12 +2,24 @@
 
 from .atlas import make_atlas
 from .circular import CircularSolution, solve_circular
-from .families import critical_document, families_document, write_families
+from .families import (
+    CriticalShapes,
+    FamilyCurve,
+    SolutionFamilies,
+    families_document,
+    find_critical_shapes,
+    follow_families,
+    write_families,
+)
 
 __all__ = [
     "CircularSolution",
-    "critical_document",
+    "CriticalShapes",
+    "FamilyCurve",
+    "SolutionFamilies",
     "families_document",
+    "find_critical_shapes",
+    "follow_families",
     "make_atlas",
     "solve_circular",
     "write_families",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -10,20 +11,169 @@ import numpy as np
 
 from ...reference.bicycle import Bicycle
 from ...reference.critical import CriticalPoint, last_stable, reconnections
+from ...reference.curve import Samples
 from ...reference.families import FAMILIES, Family, trace_all
 from ...reference.modes import MODES, follow_modes
 from ...reference.sections import SectionEnd, sample_family, stable_sections
-from ...reference.special import special_points
+from ...reference.special import SpecialPoint, special_points
 from ...reference.standing import motion_stands, stands
-from ...reference.surface import Surface
+from ...reference.surface import Surface, SurfaceOfRevolution
 from ..files import make_folder, write_json
 from ..scenario import make_bowl, name_surface
 
 LONGEST_DRAWN_STEP = 0.05  # of the arc: some 100 to 300 points a family, no stable section known is shorter than three
 
 
-def families_document(ground: Surface | float) -> dict[str, Any]:
+@dataclass(frozen=True, kw_only=True)
+class FamilyCurve:
+    """A curve of circular motions that holds a solution family or a part of one.
+
+    Attributes
+    ----------
+    number : int
+        Of the family, 1 to 4.
+    ends : tuple of str
+        What the curve ends in, see `velodrome.reference.families.Family`.
+    samples : Samples
+        Rates, angles, energy, normal forces and growth rates of the n motions along the curve.
+    modes : ndarray, shape (n, 7), complex
+        Eigenvalues along the curve, each column following one mode [1/s].
+    rims_clear : ndarray of bool, shape (n,)
+        Whether the wheels touch the ground at their contact points alone.
+    stable_sections : tuple of pairs of SectionEnd
+        Where the motions are Lyapunov stable.
+    special_points : tuple of SpecialPoint
+        Points that the paper gives letters, folds, cusps and extremes of the energy.
+    """
+
+    number: int
+    ends: tuple[str, str]
+    samples: Samples = field(repr=False)
+    modes: np.ndarray = field(repr=False)
+    rims_clear: np.ndarray = field(repr=False)
+    stable_sections: tuple[tuple[SectionEnd, SectionEnd], ...] = field(repr=False)
+    special_points: tuple[SpecialPoint, ...] = field(repr=False)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return this curve's part of the document of `velodrome families`."""
+        return {
+            "family": self.number,
+            "ends": list(self.ends),
+            "points": self._points(),
+            "stable_sections": [_section(*ends) for ends in self.stable_sections],
+            "special_points": {
+                point.name: {
+                    "rear_rate": point.rear_rate,
+                    "front_rate": point.front_rate,
+                    "lean": point.lean,
+                    "steer": point.steer,
+                    "kind": point.kind,
+                }
+                for point in self.special_points
+            },
+        }
+
+    def _points(self) -> dict[str, list[Any]]:
+        """Quantities along the curve, equal-length lists."""
+        seen = self.samples
+        names = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "radius", "energy")
+        return {
+            **{name: getattr(seen, name).tolist() for name in names},
+            "lyapunov_stable": seen.stable.tolist(),
+            "rims_clear": self.rims_clear.tolist(),
+            "growth_rate": seen.growth_rate.tolist(),
+            "normal_force_rear": seen.normal_force[:, 0].tolist(),
+            "normal_force_front": seen.normal_force[:, 1].tolist(),
+            "eigenvalues": np.stack([np.real(self.modes), np.imag(self.modes)], axis=-1).tolist(),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolutionFamilies:
+    """The solution families of one bicycle on one ground.
+
+    Attributes
+    ----------
+    surface : SurfaceOfRevolution
+    curves : tuple of FamilyCurve
+        The families by number, then further curves under the number of the family that each was a part of.
+    absent : dict
+        Number of a family that has no curve on this ground to the reason.
+    """
+
+    surface: SurfaceOfRevolution
+    curves: tuple[FamilyCurve, ...]
+    absent: dict[int, str]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the JSON document of `velodrome families`."""
+        return {
+            **name_surface(self.surface),
+            "modes": list(MODES),  # what the columns of eigenvalues are
+            "families": [curve.as_json() for curve in self.curves],
+            "absent": {str(number): reason for number, reason in self.absent.items()},
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class CriticalShapes:
+    """Critical shapes of the paraboloid.
+
+    Attributes
+    ----------
+    cusp_collision : CriticalPoint or None
+        Where the cusps of families 2 and 4 meet; None if they do nowhere.
+    last_stable : dict
+        Number of a family to the `CriticalPoint` at which its last Lyapunov-stable section vanishes; None where there
+        is none.
+    merging : tuple of CriticalPoint
+        Where families exchange parts, with rising alpha.
+    """
+
+    cusp_collision: CriticalPoint | None
+    last_stable: dict[int, CriticalPoint | None]
+    merging: tuple[CriticalPoint, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the JSON document of `velodrome critical`."""
+        return {
+            "cusp_collision": _entry_or_null(self.cusp_collision),
+            "last_stable": {str(number): _entry_or_null(point) for number, point in self.last_stable.items()},
+            "merging": [{"families": list(point.families)} | critical_entry(point) for point in self.merging],
+        }
+
+
+def follow_families(bicycle: Bicycle, surface: SurfaceOfRevolution) -> SolutionFamilies:
     """Follow every curve of the four families on a ground, with special points and stable sections.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    surface : SurfaceOfRevolution
+
+    Returns
+    -------
+    SolutionFamilies
+    """
+    curves, absent = trace_all(bicycle, surface, LONGEST_DRAWN_STEP)
+    return SolutionFamilies(surface=surface, curves=tuple(map(examine_curve, curves)), absent=absent)
+
+
+def examine_curve(family: Family) -> FamilyCurve:
+    """Sample a curve and find its stable sections and special points."""
+    return FamilyCurve(
+        number=family.number,
+        ends=family.ends,
+        samples=sample_family(family),
+        modes=follow_modes(family),
+        rims_clear=np.array([stands(family.equations, point.unknowns) for point in family.points]),
+        stable_sections=tuple(ends for ends in stable_sections(family) if _standing(family, ends)),
+        special_points=tuple(special_points(family)),
+    )
+
+
+def families_document(ground: Surface | float) -> dict[str, Any]:
+    """Follow the four families of the benchmark bicycle on a ground.
 
     Parameters
     ----------
@@ -41,43 +191,29 @@ def families_document(ground: Surface | float) -> dict[str, Any]:
     ScenarioError
         If it is none.
     """
-    surface = make_bowl(ground)
-    curves, absent = trace_all(Bicycle(), surface, LONGEST_DRAWN_STEP)
-    families = [family_document(curve) for curve in curves]
-    return {
-        **name_surface(surface),
-        "modes": list(MODES),  # what the columns of eigenvalues are
-        "families": families,
-        "absent": {str(number): reason for number, reason in absent.items()},
-    }
+    return follow_families(Bicycle(), make_bowl(ground)).as_json()
 
 
-def critical_document(watch: Callable[[str, float, float], None]) -> dict[str, Any]:
-    """Compute the critical alpha of the benchmark bicycle.
+def find_critical_shapes(bicycle: Bicycle, watch: Callable[[str, float, float], None]) -> CriticalShapes:
+    """Compute the critical alpha of a bicycle.
 
     Parameters
     ----------
+    bicycle : Bicycle
     watch : callable
         Called with what is looked for, the alpha reached and the largest.
 
     Returns
     -------
-    dict
-        The JSON document of `velodrome critical`.
+    CriticalShapes
     """
-    bicycle = Bicycle()
     merging = reconnections(bicycle, lambda alpha: watch("merging", alpha, 1.0))
-    stable: dict[str, Any] = {}
+    stable = {}
     for number in FAMILIES:
         watch("last stable", float(number), float(len(FAMILIES)))
-        point = last_stable(bicycle, number)
-        stable[str(number)] = None if point is None else critical_entry(point)
-    collision = next(point for point in merging if point.families == (2, 4))
-    return {
-        "cusp_collision": critical_entry(collision),
-        "last_stable": stable,
-        "merging": [{"families": list(point.families)} | critical_entry(point) for point in merging],
-    }
+        stable[number] = last_stable(bicycle, number)
+    collision = next((point for point in merging if point.families == (2, 4)), None)
+    return CriticalShapes(cusp_collision=collision, last_stable=stable, merging=tuple(merging))
 
 
 def critical_entry(point: CriticalPoint) -> dict[str, Any]:
@@ -94,6 +230,10 @@ def critical_entry(point: CriticalPoint) -> dict[str, Any]:
     }
 
 
+def _entry_or_null(point: CriticalPoint | None) -> dict[str, Any] | None:
+    return None if point is None else critical_entry(point)
+
+
 def write_families(document: Mapping[str, Any], out: Path) -> None:
     """Write the document and its figure into a folder, which is made if need be.
 
@@ -107,42 +247,6 @@ def write_families(document: Mapping[str, Any], out: Path) -> None:
     make_folder(out)
     write_json(out / "families.json", document)
     family_figure(out / "families.png", document, Bicycle().front_wheel_radius)
-
-
-def family_document(family: Family) -> dict[str, Any]:
-    """One family's part of the document of `velodrome families`."""
-    return {
-        "family": family.number,
-        "ends": list(family.ends),
-        "points": _points(family),
-        "stable_sections": [_section(*ends) for ends in stable_sections(family) if _standing(family, ends)],
-        "special_points": {
-            point.name: {
-                "rear_rate": point.rear_rate,
-                "front_rate": point.front_rate,
-                "lean": point.lean,
-                "steer": point.steer,
-                "kind": point.kind,
-            }
-            for point in special_points(family)
-        },
-    }
-
-
-def _points(family: Family) -> dict[str, list[Any]]:
-    """Quantities along the curve, equal-length lists."""
-    seen = sample_family(family)
-    names = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "radius", "energy")
-    values = follow_modes(family)
-    return {
-        **{name: getattr(seen, name).tolist() for name in names},
-        "lyapunov_stable": seen.stable.tolist(),
-        "rims_clear": [stands(family.equations, point.unknowns) for point in family.points],
-        "growth_rate": seen.growth_rate.tolist(),
-        "normal_force_rear": seen.normal_force[:, 0].tolist(),
-        "normal_force_front": seen.normal_force[:, 1].tolist(),
-        "eigenvalues": np.stack([np.real(values), np.imag(values)], axis=-1).tolist(),
-    }
 
 
 def _standing(family: Family, ends: tuple[SectionEnd, SectionEnd]) -> bool:

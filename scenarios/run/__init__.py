@@ -1,13 +1,27 @@
 """A scenario in every engine: planned, run, measured, and stored as a run folder."""
 
-from .folder import RunPlan, library_versions
+from .folder import RunPlan, library_versions, write_run_recording
 from .installed import installed_engines
-from .runner import RunOutcome, RunWatch, Trace, claimed_noise, configure_engine, measure_one, plan_run, run_plan
-from .stored import find_part, read_document, read_json, read_ride
+from .runner import (
+    RunOutcome,
+    RunResult,
+    RunWatch,
+    Trace,
+    claimed_noise,
+    configure_engine,
+    measure_one,
+    measure_run,
+    plan_run,
+    ride_plan,
+    run_plan,
+    store_run,
+)
+from .stored import find_part, read_document, read_json, read_ride, read_start_state
 
 __all__ = [
     "RunOutcome",
     "RunPlan",
+    "RunResult",
     "RunWatch",
     "Trace",
     "claimed_noise",
@@ -16,9 +30,14 @@ __all__ = [
     "installed_engines",
     "library_versions",
     "measure_one",
+    "measure_run",
     "plan_run",
     "read_document",
     "read_json",
     "read_ride",
+    "read_start_state",
+    "ride_plan",
     "run_plan",
+    "store_run",
+    "write_run_recording",
 ]

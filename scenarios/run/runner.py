@@ -55,6 +55,46 @@ class RunOutcome:
     interrupted: bool
 
 
+@dataclass(frozen=True)
+class Rides:
+    """What the engines of a plan gave.
+
+    Attributes
+    ----------
+    trajectories : dict
+        By engine, in the order in which they rode.
+    failures : dict
+        Engines that gave no trajectory, with the reason.
+    interrupted : bool
+    """
+
+    trajectories: dict[str, Trajectory]
+    failures: dict[str, str]
+    interrupted: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunResult:
+    """The rides of a plan, measured and judged.
+
+    Attributes
+    ----------
+    trajectories : dict
+        By engine, as the engines gave them.
+    shown : dict
+        The same as they are drawn: with poses and energies that follow from the coordinates, up to a fall.
+    metrics, failures, verdicts, interrupted
+        As in `RunOutcome`.
+    """
+
+    trajectories: dict[str, Trajectory]
+    shown: dict[str, Trajectory]
+    metrics: dict[str, dict[str, Any]]
+    failures: dict[str, str]
+    verdicts: list[dict[str, Any]]
+    interrupted: bool
+
+
 def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> RunPlan:
     """Check engines and settings and compute the start.
 
@@ -126,7 +166,7 @@ def run_plan(
 
     Parameters
     ----------
-    plan : Plan
+    plan : RunPlan
     out : Path
         Folder that the run folder is made in.
     watch : callable
@@ -138,42 +178,95 @@ def run_plan(
 
     Returns
     -------
-    Outcome
+    RunOutcome
+    """
+    folder, result = store_run(plan, out, watch, note, trace)
+    return RunOutcome(folder, result.metrics, result.failures, result.verdicts, result.interrupted)
+
+
+def store_run(
+    plan: RunPlan, out: Path, watch: RunWatch, note: Callable[[str], None], trace: Trace | None = None
+) -> tuple[Path, RunResult]:
+    """Run every engine of a plan and write the run folder; return the folder and all that was computed.
+
+    See `run_plan` for the parameters.
     """
     folder = new_folder(out, plan.name)
     write_text(folder / "scenario.toml", tomli_w.dumps(plan.scenario.model_dump(exclude_none=True)))
-    trajectories: dict[str, Trajectory] = {}
-    failures: dict[str, str] = {}
-    interrupted = False
-    write_manifest(folder, plan, trajectories, failures)
+    write_manifest(folder, plan, {}, {})
+
+    def store(name: str, rides: Rides) -> None:
+        if name in rides.trajectories:
+            write_trajectory(rides.trajectories[name], folder / f"{name}.parquet")
+        write_manifest(folder, plan, rides.trajectories, rides.failures)
+
+    rides = ride_plan(plan, watch, note, trace, store)
+    with _deaf_to_interrupts():
+        result = measure_run(plan, rides)
+        write_json(folder / "metrics.json", result.metrics)
+        write_run_recording(folder, plan, result.shown, result.metrics, result.failures, result.verdicts)
+        complete = not result.interrupted
+        found = write_manifest(folder, plan, result.trajectories, result.failures, result.verdicts, complete=complete)
+        write_page(folder, plan, result.shown, result.metrics, found)
+    return folder, result
+
+
+def ride_plan(
+    plan: RunPlan,
+    watch: RunWatch,
+    note: Callable[[str], None],
+    trace: Trace | None = None,
+    store: Callable[[str, Rides], None] | None = None,
+) -> Rides:
+    """Ride every engine of a plan.
+
+    Parameters
+    ----------
+    plan : RunPlan
+    watch, note, trace : callable
+        As `run_plan` takes them.
+    store : callable, optional
+        Called with an engine's name and the rides so far when the engine is done or has failed.
+
+    Returns
+    -------
+    Rides
+        Of the engines that were done before Ctrl-C was pressed, if it was.
+    """
+    rides = Rides({}, {})
     problem, duration = plan.start.problem, plan.scenario.simulation.duration
     try:
         for name, (engine, settings) in plan.engines.items():
             try:
                 trajectory = ride_engine(engine, problem, settings, lambda t, name=name: watch(name, t, duration))
             except Exception as error:  # whatever an engine raises must not cost the others' results
-                failures[name] = why_failed(error)
-                note(f"{name}: {failures[name]}")
+                rides.failures[name] = why_failed(error)
+                note(f"{name}: {rides.failures[name]}")
                 if trace is not None:
                     trace(name, error)
             else:
-                write_trajectory(trajectory, folder / f"{name}.parquet")
-                trajectories[name] = trajectory
-            write_manifest(folder, plan, trajectories, failures)
+                rides.trajectories[name] = trajectory
+            if store is not None:
+                store(name, rides)
     except KeyboardInterrupt:
-        interrupted = True
         note("interrupted: finished engines are kept")
-    with _deaf_to_interrupts():
-        where = (problem.bicycle, problem.surface)
-        followed = {name: evaluate_ride(one, *where) for name, one in trajectories.items()}
-        measured = measure_rides(plan, trajectories, followed)
-        verdicts = judge_run(plan, measured)
-        write_json(folder / "metrics.json", measured)
-        shown = {name: cut_at_fall(one, *where) for name, one in followed.items()}
-        write_run_recording(folder, plan, shown, measured, failures, verdicts)
-        found = write_manifest(folder, plan, trajectories, failures, verdicts, complete=not interrupted)
-        write_page(folder, plan, shown, measured, found)
-    return RunOutcome(folder, measured, failures, verdicts, interrupted)
+        return Rides(rides.trajectories, rides.failures, interrupted=True)
+    return rides
+
+
+def measure_run(plan: RunPlan, rides: Rides) -> RunResult:
+    """Measure and judge the rides of a plan."""
+    where = (plan.start.problem.bicycle, plan.start.problem.surface)
+    followed = {name: evaluate_ride(one, *where) for name, one in rides.trajectories.items()}
+    metrics = measure_rides(plan, rides.trajectories, followed)
+    return RunResult(
+        trajectories=rides.trajectories,
+        shown={name: cut_at_fall(one, *where) for name, one in followed.items()},
+        metrics=metrics,
+        failures=rides.failures,
+        verdicts=judge_run(plan, metrics),
+        interrupted=rides.interrupted,
+    )
 
 
 def measure_one(

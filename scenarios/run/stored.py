@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...engines.engine import Trajectory
 from ...engines.storage import read_trajectory
 from ..error import ScenarioError
@@ -71,6 +73,20 @@ def read_json(path: Path) -> Any:
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
     return found
+
+
+def read_start_state(manifest: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates and rates at the start of a stored run, shapes (9,).
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If the manifest does not have them.
+    """
+    q, qd = (np.array(manifest["start"][key], float) for key in ("q", "qd"))
+    if q.shape != (9,) or qd.shape != (9,):
+        raise ValueError("a start has nine coordinates and nine rates")
+    return q, qd
 
 
 def read_ride(folder: Path, manifest: Mapping[str, Any], metrics: Mapping[str, Any], engine: str) -> Trajectory:

@@ -11,7 +11,7 @@ from .schema import (
     read_scenario_file,
     validate_scenario,
 )
-from .start import Start, make_start
+from .start import Start, make_start, output_times
 from .surfaces import make_bowl, name_surface, parse_surface
 from .table import (
     Table,
@@ -40,6 +40,7 @@ __all__ = [
     "make_bowl",
     "make_start",
     "name_surface",
+    "output_times",
     "parse_surface",
     "place_error",
     "read_scenario_file",

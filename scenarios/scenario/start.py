@@ -17,7 +17,7 @@ from ...reference.rim import require_clear_rims
 from ...reference.stability import growth_rate, linearise
 from ...reference.surface import Plane, Surface, SurfaceOfRevolution, evaluate
 from ..error import ScenarioError
-from .schema import CircularTable, Scenario
+from .schema import CircularTable, Scenario, Simulation
 from .surfaces import make_bowl
 
 # Runs of one motion, disturbed in many ways, need it once.
@@ -69,12 +69,16 @@ def make_start(scenario: Scenario) -> Start:
             require_clear_rims(bicycle, surface, q)
     except (ValueError, ArithmeticError) as error:
         raise ScenarioError(f"motion: {error}") from error
-    simulation = scenario.simulation
-    samples = round(simulation.duration * simulation.output_rate)
-    # Each time is rounded once: i / rate, not a sum of steps.
-    times = np.arange(samples + 1) / simulation.output_rate
+    times = output_times(scenario.simulation)
     size = float(np.hypot(*motion.position[:2])) if motion is not None else bicycle.wheelbase
     return Start(Problem(bicycle, surface, q, qd, times), undisturbed, family, motion, rate, size)
+
+
+def output_times(simulation: Simulation) -> np.ndarray:
+    """Return the times of the samples that a scenario asks for, shape (n,) [s]."""
+    samples = round(simulation.duration * simulation.output_rate)
+    # Each time is rounded once: i / rate, not a sum of steps.
+    return np.arange(samples + 1) / simulation.output_rate
 
 
 def _growth_rate(scenario: Scenario, bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> float:

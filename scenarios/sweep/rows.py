@@ -62,19 +62,6 @@ TIMING: dict[str, pa.DataType] = {
 }
 
 
-def flatten_metrics(metrics: Mapping[str, Any]) -> dict[str, Any]:
-    """Metrics as columns: ``position_error`` becomes ``position_error_max`` and ``_end``, names one text or None."""
-    found: dict[str, Any] = {}
-    for name, value in metrics.items():
-        if isinstance(value, Mapping):
-            found |= {f"{name}_{part}": number for part, number in value.items()}
-        elif isinstance(value, list):
-            found[name] = ", ".join(part if isinstance(part, str) else part["quantity"] for part in value) or None
-        else:
-            found[name] = value
-    return found
-
-
 def row_schema(tasks: Sequence[Task]) -> pa.Schema:
     """Columns of the data set beside the engine, which is the partition: facts, parameters, metrics."""
     fields = [*ROW_FACTS.items(), *_parameter_types(tasks).items(), *METRICS.items()]

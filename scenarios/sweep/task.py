@@ -15,11 +15,12 @@ import numpy as np
 from ...engines.admission import ride_engine
 from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, why_failed
 from ...engines.guard import call_engine
+from ...reports.measure import flatten_metrics
 from ..error import ScenarioError
 from ..run import claimed_noise, configure_engine, measure_one
 from ..scenario import OF_THE_MOTION, Scenario, Start, make_start, place_error, validate_scenario
 from .plan import canonical_text, prune_settings
-from .rows import METRICS, REFUSED, flatten_metrics, reason_line
+from .rows import METRICS, REFUSED, reason_line
 
 
 class Tasks:

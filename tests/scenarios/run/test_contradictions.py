@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from velodrome.engines import engine as registry
 from velodrome.engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory, engine_names
 from velodrome.reports.drawing.summary import make_remarks
+from velodrome.reports.measure import flatten_metrics
 from velodrome.reports.measure.consistency import describe_mismatch
 from velodrome.scenarios.cli import app
 from velodrome.scenarios.gate import checks as gate
@@ -23,7 +24,6 @@ from velodrome.scenarios.gate import sample as gate_sample
 from velodrome.scenarios.run.folder import RunPlan
 from velodrome.scenarios.run.runner import configure_engine, plan_run, run_plan
 from velodrome.scenarios.scenario.schema import Gate, library_names, load_scenario
-from velodrome.scenarios.sweep.rows import flatten_metrics
 
 OWN = "own"
 HONEST = [("q2-plus", 1.0), ("iftomm-2", 1.0), ("plane-circle", 0.3)]

@@ -16,6 +16,7 @@ from sweeping import UPRIGHT, data_set, here, planned, rows, swept
 
 from velodrome.engines.admission import ride_engine
 from velodrome.reference.bicycle import Bicycle
+from velodrome.reports.measure import flatten_metrics
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run.runner import claimed_noise, measure_one, plan_run
 from velodrome.scenarios.scenario.schema import load_scenario
@@ -56,7 +57,7 @@ def test_a_row_has_the_parameters_and_the_metrics_of_a_run(tmp_path: Path) -> No
     noise = claimed_noise(*alone.engines["mujoco-multipliers"])
     measured = measure_one(alone.start, rides["mujoco-multipliers"], rides["reference"], step_noise=noise)
     differing = set(columns.TIMING)
-    flat = {name: value for name, value in columns.flatten_metrics(measured).items() if name not in differing}
+    flat = {name: value for name, value in flatten_metrics(measured).items() if name not in differing}
     assert set(flat) == set(columns.METRICS) - {"family", "growth_rate", "size"}
     assert {name: found[1][name] for name in flat} == flat
     assert (found[1]["status"], found[1]["reason"]) == ("done", None)

@@ -1,0 +1,9 @@
+"""Runs and motions from Python: what the package's public face calls."""
+
+from .motions import circular, critical, families
+from .result import Run
+from .run import run
+from .stored import load
+from .table import MetricsTable
+
+__all__ = ["MetricsTable", "Run", "circular", "critical", "families", "load", "run"]

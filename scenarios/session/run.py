@@ -1,0 +1,139 @@
+"""Run a scenario from Python, by the code of the command `velodrome run`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...engines.engine import REFERENCE, Settings
+from ..error import ScenarioError
+from ..run import RunPlan, RunResult, measure_run, plan_run, ride_plan, store_run, write_run_recording
+from ..scenario import Scenario, load_scenario
+from .result import Run
+from .table import MetricsTable
+
+
+def run(
+    scenario: str | Path,
+    *,
+    engines: str | Iterable[str] | None = None,
+    duration: float | None = None,
+    out: str | Path | None = None,
+    settings: Mapping[str, Mapping[str, Any] | Settings] | None = None,
+    changes: Mapping[str, Any] | None = None,
+    progress: Callable[[str, float, float], None] | None = None,
+) -> Run:
+    """Run a scenario in every engine from the same computed start, compared with the reference.
+
+    Parameters
+    ----------
+    scenario : str or Path
+        Name of a scenario of the library (`scenario_names`), or path to a TOML file.
+    engines : str or iterable of str, optional
+        Engines to run beside the reference, which always runs; all that are installed and made for the problem if not
+        given.
+    duration : float, optional
+        Simulated time [s]; the scenario's own if not given.
+    out : str or Path, optional
+        Folder that a run folder is made in, as `velodrome run --out` does. Nothing is written if not given.
+    settings : mapping, optional
+        By the name of an engine: its settings, as a mapping or an instance of its `Settings`. They come on top of the
+        scenario's.
+    changes : mapping, optional
+        Fields of the scenario to override, by dotted key, such as ``{"perturbation.lean_rate": 0.2}``.
+    progress : callable, optional
+        Called with the engine at work, the simulated time that it has reached and the duration [s].
+
+    Returns
+    -------
+    Run
+        An engine that broke is in its ``failures``.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario, an engine's name or a setting is wrong, or the motion does not exist.
+    KeyboardInterrupt
+        If Ctrl-C was pressed; with ``out`` the engines that were done are in the run folder.
+
+    Examples
+    --------
+    >>> import velodrome
+    >>> run = velodrome.run("q2-plus", engines=["mujoco-multipliers"], duration=0.5)
+    >>> list(run.trajectories)
+    ['reference', 'mujoco-multipliers']
+    >>> run.trajectories["mujoco-multipliers"].q.shape
+    (51, 9)
+    """
+    fields = {key: _plain(value) for key, value in (changes or {}).items()}
+    if duration is not None:
+        fields["simulation.duration"] = _plain(duration)
+    name, resolved = load_scenario(str(scenario), fields)
+    plan = plan_run(name, _with_settings(resolved, settings or {}), _wanted(engines))
+    watch = progress if progress is not None else _silent
+    if out is None:
+        folder, result = None, measure_run(plan, ride_plan(plan, watch, _silent))
+    else:
+        folder, result = store_run(plan, Path(out), watch, _silent)
+    if result.interrupted:
+        raise KeyboardInterrupt
+    return _as_run(plan, result, folder)
+
+
+def _silent(*_: Any) -> None:
+    """Say nothing of what goes on; the run tells of failures when it is done."""
+
+
+def _wanted(engines: str | Iterable[str] | None) -> list[str] | None:
+    if engines is None:
+        return None
+    return [engines] if isinstance(engines, str) else list(engines) or [REFERENCE]
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of numpy as one that a TOML file could hold."""
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+
+
+def _with_settings(scenario: Scenario, settings: Mapping[str, Mapping[str, Any] | Settings]) -> Scenario:
+    """Return the scenario with engine settings put on top of its own.
+
+    Raises
+    ------
+    ScenarioError
+        If what is given for an engine is no table of settings.
+    """
+    engines = dict(scenario.engines)
+    for name, given in settings.items():
+        if isinstance(given, Settings):
+            values = given.model_dump(mode="json", exclude_none=True)
+        elif isinstance(given, Mapping):
+            values = {key: _plain(value) for key, value in given.items()}
+        else:
+            raise ScenarioError(f"settings of {name!r} are {given!r}; they must be a mapping such as {{'step': 0.001}}")
+        engines[name] = {**engines.get(name, {}), **values}
+    return scenario.model_copy(update={"engines": engines})
+
+
+def _as_run(plan: RunPlan, result: RunResult, folder: Path | None) -> Run:
+    def record(where: Path) -> None:
+        write_run_recording(where, plan, result.shown, result.metrics, result.failures, result.verdicts)
+
+    return Run(
+        name=plan.name,
+        title=plan.scenario.title,
+        start=plan.start.problem,
+        growth_rate=plan.start.growth_rate,
+        family=plan.start.family,
+        trajectories=result.trajectories,
+        metrics=MetricsTable(result.metrics, plan.scenario.simulation.duration),
+        verdicts=tuple(result.verdicts),
+        failures=result.failures,
+        left_out=plan.left_out,
+        folder=folder,
+        complete=not result.interrupted,
+        recorder=record,
+    )
