@@ -14,10 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...reference.kernels import contact
 from ...reference.kernels.compilation import jit
-from ...reference.kernels.rim import find_contact
-from ...reference.kernels.vector import add, cross, dot
+from ...reference.kernels.vector import add, cross
+from ...reference.kernels.wheel import contact_frame
 
 
 @jit
@@ -45,17 +44,6 @@ def rotate_vector(body, v):
 
 
 @jit
-def contact_frame(centre, x, axle, z, radius, ground, function, parameters):
-    """Return (gap, d, (lateral, forward, normal)) of a wheel; the gap is NaN where no contact is found."""
-    xi, eta, angle, found = find_contact(centre, x, z, radius, ground, function, parameters)
-    _, _, gap, normal, d, _, _, _, _, _, _ = contact.equations(
-        centre, x, z, radius, xi, eta, angle, function, parameters
-    )
-    lateral, forward = contact.tangents(axle, normal)
-    return gap if found else np.nan, d, (lateral, forward, normal)
-
-
-@jit
 def wheel_contact(coordinates, centre, triad, radius, ground, function, parameters):
     """Return (gap, A p + d, (lateral, forward, normal)) of a wheel at its node's coordinates (7,).
 
@@ -66,8 +54,8 @@ def wheel_contact(coordinates, centre, triad, radius, ground, function, paramete
     offset = rotate_vector(body, centre)
     middle = (coordinates[0] + offset[0], coordinates[1] + offset[1], coordinates[2] + offset[2])
     x, axle, z = rotate_vector(body, triad[0]), rotate_vector(body, triad[1]), rotate_vector(body, triad[2])
-    gap, d, frame = contact_frame(middle, x, axle, z, radius, ground, function, parameters)
-    return gap, add(offset, d), frame
+    gap, here, frame = contact_frame(middle, x, axle, z, radius, ground, function, parameters)
+    return gap, add(offset, here.arm), frame
 
 
 @jit
@@ -149,25 +137,3 @@ def normals(coordinates, centres, triads, radii, ground, function, parameters, o
             for i in range(3):
                 out[wheel, i] = frame[2][i] if gap == gap else np.nan
         yield True
-
-
-@jit
-def observe_wheel(position, velocity, rotation, spin, radius, ground, function, parameters, point, frames, gap, slip):
-    """Measure one wheel's contact along n samples of its own motion.
-
-    position, velocity, spin (n, 3) and rotation (n, 3, 3) are the body's, in inertial axes; its centre is
-    the wheel's, its y axis the axle. Fills point (n, 3), frames (n, 3, 3) with rows lateral, forward and
-    normal, gap (n,), and slip (n, 2).
-    """
-    for n in range(position.shape[0]):
-        a = rotation[n]
-        x, axle, z = (a[0, 0], a[1, 0], a[2, 0]), (a[0, 1], a[1, 1], a[2, 1]), (a[0, 2], a[1, 2], a[2, 2])
-        centre = (position[n, 0], position[n, 1], position[n, 2])
-        gap[n], d, frame = contact_frame(centre, x, axle, z, radius, ground, function, parameters)
-        turning = cross((spin[n, 0], spin[n, 1], spin[n, 2]), d)
-        material = (velocity[n, 0] + turning[0], velocity[n, 1] + turning[1], velocity[n, 2] + turning[2])
-        slip[n, 0], slip[n, 1] = dot(frame[0], material), dot(frame[1], material)
-        for i in range(3):
-            point[n, i] = centre[i] + d[i]
-            for j in range(3):
-                frames[n, i, j] = frame[i][j]

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...reference.bicycle import BODIES, Bicycle
-from ...reference.kinematics import YAW, coordinates_from_bodies
+from ...reference.kernels.wheel import observe_wheels
 from ...reference.rim import rim_search
+from ..coordinates import coordinates_from_bodies, start_on_turn
 from ..engine import Problem
-from . import kernel
 from .model import BodyMotion, Model
 from .wheels import MASS_UNIT, wheel_radii
 
@@ -34,11 +34,21 @@ def measure_contacts(problem: Problem, model: Model, motion: BodyMotion) -> Cont
     local_forces = model.rolling.local_forces(model.system)
     for wheel, radius in enumerate(wheel_radii(problem)):
         body = 2 + wheel
-        frames = np.empty((n, 3, 3))
-        kernel.observe_wheel(
-            *(motion.position[:, body], motion.velocity[:, body], motion.rotation[:, body], motion.spin[:, body]),
-            *(radius, looking, function, parameters),
-            *(point[:, wheel], frames, gap[:, wheel], slip[:, wheel]),
+        frames, unused = np.empty((n, 3, 3)), np.empty((3, n, 3))
+        observe_wheels(
+            motion.position[:, body],
+            motion.velocity[:, body],
+            motion.rotation[:, body],
+            motion.spin[:, body],
+            np.full(n, radius),
+            looking,
+            function,
+            parameters,
+            point[:, wheel],
+            frames,
+            gap[:, wheel],
+            slip[:, wheel],
+            *unused,
         )
         force[:, wheel] = np.einsum("ni,nij->nj", local_forces[:, wheel], frames)
     return Contacts(point, force, gap, slip)
@@ -64,6 +74,4 @@ def read_coordinates(problem: Problem, motion: BodyMotion) -> tuple[np.ndarray, 
     q, qd = coordinates_from_bodies(
         problem.bicycle, motion.time, motion.position[:, 0], motion.velocity[:, 0], motion.rotation, motion.spin
     )
-    turns = np.round((problem.q[YAW:] - q[0, YAW:]) / (2 * np.pi))
-    q[:, YAW:] += 2 * np.pi * turns
-    return q, qd
+    return start_on_turn(q, problem.q), qd

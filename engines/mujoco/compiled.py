@@ -39,7 +39,8 @@ from ...reference.kernels import contact
 from ...reference.kernels.compilation import compile_callback, jit
 from ...reference.kernels.linear import factorise, solve_factorised
 from ...reference.kernels.rim import RimSearch, find_contact, level_axes
-from ...reference.kernels.vector import add, cross, dot, scale
+from ...reference.kernels.vector import add, cross, dot
+from ...reference.kernels.wheel import contact_run
 from .library import announce_collision
 
 WHEEL_COUNT = 8  # the most that a blackboard has room for
@@ -281,8 +282,8 @@ def _motion(board, k, model, data, rows, turning):
             w[i] += turning[i, j] * qvel[j]
             gamma[i] += rate[i, j] * qvel[j]
     velocity, spin = (v[0], v[1], v[2]), (w[0], w[1], w[2])
-    along = board.radius[k] * contact.rates(here, velocity, spin)[2]
-    return here, velocity, add((gamma[0], gamma[1], gamma[2]), cross(spin, scale(along, here.tangent)))
+    run = contact_run(here, board.radius[k], velocity, spin)
+    return here, velocity, add((gamma[0], gamma[1], gamma[2]), cross(spin, run))
 
 
 @compile_callback(COLLISION, error_model="numpy")
