@@ -20,6 +20,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
 from docutils import nodes
 from docutils.parsers.rst import directives
 from sphinx.application import Sphinx
@@ -132,6 +133,7 @@ def draw_figure(code: str) -> Path:
             exec(compile(code, "<drawn>", "exec"), names)
         finally:
             os.chdir(before)
+            plt.close("all")  # the figure lives on, but pyplot would count it
         if "figure" not in names:
             raise ExtensionError(f"code of a picture leaves no figure:\n{code}")
         names["figure"].savefig(folder / "figure.png", dpi=160, metadata={"Software": None})
@@ -159,7 +161,7 @@ class Drawn(SphinxDirective):
     """Code that leaves a figure, and the figure."""
 
     has_content = True
-    option_spec = {"alt": directives.unchanged_required}  # noqa: RUF012
+    option_spec = {"alt": directives.unchanged_required, "picture-only": directives.flag}  # noqa: RUF012
 
     def run(self) -> list[nodes.Node]:
         """Return the block of code and the picture."""
@@ -168,10 +170,8 @@ class Drawn(SphinxDirective):
         code = "\n".join(self.content)
         picture = draw_figure(code)
         source = os.path.relpath(picture, Path(self.env.doc2path(self.env.docname)).parent)
-        return [
-            nodes.image(uri=Path(source).as_posix(), alt=self.options["alt"], classes=["drawn"]),
-            nodes.literal_block(code, code, language="python"),
-        ]
+        image = nodes.image(uri=Path(source).as_posix(), alt=self.options["alt"], classes=["drawn"])
+        return [image] if "picture-only" in self.options else [image, nodes.literal_block(code, code, language="python")]
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
