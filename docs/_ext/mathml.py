@@ -40,7 +40,7 @@ def _visit_block(self: HTML5Translator, node: nodes.math_block) -> None:
     number = ""
     if node["number"]:
         # Sphinx declares the node as the base class.
-        label = escape(get_node_equation_number(self, cast(Any, node)))
+        label = escape(str(get_node_equation_number(self, cast(Any, node))))
         number = f'<span class="eqno">({label})</span>'
     begin = self.starttag(node, "div", CLASS="math")
     self.body.append(f"{begin}{convert_formula(node.astext(), block=True)}{number}</div>\n")
