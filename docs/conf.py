@@ -43,7 +43,7 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
 }
-html_sidebars = {"index": [], "gallery": []}
+html_sidebars = {name: [] for name in ("index", "theory", "gallery")}
 
 default_role = "autolink"
 autosummary_generate = False

@@ -31,7 +31,8 @@ import velodrome
 
 DOCS = Path(__file__).parents[1]
 MADE = DOCS / "made"
-COLUMNS = 88  # letters in a line of the theme's widest column
+COLUMNS = 100  # letters in a line: the whole table of a run
+_PIXELS_DRAWN, _PIXELS_SHOWN = 160, 96  # an inch
 _LIBRARIES = ("exudyn", "mujoco", "numpy", "scipy", "numba", "matplotlib")
 
 
@@ -105,7 +106,9 @@ def run_commands(lines: str) -> Path:
             )
             if done.returncode not in (0, 1):
                 raise ExtensionError(f"{line}: {done.stderr}")
-            printed.append(done.stdout.strip("\n"))
+            # Where the command lies on this machine is nobody's business.
+            installed = str(Path(sys.executable).with_name("velodrome"))
+            printed.append(done.stdout.strip("\n").replace(installed, "velodrome"))
         (folder / "printed.json").write_text(json.dumps(printed), encoding="utf-8")
 
     return keep("typed", lines, make)
@@ -136,7 +139,7 @@ def draw_figure(code: str) -> Path:
             plt.close("all")  # the figure lives on, but pyplot would count it
         if "figure" not in names:
             raise ExtensionError(f"code of a picture leaves no figure:\n{code}")
-        names["figure"].savefig(folder / "figure.png", dpi=160, metadata={"Software": None})
+        names["figure"].savefig(folder / "figure.png", dpi=_PIXELS_DRAWN, metadata={"Software": None})
 
     return keep("drawn", code, make) / "figure.png"
 
@@ -170,7 +173,9 @@ class Drawn(SphinxDirective):
         code = "\n".join(self.content)
         picture = draw_figure(code)
         source = os.path.relpath(picture, Path(self.env.doc2path(self.env.docname)).parent)
-        image = nodes.image(uri=Path(source).as_posix(), alt=self.options["alt"], classes=["drawn"])
+        # As large as text of the same size in inches, and never wider than the page.
+        width = f"{round(_PIXELS_SHOWN * plt.imread(picture).shape[1] / _PIXELS_DRAWN)}px"
+        image = nodes.image(uri=Path(source).as_posix(), alt=self.options["alt"], classes=["drawn"], width=width)
         return [image] if "picture-only" in self.options else [image, nodes.literal_block(code, code, language="python")]
 
 

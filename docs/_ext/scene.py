@@ -19,10 +19,11 @@ _GROUND, _GRID, _EDGE = np.array([0.90, 0.925, 0.945]), np.array([0.68, 0.73, 0.
 _ELEVATION, _AZIMUTH = np.radians(42.0), np.radians(-60.0)
 _DARKER = 0.75  # the engines' colours are made for a dark ground
 _PIXELS = 1500
+_TRAIL = 2.6  # one turn or so [s]
 
 
 def draw_scene(run: velodrome.Run, engines: Sequence[str], time: float) -> Figure:
-    """Draw the bicycles of some engines at one time, with the paths of their rear contacts up to then.
+    """Draw the bicycles of some engines at one time, with the recent paths of their rear contacts.
 
     Parameters
     ----------
@@ -35,16 +36,18 @@ def draw_scene(run: velodrome.Run, engines: Sequence[str], time: float) -> Figur
     bicycle, surface = run.start.bicycle, run.start.surface
     rides = {name: run.trajectories[name].until(time) for name in engines}
     contacts = {name: _rear_contact(ride) for name, ride in rides.items()}
-    radius = max(float(np.hypot(*points[:, :2].T).max()) for points in contacts.values()) + 0.9
+    radius = max(float(np.hypot(*points[:, :2].T).max()) for points in contacts.values()) + 0.6
     rim = float(lift_points(surface, np.array([radius]), np.zeros(1))[0, 2])
-    centre = np.array([0.0, 0.0, rim + 0.25])
-    view = View(_AZIMUTH, _ELEVATION, centre, 2.04 * radius, 2.04 * radius * float(np.sin(_ELEVATION)) + 1.0)
+    # A bicycle at the far side reaches above the bowl.
+    centre = np.array([0.0, 0.0, rim + 0.2])
+    view = View(_AZIMUTH, _ELEVATION, centre, 2.04 * radius, 2.04 * radius * float(np.sin(_ELEVATION)) + 0.4)
     picture = Picture(view, _PIXELS)
     _draw_ground(picture, view, surface, radius)
     colours = {name: _DARKER * np.array(colour) / 255 for name, colour in assign_colours(run.trajectories).items()}
-    colours["reference"] = np.array([0.12, 0.12, 0.12])
+    colours["reference"] = np.array([0.35, 0.35, 0.35])
     for name, ride in rides.items():
-        track = lift_points(surface, contacts[name][:, 0], contacts[name][:, 1], 0.01)
+        recent = contacts[name][ride.time > ride.time[-1] - _TRAIL]
+        track = lift_points(surface, recent[:, 0], recent[:, 1], 0.01)
         picture.line(track, 3.0, colours[name])
         _draw_bicycle(picture, bicycle, ride, colours[name])
     with use_style():
