@@ -4,6 +4,9 @@ An engine is any object that satisfies `Engine` and is announced under the entry
 ``velodrome.engines``; the suite never names one.
 """
 
+# pandas and pyarrow carry no types.
+# pyright: reportMissingTypeStubs=false
+
 from __future__ import annotations
 
 import re
@@ -18,7 +21,8 @@ from pydantic import BaseModel, ConfigDict
 
 from ..reference.bicycle import Bicycle
 from ..reference.surface import Surface
-from .guard import EngineError, GuardedEngine, call_engine, where_raised
+from .guard import EngineError as EngineError
+from .guard import GuardedEngine, call_engine, where_raised
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -146,7 +150,7 @@ class Trajectory:
         """The ride up to a time [s], its first sample at least; steps and CPU time stay those of the whole."""
         return self.first(max(1, int(np.searchsorted(self.time, time, side="right"))))
 
-    def to_arrow(self) -> pa.Table:
+    def to_arrow(self) -> pa.Table:  # pyright: ignore[reportUnknownParameterType, reportUnknownMemberType]
         """Return the trajectory as a table, with the columns of the stored Parquet files.
 
         Units stand in the metadata of the columns, what is no column in that of the schema.
@@ -156,9 +160,9 @@ class Trajectory:
         pyarrow.Table
             With n rows, in double precision.
         """
-        from .storage import trajectory_table
+        from .storage import trajectory_table  # pyright: ignore[reportUnknownVariableType]
 
-        return trajectory_table(self)
+        return trajectory_table(self)  # pyright: ignore[reportUnknownVariableType]
 
     def to_pandas(self) -> pd.DataFrame:
         """Return the trajectory as a data frame, with the columns of the stored Parquet files.

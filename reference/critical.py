@@ -76,7 +76,7 @@ def reconnections(
     list of CriticalPoint
         With rising alpha.
     """
-    found = []
+    found: list[CriticalPoint] = []
     for number in (1, 2):
         for low, high in _changes(bicycle, number, largest, progress):
             point = _touching_point(bicycle, number, low, high)

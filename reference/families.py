@@ -278,7 +278,7 @@ def _met(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate:
         for towards in start.directions:
             points = _to_an_end(follow_curve(start.equations, start.unknowns, towards))
             yield from _new(found, start.equations, points, rear_rate)
-    every = _all_curves(bicycle, surface)
+    every = _all_curves(bicycle, surface)  # type: ignore[arg-type]
     others = [c for c in every if c.number == family and not any(_passes(c, start) for start in anchors)]
     for curve in others:
         yield from _new(found, curve.equations, curve.points, rear_rate)

@@ -40,7 +40,7 @@ class SurfaceFunction:
         Whether the compiled code is kept on disk; a closure's cannot be.
     """
 
-    source: Callable[..., tuple]
+    source: Callable[..., tuple[Any, ...]]
     cached: bool = True
 
     @cached_property
@@ -54,7 +54,7 @@ class SurfaceFunction:
         return compile_callback(_signature(types.complex128), cache=self.cached)(self.source)
 
 
-def surface_function(function: Callable[..., tuple]) -> SurfaceFunction:
+def surface_function(function: Callable[..., tuple[Any, ...]]) -> SurfaceFunction:
     """Make ``function(x, y, parameters) -> (f, fx, fy, fxx, fxy, fyy)`` a function for the kernels.
 
     All six results must be of the type of ``x`` (write ``0 * x`` for a zero), and the function must be

@@ -7,7 +7,7 @@ of them waits for the others'.
 from __future__ import annotations
 
 import sys
-from typing import NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -21,6 +21,7 @@ from .commands import (
     list_command,
     paper_command,
     precision_command,
+    print_versions,
     run_command,
     run_supervised,
     sweep_command,
@@ -35,6 +36,29 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+
+def _print_versions(wanted: bool) -> None:
+    if wanted:
+        print_versions()
+        raise typer.Exit
+
+
+@app.callback()
+def _take_options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            callback=_print_versions,
+            is_eager=True,
+            help="Show the versions of the suite, its engines and libraries, and exit.",
+        ),
+    ] = False,
+) -> None:
+    pass
+
+
 # In the order of the help.
 for _command in (
     list_command,

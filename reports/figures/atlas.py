@@ -253,5 +253,5 @@ def _cause_legend(document: Mapping[str, Any]) -> Iterator[Any]:
     for cause in sorted({cause for cause, length in pieces if length > 1}):
         yield Line2D([], [], color=INK, ls=_CAUSES[cause], label=f"end of stability: {_WORDS[cause]}")
     for cause in sorted({cause for cause, length in pieces if length == 1}):
-        mark = {"marker": "s", "color": "white", "mec": INK, "ms": 4, "ls": ""}
+        mark: dict[str, Any] = {"marker": "s", "color": "white", "mec": INK, "ms": 4, "ls": ""}
         yield Line2D([], [], **mark, label=f"on the plane alone: {_WORDS[cause]}")

@@ -199,8 +199,8 @@ def _extremes(values: np.ndarray) -> dict[str, float]:
 
 
 def _errors(trajectory: Trajectory, reference: Trajectory | None) -> dict[str, Any]:
-    names = ("position_error", "orientation_error", "rate_error", "rear_rate_error", "contact_force_error")
-    names += ("contact_force_error_at", "settled_force_error")
+    names = ["position_error", "orientation_error", "rate_error", "rear_rate_error", "contact_force_error"]
+    names += ["contact_force_error_at", "settled_force_error"]
     result: dict[str, Any] = dict.fromkeys(names)
     if reference is None:
         return result

@@ -44,12 +44,7 @@ def steady_trajectory(bicycle: Bicycle, motion: CircularMotion, times: np.ndarra
         qd=qd,
         body_position=body_positions(bicycle, q),
         body_quaternion=body_quaternions(bicycle, q),
-        contact_point=None,
         contact_force=force,
-        gap=None,
-        slip=None,
-        kinetic_energy=None,
-        potential_energy=None,
         steps=0,
         cpu_time=0.0,
     )

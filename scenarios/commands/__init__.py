@@ -7,6 +7,7 @@ from .stored import diff_command, view_command
 from .studies import paper_command, precision_command
 from .supervision import run_supervised
 from .sweep import sweep_command
+from .version import print_versions
 
 __all__ = [
     "atlas_command",
@@ -18,6 +19,7 @@ __all__ = [
     "list_command",
     "paper_command",
     "precision_command",
+    "print_versions",
     "run_command",
     "run_supervised",
     "sweep_command",

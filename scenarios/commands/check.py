@@ -93,8 +93,8 @@ def check_command(
         else:
             console = Console()
             show_verdicts(console, verdicts, renewed=update)
-            for path in written:
-                console.print(f"baseline written: {path}", soft_wrap=True)
+            for name in written:
+                console.print(f"baseline written: {name}", soft_wrap=True)
             for name, verdict in refused:
                 line = f"no baseline written of {verdict.engine} on {name}: {verdict.reason}"
                 console.print(line, style="red", markup=False, highlight=False, soft_wrap=True)

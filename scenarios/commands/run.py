@@ -36,7 +36,7 @@ def list_command(as_json: JsonOption = False) -> None:
     for name in library_names():
         _, scenario = load_scenario(name)
         scenarios.append({"name": name, "title": scenario.title, "tags": list(scenario.tags)})
-    engines = []
+    engines: list[dict[str, Any]] = []
     for name in installed_engines():
         try:
             engine = load_engine(name)

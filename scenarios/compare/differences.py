@@ -248,7 +248,7 @@ def _metrics(
 
 def _flat(metrics: Mapping[str, Any]) -> dict[str, Any]:
     """Metrics with the parts of those that have parts under names of their own."""
-    found = {}
+    found: dict[str, Any] = {}
     for name, value in metrics.items():
         if isinstance(value, Mapping):
             found |= {f"{name}.{part}": number for part, number in value.items()}

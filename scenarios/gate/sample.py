@@ -254,8 +254,8 @@ def _order(start: Start, engine: Engine, settings: Settings, step_noise: float) 
     first, second = (float(np.abs(b - a).max()) for a, b in pairwise(paths))
     scale = replace(scale_of(start), duration=float(short.times[-1]))
     # The finest ride has the most steps.
-    error = scale.radius * noise(scale, step_noise, rides[-1].steps)
-    limit = order_limit(error, (first, second))
+    round_off = scale.radius * noise(scale, step_noise, rides[-1].steps)
+    limit = order_limit(round_off, (first, second))
     if limit is None:
         return none, {"observed_order": BELOW_NOISE}
     return {"observed_order": (observed_orders(paths)[-1], limit)}, {}

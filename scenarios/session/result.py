@@ -100,5 +100,5 @@ class Run:
     def _repr_html_(self) -> str:
         notes = "".join(f"<li>{escape(line)}</li>" for line in self._notes())
         where = "" if self.folder is None else f"<p>run folder: <code>{escape(str(self.folder))}</code></p>"
-        table = self.metrics._repr_html_()
+        table = self.metrics.to_html()
         return f"<p><b>{escape(self._heading())}</b></p>{table}{f'<ul>{notes}</ul>' if notes else ''}{where}"

@@ -14,9 +14,9 @@ Examples
 """
 
 from importlib import import_module as _import_module
-from typing import TYPE_CHECKING as _TYPE_CHECKING
+from typing import TYPE_CHECKING
 
-if _TYPE_CHECKING:
+if TYPE_CHECKING:
     from .engines.engine import Engine as Engine
     from .engines.engine import Problem as Problem
     from .engines.engine import Settings as Settings
@@ -119,21 +119,23 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 
-def __getattr__(name: str) -> object:
-    """Import a public name when it is first asked for."""
-    if name == "__version__":
-        from importlib.metadata import version
+if not TYPE_CHECKING:  # or type checkers would take any name for a public one
 
-        value: object = version("velodrome")
-    elif name == "scenario_names":
-        value = _import_module(".scenarios.scenario", __name__).library_names
-    elif name in _HOME:
-        value = getattr(_import_module(_HOME[name], __name__), name)
-    else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    globals()[name] = value
-    return value
+    def __getattr__(name: str) -> object:
+        """Import a public name when it is first asked for."""
+        if name == "__version__":
+            from importlib.metadata import version
+
+            value: object = version("velodrome")
+        elif name == "scenario_names":
+            value = _import_module(".scenarios.scenario", __name__).library_names
+        elif name in _HOME:
+            value = getattr(_import_module(_HOME[name], __name__), name)
+        else:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)

@@ -78,12 +78,7 @@ class PlainEngine:
             qd=qd,
             body_position=body_positions(problem.bicycle, q),
             body_quaternion=body_quaternions(problem.bicycle, q),
-            contact_point=None,
             contact_force=np.array([self._solved(problem, y)[1] for y in states]).reshape(-1, 2, 3),
-            gap=None,
-            slip=None,
-            kinetic_energy=None,
-            potential_energy=None,
             steps=stride * (len(problem.times) - 1),
             cpu_time=time.process_time() - begin,
         )
