@@ -1,7 +1,7 @@
 """Measurements on rides: errors, drift, falls, friction, modes, orders, and what round-off allows them to differ by."""
 
 from .consistency import LARGEST_NOISE, TURNING, Mismatch, describe_mismatch, evaluate_ride, find_mismatches
-from .convergence import observed_orders
+from .convergence import extrapolate, observed_orders
 from .fall import cut_at_fall, fell_at, until_fall
 from .friction import normal_force, required_friction
 from .identify import DISTURBANCES, IDENTIFY_LEVELS, STENCIL_WEIGHT, Identified, identify, interval_of, jacobian_at
@@ -48,6 +48,7 @@ __all__ = [
     "eigenvalue_pairs",
     "engine_document",
     "evaluate_ride",
+    "extrapolate",
     "fell_at",
     "find_mismatches",
     "find_modes",

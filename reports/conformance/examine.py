@@ -1,0 +1,200 @@
+"""The examination of an engine: which rides are made of it, and which checks look at them."""
+
+from __future__ import annotations
+
+import os
+import random
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from ...engines.admission import ride_engine
+from ...engines.engine import Engine, EngineError, Settings, why_failed
+from ...engines.guard import GuardedEngine
+from ...reference.bicycle import Bicycle
+from ...reference.surface import Surface
+from .forces import check_forces
+from .maps import check_maps
+from .motions import GROUNDS, OTHER_BICYCLE, Motion, make_motion, make_problem, output_times
+from .order import check_order
+from .protocol import check_settings, guard_engine
+from .refusals import check_refusals, suits
+from .repeats import check_bits, check_own_work
+from .report import Check, ConformanceError, ConformanceReport, judge
+from .reports import check_bodies, check_reports
+from .rides import Ride
+from .start import check_start
+from .timing import check_clock, check_rates
+
+_RIDE = "it rides to the end, and what it gives is a trajectory of the problem"
+
+
+def check_engine(engine: Engine | str, settings: Mapping[str, Any] | None = None) -> ConformanceReport:
+    """Examine an engine as `examine_engine` does, and raise an error if a check fails.
+
+    Parameters
+    ----------
+    engine : Engine or str
+    settings : mapping, optional
+
+    Returns
+    -------
+    ConformanceReport
+        In which no check failed.
+
+    Raises
+    ------
+    ConformanceError
+        An `AssertionError` that lists all failed checks with their diagnoses.
+    ValueError
+        If the engine refuses the settings.
+    """
+    report = examine_engine(engine, settings)
+    if not report.passed:
+        raise ConformanceError(report)
+    return report
+
+
+def examine_engine(engine: Engine | str, settings: Mapping[str, Any] | None = None) -> ConformanceReport:
+    """Examine an engine: let it ride short transients, and hold it against what every engine must keep to.
+
+    Parameters
+    ----------
+    engine : Engine or str
+        The object itself, installed or not, or the name of an installed one.
+    settings : mapping, optional
+        Values of its settings that differ from the defaults.
+
+    Returns
+    -------
+    ConformanceReport
+        Whatever the engine does: an engine that breaks, exits or prints fails checks.
+
+    Raises
+    ------
+    ValueError
+        If the engine refuses the settings.
+    """
+    guarded, protocol = guard_engine(engine)
+    if guarded is None:
+        name = engine if isinstance(engine, str) else str(getattr(engine, "name", type(engine).__name__))
+        return ConformanceReport(name, "", {}, (protocol,))
+    checks = [protocol, check_settings(guarded)]
+    try:
+        chosen = guarded.settings.model_validate(dict(settings or {}))
+    except ValidationError as error:
+        if settings:
+            raise ValueError(f"{guarded.name} refuses the settings: {error.errors()[0]['msg']}") from error
+        return ConformanceReport(str(guarded.name), str(guarded.version), {}, tuple(checks))
+    before = _surroundings()
+    checks += _Examination(guarded, chosen).checks()
+    checks.append(_check_surroundings(before))
+    shown = chosen.model_dump(mode="json")
+    return ConformanceReport(guarded.name, guarded.version, shown, tuple(checks))
+
+
+@dataclass(frozen=True)
+class _Examination:
+    """An engine with its settings, and the times at which it reported progress in its rides."""
+
+    engine: GuardedEngine
+    settings: Settings
+    reported: list[list[float]] = field(default_factory=list)
+
+    @property
+    def step_noise(self) -> float:
+        return self.engine.step_noise(self.settings)
+
+    def ride(self, motion: Motion, factor: float = 1.0) -> Ride:
+        """Ride a motion with a factor on the step; errors as of `ride_engine` and of `Settings.refined`."""
+        settings = self.settings if factor == 1.0 else self.settings.refined(factor)
+        self.reported.append([])
+        trajectory = ride_engine(self.engine, motion.problem, settings, self.reported[-1].append)
+        if trajectory.ended is not None:
+            raise EngineError(f"it ended at {trajectory.time[-1]:.6g} s: {trajectory.ended}")
+        return Ride(motion, trajectory, self.engine.step_noise(settings))
+
+    def checks(self) -> Iterator[Check]:
+        times = output_times(getattr(self.settings, "step", None))
+        wrong: list[str] = []
+        suitable: dict[str, bool] = {}
+        grounds: dict[str, Surface] = {}
+        for name, make in GROUNDS.items():
+            grounds[name] = make()
+            problem = make_problem(grounds[name], Bicycle(), times)
+            suitable[name], more = suits(self.engine, problem, self.settings)
+            wrong += more
+        ridden = [name for name, good in suitable.items() if good]
+        if not ridden:
+            yield judge(
+                "grounds", "it rides on one ground at least", [*wrong, "it refuses all: a plane, a bowl, waves"]
+            )
+            return
+        motion = make_motion(ridden[0], make_problem(grounds[ridden[0]], Bicycle(), times))
+        try:
+            first = self.ride(motion)
+        except Exception as error:  # another package's code may break in any way
+            yield judge(f"ride on {motion.name}", _RIDE, [why_failed(error)])
+            return
+        yield judge(f"ride on {motion.name}", _RIDE, _wrong_facts(first, self.reported[-1]))
+        yield check_refusals(self.engine, self.settings, first, wrong, suitable)
+        yield from _judged(first)
+        # The other bicycle too: an engine that knows but the benchmark's would pass on one.
+        other = make_motion(f"{ridden[-1]}, another bicycle", make_problem(grounds[ridden[-1]], OTHER_BICYCLE, times))
+        try:
+            second = self.ride(other)
+        except Exception as error:  # another package's code may break in any way
+            yield judge(f"ride on {other.name}", _RIDE, [why_failed(error)])
+        else:
+            yield judge(f"ride on {other.name}", _RIDE, _wrong_facts(second, self.reported[-1]))
+            yield from _judged(second)
+        try:
+            again = self.ride(motion)
+        except Exception as error:  # another package's code may break in any way
+            yield judge("same bits", "a ride can be repeated", [why_failed(error)])
+        else:
+            yield check_bits(first, again.trajectory)
+        yield check_own_work(first, self.engine.name)
+        yield check_order(motion.name, lambda factor: self.ride(motion, factor))
+
+
+def _judged(ride: Ride) -> Iterator[Check]:
+    """The checks of one ride."""
+    yield check_start(ride)
+    yield check_maps(ride)
+    yield check_rates(ride)
+    yield check_clock(ride)
+    yield check_bodies(ride)
+    yield check_reports(ride)
+    yield check_forces(ride)
+
+
+def _wrong_facts(ride: Ride, reported: list[float]) -> Iterator[str]:
+    trajectory, end = ride.trajectory, float(ride.motion.problem.times[-1])
+    if trajectory.not_finite():
+        yield f"not finite in some samples: {', '.join(trajectory.not_finite())}"
+    if trajectory.unconverged_steps:
+        yield f"its iterations did not converge in {trajectory.unconverged_steps} of {trajectory.steps} steps"
+    if not trajectory.steps > 0:
+        yield "it says that it took no steps"
+    if reported != sorted(reported) or not all(0 <= time <= end * (1 + 1e-9) for time in reported):
+        yield f"the times of its progress must rise from 0 to {end:g} s; it reported {reported[:3]}"
+
+
+def _surroundings() -> dict[str, Any]:
+    """What an engine may not change in the process that it runs in."""
+    return {
+        "numpy's handling of errors": np.geterr(),
+        "numpy's random numbers": repr(np.random.get_state()),  # noqa: NPY002
+        "Python's random numbers": random.getstate(),
+        "the environment's variables": dict(os.environ),
+    }
+
+
+def _check_surroundings(before: Mapping[str, Any]) -> Check:
+    after = _surroundings()
+    changed = [f"it changed {what}" for what, value in before.items() if after[what] != value]
+    return judge("surroundings", "it leaves the process as it found it", changed)

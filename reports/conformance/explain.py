@@ -1,0 +1,92 @@
+"""What numbers look like beside those that they should be: mirrored, swapped, scaled, shifted or late."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ...reference.kinematics import COORDINATES
+
+# A fault explains a difference if it leaves no more than this share of it.
+EXPLAINED = 0.1
+_UNITS = {180 / np.pi: "in degrees", np.pi / 180: "in radians twice over", 1e-3: "in thousands", 1e3: "in thousandths"}
+
+
+def rate_names() -> list[str]:
+    """Names of the nine rates in words."""
+    return [f"the rate of {name}" for name in COORDINATES]
+
+
+def size_of(values: np.ndarray) -> float:
+    """Root of the sum of squares; inf where a value is not finite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        size = float(np.sqrt(np.sum(np.square(values))))
+    return size if np.isfinite(size) else np.inf
+
+
+def explains(given: np.ndarray, guess: np.ndarray, expected: np.ndarray) -> bool:
+    """Whether a guess comes so near to what is given that hardly anything of its difference is left."""
+    return size_of(given - guess) <= EXPLAINED * size_of(given - expected)
+
+
+def fit_factor(given: np.ndarray, expected: np.ndarray) -> float | None:
+    """The factor by which ``given`` is ``expected``; None if it is not by a factor."""
+    square = float(np.sum(expected * expected))
+    if not 0 < square < np.inf:
+        return None
+    factor = float(np.sum(given * expected)) / square
+    return factor if explains(given, factor * expected, expected) else None
+
+
+def fit_lag(given: np.ndarray, expected: np.ndarray, time: np.ndarray) -> float | None:
+    """The time by which samples (n, ...) from the second on are late [s]; None if that explains no difference."""
+    if len(time) < 4:
+        return None
+    slope = np.gradient(expected, time, axis=0, edge_order=2)[1:]
+    apart, square = (given - expected)[1:], float(np.sum(slope * slope))
+    if not 0 < square < np.inf:
+        return None
+    lag = -float(np.sum(apart * slope)) / square
+    # A line from sample to sample errs by its curvature over the lag.
+    return lag if size_of(apart + lag * slope) <= EXPLAINED * size_of(apart) + _bend(expected, time, lag) else None
+
+
+def _bend(expected: np.ndarray, time: np.ndarray, lag: float) -> float:
+    slope = np.gradient(expected, time, axis=0, edge_order=2)
+    return size_of(0.5 * lag * lag * np.gradient(slope, time, axis=0, edge_order=2)[1:])
+
+
+def explain_columns(given: np.ndarray, expected: np.ndarray, off: Sequence[int], names: Sequence[str]) -> Iterator[str]:
+    """Say of columns what they look like.
+
+    Parameters
+    ----------
+    given, expected : ndarray, shape (n, k)
+    off : sequence of int
+        The columns that are wrong.
+    names : sequence of str
+        Of all columns.
+    """
+    for i in off:
+        yield _explain_column(given, expected, i, names)
+
+
+def _explain_column(given: np.ndarray, expected: np.ndarray, i: int, names: Sequence[str]) -> str:
+    own, right = given[:, i], expected[:, i]
+    said = f"{names[i]} is {own[0]:.6g}" + (f", not {right[0]:.6g}" if len(own) == 1 else " at first")
+    if len(own) > 1:
+        worst = int(np.argmax(np.abs(own - right)))
+        said = f"{names[i]} is {own[worst]:.6g}, not {right[worst]:.6g}, in sample {worst}"
+    if explains(own, -right, right):
+        return f"{said}: {names[i]} looks mirrored"
+    for j in range(given.shape[1]):
+        if j != i and explains(own, expected[:, j], right) and explains(given[:, j], right, expected[:, j]):
+            return f"{said}: {names[i]} looks swapped with {names[j]}"
+    factor = fit_factor(own, right)
+    if factor is not None:
+        for unit, words in _UNITS.items():
+            if abs(factor / unit - 1) < EXPLAINED:
+                return f"{said}: {names[i]} looks to be {words}"
+        return f"{said}: {names[i]} looks scaled by {factor:.6g}"
+    return said

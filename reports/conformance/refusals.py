@@ -1,0 +1,86 @@
+"""Whether an engine refuses what it cannot do, before it computes anything, and does what it does not refuse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from ...engines.admission import ride_engine
+from ...engines.engine import Problem, UnsuitableProblem, why_failed
+from ...engines.guard import GuardedEngine
+from .motions import awkward_times, make_motion
+from .report import Check, judge
+from .rides import Ride
+
+_ROOM = 4.0  # of two errors of one computation
+_LONGEST = 400  # letters that fit a line of a table
+
+
+def suits(engine: GuardedEngine, problem: Problem, settings: Any) -> tuple[bool, list[str]]:
+    """Ask an engine whether it is made for a problem; also what is wrong with its answer."""
+    try:
+        engine.check(problem, settings)
+    except UnsuitableProblem as error:
+        return False, list(_wrong_words(error, "the refusal of a ground"))
+    except Exception as error:  # another package's code may break in any way
+        return False, [
+            f"its check raises {why_failed(error)} for a rideable {type(problem.surface).__name__}; a ground that it "
+            "does not know is an UnsuitableProblem"
+        ]
+    return True, []
+
+
+def check_refusals(
+    engine: GuardedEngine, settings: Any, ride: Ride, wrong: list[str], suitable: dict[str, bool]
+) -> Check:
+    """Check refusals of grounds, found before, and of output times that the step does not meet."""
+    seen = [f"it rides on the {name}" if good else f"it refuses the {name}" for name, good in suitable.items()]
+    found = list(wrong)
+    times = awkward_times(ride.motion.problem.times)
+    awkward = replace(ride.motion.problem, times=times)
+    try:
+        engine.check(awkward, settings)
+    except UnsuitableProblem:
+        found.append(
+            "output times beside its steps are no UnsuitableProblem, which stands for grounds; raise ValueError"
+        )
+    except ValueError as error:
+        found += _wrong_words(error, "the refusal of output times")
+        seen.append(f"it refuses an output interval of {times[1]:.6g} s")
+    except Exception as error:  # another package's code may break in any way
+        found.append(f"its check raises {why_failed(error)} for output times beside its steps; raise ValueError")
+    else:
+        found += _wrong_ride(engine, settings, ride, awkward)
+        seen.append(f"it rides with an output interval of {times[1]:.6g} s")
+    return judge(
+        "refusals",
+        "check refuses what cannot be run, a ground by UnsuitableProblem and times by ValueError, in one line; the "
+        "rest is ridden",
+        found,
+        seen,
+        "samples between steps may be off by the noise and four times the error of those at steps",
+    )
+
+
+def _wrong_words(error: Exception, what: str) -> Iterator[str]:
+    words = str(error)
+    if not (words.strip() and words.isprintable() and len(words) <= _LONGEST):
+        yield f"{what} says {words[:80]!r}; it must say in one line what is wrong and what would be right"
+
+
+def _wrong_ride(engine: GuardedEngine, settings: Any, ride: Ride, awkward: Problem) -> Iterator[str]:
+    """What is wrong with the samples of a ride whose output times lie between steps."""
+    motion = make_motion(ride.motion.name, awkward)
+    try:
+        trajectory = ride_engine(engine, awkward, settings, lambda _: None)
+    except Exception as error:  # another package's code may break in any way
+        yield f"check accepts an output interval of {awkward.times[1]:.6g} s, and the ride fails: {why_failed(error)}"
+        return
+    found = Ride(motion, trajectory, ride.step_noise)
+    allowed = ride.noise + _ROOM * ride.error
+    if not found.error <= allowed:
+        yield (
+            f"check accepts an output interval of {awkward.times[1]:.6g} s, and samples between its steps are off by "
+            f"{found.error:.2g}, limit {allowed:.2g}"
+        )
