@@ -176,7 +176,9 @@ class Drawn(SphinxDirective):
         # As large as text of the same size in inches, and never wider than the page.
         width = f"{round(_PIXELS_SHOWN * plt.imread(picture).shape[1] / _PIXELS_DRAWN)}px"
         image = nodes.image(uri=Path(source).as_posix(), alt=self.options["alt"], classes=["drawn"], width=width)
-        return [image] if "picture-only" in self.options else [image, nodes.literal_block(code, code, language="python")]
+        return (
+            [image] if "picture-only" in self.options else [image, nodes.literal_block(code, code, language="python")]
+        )
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

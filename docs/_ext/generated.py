@@ -6,10 +6,10 @@ import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sphinx.application import Sphinx
-from sphinx.errors import ExtensionError
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
 # The modules beside this one: Sphinx loads extensions by name from this folder.
 sys.path.insert(0, str(Path(__file__).parent))
@@ -40,13 +40,13 @@ def fill_page(text: str) -> str:
 
     Raises
     ------
-    ExtensionError
+    ValueError
         If there is no such generator.
     """
 
     def fill(mark: re.Match[str]) -> str:
         if mark[1] not in GENERATORS:
-            raise ExtensionError(f"nothing is generated under {mark[1]!r}; there are {', '.join(GENERATORS)}")
+            raise ValueError(f"nothing is generated under {mark[1]!r}; there are {', '.join(GENERATORS)}")
         return GENERATORS[mark[1]](*mark[2].split())
 
     return MARK.sub(fill, text)

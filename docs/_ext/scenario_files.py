@@ -38,7 +38,9 @@ def _models(annotation: Any) -> Iterator[type]:
 def describe_scenario_file() -> str:
     """Markdown of all tables and fields of a scenario file."""
     tables = scenario_tables()
-    links = {model.__name__: f"table [`[{name}]`](#table-{name})" for name, models in tables.items() for model in models}
+    links = {
+        model.__name__: f"table [`[{name}]`](#table-{name})" for name, models in tables.items() for model in models
+    }
     parts = ["## Top level", list_fields(Scenario, links)]
     for name, models in tables.items():
         parts += [f"(table-{name})=", f"## `[{name}]`"]

@@ -77,9 +77,7 @@ def _draw_ground(picture: Picture, view: View, surface: velodrome.Surface, radiu
     picture.line(ground.edge, 2.4, _EDGE)
 
 
-def _draw_bicycle(
-    picture: Picture, bicycle: velodrome.Bicycle, ride: velodrome.Trajectory, colour: np.ndarray
-) -> None:
+def _draw_bicycle(picture: Picture, bicycle: velodrome.Bicycle, ride: velodrome.Trajectory, colour: np.ndarray) -> None:
     from velodrome.engines.coordinates import rotation_matrices
 
     turned, placed = rotation_matrices(ride.body_quaternion[-1:])[0], ride.body_position[-1]
