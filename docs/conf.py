@@ -5,6 +5,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 
+from numpydoc.xref import DEFAULT_LINKS
+
 import velodrome
 
 project = "Velodrome"
@@ -25,7 +27,6 @@ extensions = [
 exclude_patterns = ["made"]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
-suppress_warnings: list[str] = []
 
 # Formulas are MathML: nothing is loaded from elsewhere, and pages are whole without a script.
 html_math_renderer = "mathml"
@@ -51,4 +52,9 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the docstrings say the types
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
-numpydoc_xref_param_type = False
+# Types link to names of this site only: others would need the network.
+DEFAULT_LINKS.clear()
+numpydoc_xref_param_type = True
+numpydoc_xref_aliases = {name: f"velodrome.{name}" for name in velodrome.__all__}
+numpydoc_xref_ignore = "all"  # but those
+toc_object_entries = False  # each has a heading of its own

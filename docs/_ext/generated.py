@@ -33,6 +33,7 @@ GENERATORS: dict[str, Callable[..., str]] = {
     "trajectory-columns": describe_columns_of_trajectories,
 }
 MARK = re.compile(r"^<!-- generated: ([a-z-]+)((?: [\w.]+)*) -->$", re.MULTILINE)
+_MADE_BY_THE_BUILD = re.compile(rf"{MARK.pattern}|^```\{{(drawn|typed)\}}", re.MULTILINE)
 
 
 def fill_page(text: str) -> str:
@@ -57,8 +58,9 @@ def _fill_source(app: Sphinx, docname: str, source: list[str]) -> None:
 
 
 def _forget_pages(app: Sphinx, env: Any, added: Any, changed: Any, removed: Any) -> list[str]:
-    """Pages with marks are read in every build: what they are made from is no file of the site."""
-    return [name for name in env.found_docs if MARK.search(Path(env.doc2path(name)).read_text(encoding="utf-8"))]
+    """Pages with marks, runs or figures are read in every build: what they are made from is no file of the site."""
+    pages = {name: Path(env.doc2path(name)).read_text(encoding="utf-8") for name in env.found_docs}
+    return [name for name, text in pages.items() if _MADE_BY_THE_BUILD.search(text)]
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
