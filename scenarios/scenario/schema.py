@@ -34,9 +34,9 @@ class CircularTable(Table):
 
     kind: Literal["circular"] = "circular"
     rear_rate: float = Field(gt=0, le=1e4, description="rear-wheel rate [rad/s]")
-    family: Annotated[int, Field(ge=1, le=4)] | None = Field(None, description="solution family")
+    family: Annotated[int, Field(ge=1, le=4)] | None = Field(default=None, description="solution family")
     near: Near | None = Field(
-        None, description="angles it is near to; with family where the family has several motions at this rate"
+        default=None, description="angles it is near to; with family where the family has several motions at this rate"
     )
 
     @model_validator(mode="after")
@@ -56,20 +56,20 @@ class UprightTable(Table):
 class Perturbation(Table):
     """Added to the independent variables of the start; the rest is solved."""
 
-    x: _Moderate = Field(0.0, description="of D [m]")
-    y: _Moderate = Field(0.0, description="of D [m]")
-    lean: _Moderate = Field(0.0, description="to the right [rad]")
-    steer: _Moderate = Field(0.0, description="to the left [rad]")
-    lean_rate: _Moderate = Field(0.0, description="[rad/s]")
-    steer_rate: _Moderate = Field(0.0, description="[rad/s]")
-    rear_rate: _Moderate = Field(0.0, description="of the rear wheel [rad/s]")
+    x: _Moderate = Field(default=0.0, description="of D [m]")
+    y: _Moderate = Field(default=0.0, description="of D [m]")
+    lean: _Moderate = Field(default=0.0, description="to the right [rad]")
+    steer: _Moderate = Field(default=0.0, description="to the left [rad]")
+    lean_rate: _Moderate = Field(default=0.0, description="[rad/s]")
+    steer_rate: _Moderate = Field(default=0.0, description="[rad/s]")
+    rear_rate: _Moderate = Field(default=0.0, description="of the rear wheel [rad/s]")
 
 
 class Simulation(Table):
     """How long, and how often to report."""
 
     duration: float = Field(gt=0, le=1e5, description="simulated time [s]")
-    output_rate: float = Field(100.0, gt=0, le=1e5, description="samples a second [1/s]")
+    output_rate: float = Field(default=100.0, gt=0, le=1e5, description="samples a second [1/s]")
 
     @model_validator(mode="after")
     def _whole_samples(self) -> Simulation:
@@ -105,16 +105,16 @@ class Scenario(Table):
 
     title: str = Field(description="one line of text")
     tags: Annotated[tuple[str, ...], Field(strict=False)] = Field(  # TOML has arrays only
-        (), description="words that `velodrome run --tag` selects by"
+        default=(), description="words that `velodrome run --tag` selects by"
     )
     surface: SurfaceTable = Field(description="ground")
     motion: Annotated[CircularTable | UprightTable, Field(discriminator="kind")] = Field(
         description="motion to start from"
     )
-    perturbation: Perturbation = Field(Perturbation(), description="added to the start")
+    perturbation: Perturbation = Field(default=Perturbation(), description="added to the start")
     simulation: Simulation = Field(description="how long, and how often to report")
-    gate: Gate | None = Field(None, description="how the drift gate rides it; absent: it does not")
-    criterion: Criterion | None = Field(None, description="verdict asked of every engine")
+    gate: Gate | None = Field(default=None, description="how the drift gate rides it; absent: it does not")
+    criterion: Criterion | None = Field(default=None, description="verdict asked of every engine")
     bicycle: dict[str, _Moderate] = Field(
         default_factory=dict, description="parameters that differ from the benchmark bicycle's, by name"
     )

@@ -102,9 +102,9 @@ class ProfileTable(Table):
     """A bowl z = g(r): a polynomial in r^2, or a spline through points."""
 
     kind: Literal["profile"]
-    coefficients: _Numbers | None = Field(None, description="of r^2, r^4, ... [1/m, 1/m^3, ...]")
-    radii: _Numbers | None = Field(None, description="of the points, rising [m]")
-    heights: _Numbers | None = Field(None, description="of the points [m]")
+    coefficients: _Numbers | None = Field(default=None, description="of r^2, r^4, ... [1/m, 1/m^3, ...]")
+    radii: _Numbers | None = Field(default=None, description="of the points, rising [m]")
+    heights: _Numbers | None = Field(default=None, description="of the points [m]")
 
     @model_validator(mode="after")
     def _one_way(self) -> ProfileTable:

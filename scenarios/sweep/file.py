@@ -67,9 +67,11 @@ class SweepFile(Table):
     scenario: str | dict[str, Any] = Field(description="library name, path from the sweep file, or tables")
     engines: _Names = Field((REFERENCE,), description="names of engines; each rides every point")
     time_limit: float = Field(600.0, gt=0, le=1e6, description="of a run, on the clock [s]")
-    memory_limit: float | None = Field(None, ge=1, le=1e9, description="that a run may take for itself [MB]")
+    memory_limit: float | None = Field(default=None, ge=1, le=1e9, description="that a run may take for itself [MB]")
     grid: dict[str, _Values] = Field(default_factory=dict, description="dotted key to values, all combinations")
-    latin_hypercube: Hypercube | None = Field(None, description="points drawn evenly, with every combination of grid")
+    latin_hypercube: Hypercube | None = Field(
+        default=None, description="points drawn evenly, with every combination of grid"
+    )
     list: Annotated[tuple[dict[str, Any], ...], Field(strict=False)] = Field(
         (), description="points one by one, each a table of dotted keys, with every combination of grid"
     )
