@@ -28,7 +28,7 @@ LONGEST = 0.02
 
 
 def fastest(work: Callable[[], object], rounds: int) -> float:
-    """Least CPU seconds of a piece of work, after one run that compiles."""
+    """Return the least CPU time of a piece of work [s], after one run that compiles."""
     work()
     taken = []
     for _ in range(rounds):
@@ -52,11 +52,11 @@ def curve_table(alpha: float, family: int, rounds: int) -> Table:
     points = followed()
     title = f"family {family}, alpha = {alpha:g}: {len(points)} points"
     table = Table(title, "us a point", box=None, pad_edge=False)
-    steps, seen = fastest(followed, rounds), fastest(lambda: sample_curve(equations, points), rounds)
+    steps, sampling = fastest(followed, rounds), fastest(lambda: sample_curve(equations, points), rounds)
     alone = fastest(lambda: single(equations, points[::10]), rounds) * 10
     table.add_row("predictor, Newton's method, tangent", f"{1e6 * steps / len(points):.1f}")
-    table.add_row("7 x 7 Jacobian, eigenvalues, forces, energy", f"{1e6 * seen / len(points):.1f}")
-    table.add_row("together", f"{1e6 * (steps + seen) / len(points):.1f}")
+    table.add_row("7 x 7 Jacobian, eigenvalues, forces, energy", f"{1e6 * sampling / len(points):.1f}")
+    table.add_row("together", f"{1e6 * (steps + sampling) / len(points):.1f}")
     table.add_row("(Jacobian and eigenvalues one by one, from Python)", f"{1e6 * alone / len(points):.1f}")
     return table
 
@@ -68,7 +68,7 @@ def single(equations: Steady, points: np.ndarray) -> None:
 
 
 def atlas_table(size: int) -> Table:
-    """Time the atlas: curves, stable sections, critical points; no files."""
+    """Time the atlas: curves, stable sections and critical points, without files."""
     alphas, longest = spacing(size)
     compute_atlas(BICYCLE, alphas[:2], longest)  # compiles
     begin = time.process_time()
@@ -84,7 +84,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Speed of circular motions along a curve and of the atlas.")
     parser.add_argument("--rounds", type=int, default=7, help="repetitions of each measurement")
     parser.add_argument("--atlas", action="store_true", help="time the whole atlas too")
-    parser.add_argument("--size", type=int, default=ATLAS_SIZE, help="its number of motions")
+    parser.add_argument("--size", type=int, default=ATLAS_SIZE, help="number of motions of the atlas")
     options, console = parser.parse_args(), Console()
     for alpha, family in ((0.005, 2), (0.2, 3)):
         console.print(curve_table(alpha, family, options.rounds))

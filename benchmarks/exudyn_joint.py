@@ -1,7 +1,7 @@
-"""What rolling costs in Exudyn, and where it goes: `python benchmarks/exudyn_joint.py`.
+"""The cost of rolling in Exudyn and its parts: `python benchmarks/exudyn_joint.py`.
 
-All is process CPU time at a step of 1 ms, measured in rounds that take turns: on a busy machine look at the
-ratios (median of the ratios within a round) to the library's own rolling disc on the level plane.
+All times are process CPU times at a step of 1 ms, measured in alternating rounds. On a busy machine only the
+ratios (median of the ratios within a round) to the library's own rolling disc on the level plane are meaningful.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def assembled(engine: ExudynEngine, surface: Surface) -> Model:
 
 
 def solve(model: Model, timers: bool = False) -> tuple[float, Any]:
-    """CPU seconds per simulated second, and the solver."""
+    """Return the CPU time per simulated second, and the solver."""
     integration = Integration(DURATION, round(DURATION / STEP), round(100 * DURATION), BUILTIN.settings())
     settings: Any = simulation_settings(integration)
     settings.show.computationTime = timers
@@ -77,7 +77,7 @@ def speed_table(rounds: int) -> Table:
 
 
 def profile_table(rounds: int) -> Table:
-    """Split a step by the engine's own timers."""
+    """Split the time of a step by the engine's own timers."""
     table = Table("us a step, median", *RUNS, box=None, pad_edge=False)
     parts: dict[str, list[str]] = {name: [] for name in (*TIMERS, "iterations a step")}
     for run in RUNS.values():
@@ -92,11 +92,11 @@ def profile_table(rounds: int) -> Table:
 
 
 def call_table(rounds: int) -> Table:
-    """Time the joint's user functions, called as the engine calls them but for its conversions."""
+    """Time the joint's user functions, called as the engine calls them, without its conversions."""
     model = assembled(ENGINE, BOWL)
     item = model.system.GetObject(model.rolling.joint.objectNumber)  # pyright: ignore[reportAttributeAccessIssue]
     constraint, jacobian = (item[name]["function"] for name in ("constraintUserFunction", "jacobianUserFunction"))
-    here = list(model.system.systemData.GetODE2CoordinatesTotal())[14:]  # of the wheels, after the frames
+    here = list(model.system.systemData.GetODE2CoordinatesTotal())[14:]  # those of the wheels come after the frames'
     there, rates = [here[0] + 1e-3, *here[1:]], [0.1] * 14
 
     def call(function: Callable[..., Any], *states: list[float]) -> float:
@@ -117,7 +117,7 @@ def call_table(rounds: int) -> Table:
 
 def main() -> None:
     """Measure and print the tables."""
-    parser = argparse.ArgumentParser(description="What rolling costs in Exudyn.")
+    parser = argparse.ArgumentParser(description="The cost of rolling in Exudyn.")
     parser.add_argument("--rounds", type=int, default=9, help="repetitions of each measurement")
     rounds, console = parser.parse_args().rounds, Console(width=140)
     with no_progress():

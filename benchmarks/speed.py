@@ -1,16 +1,15 @@
-"""How fast the reference is: `python benchmarks/speed.py`.
+"""Speed of the reference: `python benchmarks/speed.py`.
 
-One run measures everything, in rounds that take turns, as CPU time of this process: on a busy machine
-look at the ratios (median of the ratios within a round). Integrations are compared at equal accuracy:
+One run measures everything, in alternating rounds, as CPU time of this process. On a busy machine only the ratios
+(median of the ratios within a round) are meaningful. Integrations are compared at equal accuracy:
 each method takes the largest tolerance, on a grid of four a decade, whose error at the end stays below
-the target. The error is the distance of the rear contact from where the reference at tolerance 1e-14
-has it.
+the target. The error is the distance of the rear contact from that of the reference at tolerance 1e-14.
 
-    reference         the reference as everybody calls it, `velodrome.reference.simulate.simulate`
+    reference         the reference as users call it, `velodrome.reference.simulate.simulate`
     same in scipy     the same right-hand side, compiled, in scipy's DOP853: the same method in Python
     symbrim in scipy  the equations that symbrim derives, compiled to C, in scipy's DOP853
 
-What the equations alone make of it says the first table, the rest is the integrator's.
+The first table compares the equations alone; the rest of the difference comes from the integrators.
 """
 
 from __future__ import annotations
@@ -53,7 +52,7 @@ State = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where the rear contact is at the end, and what it took."""
+    """Position of the rear contact at the end, and number of evaluations."""
 
     contact: np.ndarray
     evaluations: int
@@ -69,18 +68,18 @@ def _repeat(y, function, parameters, bicycle, count, out):
 
 
 def riding(surface: Surface, state: State) -> np.ndarray:
-    """Integration state (24,) of a start."""
+    """Return the integration state (24,) of a start."""
     return np.concatenate([*state, contact_parameters(BICYCLE, surface, state[0])])
 
 
 def upright() -> State:
-    """Start of iftomm-2."""
+    """Return the start of iftomm-2."""
     rates = (LEAN_RATE, 0.0, SPEED / BICYCLE.rear_wheel_radius)
     return consistent_state(BICYCLE, Plane(), (0.0, 0.0), 0.0, 0.0, rates)
 
 
 def in_circles() -> tuple[Paraboloid, State]:
-    """Surface and start of q2-plus."""
+    """Return the surface and the start of q2-plus."""
     bowl = Paraboloid(0.005)
     _, motion = find_motion(BICYCLE, bowl, 18.0, 2)
     q, _ = motion.state()
@@ -89,7 +88,7 @@ def in_circles() -> tuple[Paraboloid, State]:
 
 
 def reference_method(state: State) -> Method:
-    """Build the reference's integrator."""
+    """Make a method of the reference's integrator."""
 
     def run(tolerance: float) -> Outcome:
         motion = simulate(BICYCLE, Plane(), *state, np.array([DURATION]), tolerance=tolerance)
@@ -99,11 +98,11 @@ def reference_method(state: State) -> Method:
 
 
 def scipy_method(y: np.ndarray) -> Method:
-    """Build the reference's right-hand side in scipy's integrator."""
+    """Make a method of the reference's right-hand side in scipy's integrator."""
     function, bicycle = Plane().function.real, aligned(constants(BICYCLE))
     options = {"method": "DOP853", "args": (Plane().parameters,)}
 
-    # Constants frozen in: handing them over at each call would take ten times the evaluation.
+    # The constants are compiled in: passing them at each call would take ten times as long as the evaluation.
     @nb.njit
     def rate(_, y, parameters):
         out = np.empty(24)
@@ -118,7 +117,7 @@ def scipy_method(y: np.ndarray) -> Method:
 
 
 def symbrim_method(equations: symbrim_equations.Equations, x: np.ndarray) -> Method:
-    """Build symbrim's equations in scipy's integrator."""
+    """Make a method of symbrim's equations in scipy's integrator."""
     rate = equations.function()
 
     def run(tolerance: float) -> Outcome:
@@ -129,7 +128,7 @@ def symbrim_method(equations: symbrim_equations.Equations, x: np.ndarray) -> Met
 
 
 def symbrim_obstacle() -> str | None:
-    """Why symbrim's equations cannot be compiled here, None where they can."""
+    """Return why symbrim's equations cannot be compiled here, None if they can."""
     if importlib.util.find_spec("symbrim") is None:
         return "symbrim is not installed: pip install -e '.[benchmark]'"
     if symbrim_equations.compiler() is None:
@@ -138,7 +137,7 @@ def symbrim_obstacle() -> str | None:
 
 
 def interleaved(work: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, np.ndarray]:
-    """CPU seconds (rounds,) of each piece of work; each round runs all of them, each for 20 ms at least."""
+    """Return CPU seconds (rounds,) of each piece of work; each round runs all of them, each for at least 20 ms."""
 
     def timed(run: Callable[[], object], count: int) -> float:
         begin = time.process_time()
@@ -154,12 +153,12 @@ def interleaved(work: Mapping[str, Callable[[], object]], rounds: int) -> dict[s
 
 
 def spread(seconds: np.ndarray, unit: float) -> list[str]:
-    """Minimum, median, maximum in a unit of time."""
+    """Format minimum, median and maximum in a unit of time."""
     return [f"{value / unit:.3g}" for value in (seconds.min(), np.median(seconds), seconds.max())]
 
 
 def coarsest(method: Method, target: float, exact: np.ndarray) -> tuple[float, Outcome, float] | None:
-    """Largest tolerance that meets the target, its outcome and error; None where none does."""
+    """Return the largest tolerance that meets the target, its outcome and error; None if none does."""
     for tolerance in TOLERANCES:
         outcome = method(tolerance)
         error = float(np.linalg.norm(outcome.contact - exact))
@@ -214,7 +213,7 @@ def outputs_table(rounds: int) -> Table:
 
 def main() -> None:
     """Measure and print the tables."""
-    parser = argparse.ArgumentParser(description="Speed of the reference, beside scipy and symbrim.")
+    parser = argparse.ArgumentParser(description="Speed of the reference, compared with scipy and symbrim.")
     parser.add_argument("--rounds", type=int, default=15, help="repetitions of each measurement")
     rounds, console = parser.parse_args().rounds, Console()
     state = upright()

@@ -1,7 +1,7 @@
-"""What a sweep costs beside its engines, and how it grows with workers.
+"""The cost of a sweep besides its engines, and its speed-up with workers.
 
 python benchmarks/sweep.py                    # overhead, bytes and speed-up from 1 to 2 processes
-python benchmarks/sweep.py --cluster 2 4 8    # and Dask clusters of so many workers on this machine
+python benchmarks/sweep.py --cluster 2 4 8    # also Dask clusters of 2, 4 and 8 workers on this machine
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from velodrome.scenarios.sweep.pool import ONE_THREAD
 from velodrome.scenarios.sweep.run import Work, locally, run_sweep
 from velodrome.scenarios.sweep.store import JOURNAL, RESULTS, TIMINGS, open_folder, write_results
 
-# Starts of a straight ride are computed in a millisecond: what is left beside the engine is the sweep's own.
+# A straight ride's start is computed in a millisecond: the cost besides the engine is the sweep's own.
 SWEEP = """
 scenario = "iftomm-1"
 engines = [{engines}]
@@ -51,15 +51,15 @@ class Measured:
     rate : float
         Rows per second from the first row to the last, without the start of the workers.
     elapsed : float
-        Seconds in all.
+        Total time [s].
     others : float
-        Cores that others on this machine kept busy meanwhile: above some 0.1, rates say little.
+        Cores kept busy by other processes of this machine: above about 0.1, rates are not meaningful.
     engine, task, parent : float
-        CPU seconds a row: in the engine, in the worker, in the process that hands out tasks and keeps rows.
+        CPU time per row: in the engine, in the worker, in the process that distributes tasks and keeps rows [s].
     journal, results, timing : float
-        Bytes a row.
+        Size per row [bytes].
     finish : float
-        CPU seconds a row of making the data set of the journal.
+        CPU time per row of making the data set from the journal [s].
     """
 
     rate: float
@@ -75,14 +75,14 @@ class Measured:
 
 
 def planned(folder: Path, engines: list[str], count: int, duration: float = 20.0) -> SweepPlan:
-    """A sweep of rides on the plane."""
+    """Plan a sweep of rides on the plane."""
     path = folder / "sweep.toml"
     path.write_text(SWEEP.format(engines=", ".join(f'"{name}"' for name in engines), count=count, duration=duration))
     return plan_sweep(path)
 
 
 def measured(plan: SweepPlan, work: Work) -> Measured:
-    """Run a sweep in a fresh folder."""
+    """Run a sweep in a new folder and measure its costs."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"
         begin, own, before = time.perf_counter(), time.process_time(), busy() - with_children()
@@ -100,33 +100,33 @@ def measured(plan: SweepPlan, work: Work) -> Measured:
         journal, clock = (out / JOURNAL).stat().st_size, (out / TIMINGS).stat().st_size
     rows = len(plan.tasks)
     return Measured(
-        (rows - 1) / float(np.ptp(columns["finished"])),
-        elapsed,
-        others,
-        float(columns["engine_time"].mean()),
-        float(columns["task_time"].mean()),
-        (own - finish) / rows,
-        journal / rows,
-        results / rows,
-        clock / rows,
-        finish / rows,
+        rate=(rows - 1) / float(np.ptp(columns["finished"])),
+        elapsed=elapsed,
+        others=others,
+        engine=float(columns["engine_time"].mean()),
+        task=float(columns["task_time"].mean()),
+        parent=(own - finish) / rows,
+        journal=journal / rows,
+        results=results / rows,
+        timing=clock / rows,
+        finish=finish / rows,
     )
 
 
 def busy() -> float:
-    """CPU seconds that this machine has spent so far, by anybody."""
+    """Return the CPU time of this machine so far, of all processes [s]."""
     user, nice, system, _, _, irq, soft, *_ = map(int, Path("/proc/stat").read_text().split()[1:9])
     return (user + nice + system + irq + soft) / os.sysconf("SC_CLK_TCK")
 
 
 def with_children() -> float:
-    """CPU seconds of this process and of all that it has started and that have ended."""
+    """Return the CPU time of this process and of its children that have ended [s]."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
 
 
 def costs_table(folder: Path, engines: list[str], count: int) -> Table:
-    """What a row costs, an engine at a time."""
+    """Measure the cost of a row, one engine at a time."""
     table = Table("engine", "rows", "rows/s", box=None, pad_edge=False)
     for title in ("engine", "worker's own", "parent's own", "data set's"):
         table.add_column(f"{title}\nms a row", justify="right")
@@ -141,28 +141,28 @@ def costs_table(folder: Path, engines: list[str], count: int) -> Table:
 
 
 def speed_table(folder: Path, count: int, rounds: int) -> Table:
-    """Rows per second of one process and of two, by turns.
+    """Measure the rows per second of one process and of two, in turn.
 
-    A machine that is shared does not give the same second twice. What the sweep itself loses shows in how busy
-    its workers are; the ratio of that is the speed-up at equal CPU time a row.
+    On a shared machine the speed varies. The losses of the sweep itself show in how busy its workers are; the ratio
+    of that is the speed-up at equal CPU time per row.
     """
     table = Table("processes", "rows/s", "seconds in all", "CPU ms a row", box=None, pad_edge=False)
     table.add_column("workers busy", justify="right")
     table.add_column("others' cores", justify="right")
     plan = planned(folder, ["reference"], count, 100.0)
     for _ in range(rounds):
-        one, two = (measured(plan, locally(workers)) for workers in (1, 2))
-        for workers, found in ((1, one), (2, two)):
+        single, double = (measured(plan, locally(workers)) for workers in (1, 2))
+        for workers, found in ((1, single), (2, double)):
             share = f"{found.rate * found.task / workers:.3f}"
             numbers = (f"{found.rate:.4g}", f"{found.elapsed:.3g}", f"{1e3 * found.task:.3g}", share)
             table.add_row(str(workers), *numbers, f"{found.others:.2f}")
-        speed, equal = two.rate / one.rate, two.rate * two.task / (one.rate * one.task)
+        speed, equal = double.rate / single.rate, double.rate * double.task / (single.rate * single.task)
         table.add_row("2 / 1", f"{speed:.3f}", "", "", f"{equal:.3f}")
     return table
 
 
 def cluster_table(folder: Path, sizes: list[int], count: int) -> Table:
-    """Rows per second of Dask clusters on this machine, and what their scheduler and client spend."""
+    """Measure the rows per second of Dask clusters on this machine, and the CPU time of their scheduler and client."""
     from velodrome.scenarios.sweep.cluster import on_cluster
 
     table = Table("Dask workers", "rows/s", "worker", "client", "scheduler", box=None, pad_edge=False)
@@ -173,7 +173,7 @@ def cluster_table(folder: Path, sizes: list[int], count: int) -> Table:
             idle = idle_share(scheduler)
             before = cpu_seconds(scheduler)
             found = measured(plan, work)
-            # What it does all the time, heartbeats and the like, is not the rows'.
+            # What the scheduler spends all the time, on heartbeats and the like, does not belong to the rows.
             spent = (cpu_seconds(scheduler) - before - idle * found.elapsed) / len(plan.tasks)
         times = (found.task, found.parent, spent)
         table.add_row(str(workers), f"{found.rate:.4g}", *(f"{1e3 * seconds:.2f} ms" for seconds in times))
@@ -182,9 +182,9 @@ def cluster_table(folder: Path, sizes: list[int], count: int) -> Table:
 
 @contextmanager
 def cluster(workers: int) -> Iterator[tuple[str, int]]:
-    """A scheduler and its workers, one thread each; its address and process id."""
+    """Run a scheduler and its workers, one thread each; yield its address and process id."""
     address = "tcp://127.0.0.1:18786"
-    # The command without its console script: it is there wherever the package is.
+    # The module is called since its console script need not be on the path.
     dask = [sys.executable, "-m", "dask"]
     with tempfile.TemporaryDirectory() as folder:
         quiet = {
@@ -207,7 +207,7 @@ def cluster(workers: int) -> Iterator[tuple[str, int]]:
 
 
 def idle_share(pid: int, seconds: float = 5.0) -> float:
-    """CPU time per second of a process that has nothing to do, once it has settled."""
+    """Return the CPU time per second of an idle process, after it has settled."""
     time.sleep(seconds)
     before = cpu_seconds(pid)
     time.sleep(seconds)
@@ -215,15 +215,15 @@ def idle_share(pid: int, seconds: float = 5.0) -> float:
 
 
 def cpu_seconds(pid: int) -> float:
-    """CPU time that a process has taken."""
+    """Return the CPU time of a process [s]."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def main() -> None:
     """Measure and print the tables."""
-    parser = argparse.ArgumentParser(description="What a sweep costs beside its engines.")
-    parser.add_argument("--rows", type=int, default=500, help="rows of the reference; of slower engines fewer")
+    parser = argparse.ArgumentParser(description="The cost of a sweep besides its engines.")
+    parser.add_argument("--rows", type=int, default=500, help="rows of the reference; slower engines get fewer")
     parser.add_argument("--rounds", type=int, default=2, help="repetitions of the speed-up")
     parser.add_argument("--engines", nargs="*", default=["reference", "mujoco-native", "exudyn"])
     parser.add_argument("--cluster", type=int, nargs="*", default=[], help="numbers of Dask workers")

@@ -1,4 +1,4 @@
-"""The Whipple bicycle on the plane as symbrim derives it, compiled to C.
+"""The Whipple bicycle on the plane as derived by symbrim, compiled to C.
 
 symbrim's axes are x forward, y right, z down, and its angles yaw, roll, pitch, steer; its rear frame
 is aligned with the steering axis. The state is its eight coordinates and eight speeds in the order of
@@ -19,7 +19,7 @@ import numpy as np
 
 from velodrome.reference.bicycle import Bicycle
 
-# symbrim and what it brings along are an extra: `pip install -e '.[benchmark]'`.
+# symbrim and its dependencies are an extra: `pip install -e '.[benchmark]'`.
 # pyright: reportMissingImports=false
 
 _TEMPLATE = """#include <math.h>
@@ -67,12 +67,12 @@ void repeat(const double *x, double *out, int count)
 
 
 def compiler() -> str | None:
-    """Path of the system's C compiler, None where there is none."""
+    """Return the path of the system's C compiler, None if there is none."""
     names = [(sysconfig.get_config_var("CC") or "cc").split()[0], "cc", "gcc", "clang"]
     return next((path for path in map(shutil.which, names) if path), None)
 
 
-def _model() -> tuple[Any, Any]:
+def _derive_system() -> tuple[Any, Any]:
     import symbrim as sb
     from sympy import Symbol
 
@@ -91,8 +91,8 @@ def _model() -> tuple[Any, Any]:
     return bike, system
 
 
-def _constants(bike: Any, bicycle: Bicycle) -> dict[Any, float]:
-    """Values of symbrim's symbols: lengths and inertia along (u, right, down the steering axis)."""
+def _symbol_values(bike: Any, bicycle: Bicycle) -> dict[Any, float]:
+    """Return the values of symbrim's symbols: lengths and inertia along (u, right, down the steering axis)."""
     from sympy import Symbol
 
     along = np.array([np.cos(bicycle.steer_axis_tilt), 0, np.sin(bicycle.steer_axis_tilt)])
@@ -121,14 +121,14 @@ def _constants(bike: Any, bicycle: Bicycle) -> dict[Any, float]:
     return {symbol: float(value) for symbol, value in values.items()}
 
 
-def _source(bicycle: Bicycle) -> str:
+def _write_source(bicycle: Bicycle) -> str:
     from sympy import Symbol, ccode, cse, numbered_symbols
 
-    bike, system = _model()
-    constants = _constants(bike, bicycle)
+    bike, system = _derive_system()
+    constants = _symbol_values(bike, bicycle)
     names: dict[Any, Any] = {symbol: Symbol(f"p[{i}]") for i, symbol in enumerate(constants)}
     names |= {value: Symbol(f"x[{i}]") for i, value in enumerate([*bike.q, *bike.u])}
-    # symbrim's equations stand in the order of its independent, then dependent speeds.
+    # symbrim's equations are in the order of its independent, then its dependent speeds.
     order = [list(system.u).index(u) for u in bike.u]
     mass, forcing = system.mass_matrix[:, order].xreplace(names), system.forcing.xreplace(names)
     steps, (mass, forcing) = cse([mass, forcing], symbols=numbered_symbols("t"))
@@ -143,7 +143,7 @@ class Equations:
 
     def __init__(self, bicycle: Bicycle, folder: Path, cc: str) -> None:
         source, library = folder / "equations.c", folder / "equations.so"
-        source.write_text(_source(bicycle), encoding="utf-8")
+        source.write_text(_write_source(bicycle), encoding="utf-8")
         flags = ["-O3", "-march=native", "-shared", "-fPIC"]
         subprocess.run([cc, *flags, "-o", str(library), str(source), "-lm"], check=True)
         compiled = ctypes.CDLL(str(library))
@@ -152,7 +152,7 @@ class Equations:
         self._repeat.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int]
 
     def function(self) -> Callable[[float, np.ndarray], np.ndarray]:
-        """As scipy's integrators call it."""
+        """Return the right-hand side as scipy's integrators call it."""
         state, out = np.empty(16), np.empty(16)
         where, there, derivative = state.ctypes.data, out.ctypes.data, self._derivative
 
@@ -170,7 +170,7 @@ class Equations:
 
 
 def start(bicycle: Bicycle, speed: float, lean_rate: float, contact: np.ndarray) -> np.ndarray:
-    """State (16,) of the upright bicycle riding straight on, its rear contact at ``contact`` (x, y; y left)."""
+    """Return the state (16,) of the upright bicycle riding straight, its rear contact at ``contact`` (x, y; y left)."""
     x = np.zeros(16)
     x[0], x[1], x[4] = contact[0], -contact[1], bicycle.steer_axis_tilt
     x[8], x[11] = speed, lean_rate

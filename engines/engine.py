@@ -21,8 +21,10 @@ from pydantic import BaseModel, ConfigDict
 
 from ..reference.bicycle import Bicycle
 from ..reference.surface import Surface
+from .format_version import VERSION_KEY
 from .guard import EngineError as EngineError
 from .guard import GuardedEngine, call_engine, where_raised
+from .names import suggest_name
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -281,6 +283,8 @@ class UnsuitableProblem(ValueError):
     """A problem of a kind that an engine is not made for, such as a ground that it does not know."""
 
 
+# Keys of documents that have a key an engine besides; no engine may bear such a name.
+RESERVED_NAMES = (VERSION_KEY, "sha256")
 # Files are called after engines, and a name may come from any package.
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 
@@ -295,7 +299,7 @@ def _announced() -> dict[str, EntryPoint]:
     """
     found: dict[str, EntryPoint] = {}
     for point in entry_points(group=ENTRY_POINT_GROUP):
-        if not _NAME.fullmatch(point.name):
+        if not _NAME.fullmatch(point.name) or point.name in RESERVED_NAMES:
             continue
         other = found.setdefault(point.name, point)
         # One package may stand on the path twice, as with an editable install.
@@ -334,7 +338,7 @@ def load_engine(name: str) -> Engine:
     """
     points = _announced()
     if name not in points:
-        raise ValueError(f"engine {name!r} is not installed; there are {', '.join(engine_names())}")
+        raise ValueError(f"engine {name!r} is not installed ({suggest_name(name, engine_names())})")
     where = f"engine {name!r}, announced as {points[name].value},"
     engine = None
     try:

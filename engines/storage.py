@@ -21,8 +21,10 @@ from ..reference.bicycle import BODIES
 from ..reference.kinematics import COORDINATES, WHEELS
 from .engine import REQUIRED, SHAPES, Trajectory
 from .files import write_whole
+from .format_version import VERSION_KEY, read_version
 
 METADATA_KEY, DIGEST_KEY = b"velodrome", b"velodrome-sha256"
+PARQUET_VERSION = 1  # of the metadata and the columns that they tell of
 
 
 class _Facts(BaseModel):
@@ -98,7 +100,7 @@ def write_columns(
         Name, values of shape (n,), unit.
     path : Path
     facts : mapping
-        JSON values for the schema's metadata.
+        JSON values for the schema's metadata, which get the format's version besides.
     **options
         Of `pyarrow.parquet.write_table`.
     """
@@ -111,13 +113,18 @@ def _make_table(columns: Iterable[tuple[str, np.ndarray, str | None]], facts: Ma
         metadata = None if unit is None else {b"unit": unit.encode()}
         arrays.append(pa.array(np.ascontiguousarray(values)))
         fields.append(pa.field(name, arrays[-1].type, nullable=False, metadata=metadata))
-    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata={METADATA_KEY: json.dumps(facts).encode()}))
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=versioned_metadata(facts)))
 
 
 def _write_table(table: pa.Table, path: Path, **options: Any) -> None:
     sealed = {**(table.schema.metadata or {}), DIGEST_KEY: digest(table)}
     with write_whole(path) as partial:
         pq.write_table(table.replace_schema_metadata(sealed), partial, **options)
+
+
+def versioned_metadata(facts: Mapping[str, Any]) -> dict[bytes, bytes]:
+    """Metadata of a Parquet schema: facts with the format's version."""
+    return {METADATA_KEY: json.dumps({VERSION_KEY: PARQUET_VERSION, **facts}).encode()}
 
 
 def digest(table: pa.Table) -> bytes:
@@ -139,8 +146,8 @@ def read_trajectory(path: Path) -> Trajectory:
     Raises
     ------
     ValueError
-        If the file is not a trajectory, not a whole one, or was altered since it was written. Only files of
-        earlier versions carry no digest.
+        If the file is not a trajectory, not a whole one, of a newer format, or was altered since it was written. Only
+        files of earlier versions carry no digest.
     """
     table = _table(path)
     facts = _facts(table, path)
@@ -169,13 +176,29 @@ def _table(path: Path) -> pa.Table:
 
 def _facts(table: pa.Table, path: Path) -> _Facts:
     try:
-        return _Facts.model_validate(json.loads((table.schema.metadata or {})[METADATA_KEY]))
+        found = json.loads((table.schema.metadata or {})[METADATA_KEY])
+        if isinstance(found, dict):
+            _refuse_newer(found, path)
+        return _Facts.model_validate(found)
+    except _NewerFormat:
+        raise
     except (KeyError, ValueError, RecursionError) as error:
         what = ""
         if isinstance(error, ValidationError):
             first = error.errors()[0]
             what = f" ({'.'.join(str(part) for part in first['loc'])}: {first['msg']})"
         raise ValueError(f"{path} is not a trajectory: its schema has no whole velodrome metadata{what}") from error
+
+
+class _NewerFormat(ValueError):
+    """A file of a format that this version does not know."""
+
+
+def _refuse_newer(facts: Mapping[str, Any], path: Path) -> None:
+    try:
+        read_version(facts, PARQUET_VERSION)
+    except ValueError as error:
+        raise _NewerFormat(f"{path} cannot be read as a trajectory: {error}") from error
 
 
 def _field(table: pa.Table, name: str, names: list[tuple[str, str]], path: Path) -> np.ndarray | None:

@@ -1,13 +1,13 @@
-"""Why contact forces of Exudyn can be wrong whatever the step: `python examples/exudyn_contact_forces.py`.
+"""Wrong contact forces of Exudyn at any step, and their cures: `python examples/exudyn_contact_forces.py`.
 
-Plain Exudyn and numpy. Two defects, each on a model whose forces are known exactly.
+Plain Exudyn and numpy. The script shows two defects, each on a model whose forces are known exactly.
 
 Initial accelerations. A constraint on velocities, W(q) q' = 0, has W q'' = -(W q')_q q'. The solver puts 0 on
 the right (CSolverImplicitSecondOrderTimeInt::InitializeSolverInitialConditions; NumericalConstraintJacobian-
-TimesVector leaves out objects on velocity level). A disc in steady precession on the level plane rolls on
-ObjectJointRollingDisc: its first contact force is wrong. The trapezoidal rule with index 2 never forgets
-that: its forces alternate about the right ones with the initial error, at any step. Generalized alpha with a
-spectral radius below 1 forgets it within some steps. Right accelerations, imported by SetODE2Coordinates_tt
+TimesVector omits objects on velocity level). A disc in steady precession on the level plane rolls on
+ObjectJointRollingDisc: its first contact force is wrong. The trapezoidal rule with index 2 keeps
+this error: its forces alternate about the right ones with the initial error, at any step. Generalized alpha with a
+spectral radius below 1 loses it within some steps. Right accelerations, imported by SetODE2Coordinates_tt
 with computeInitialAccelerations=False, cure both.
 
 First steps. Generalized alpha with constraints on positions needs start values a_0 = q''(D h), D = alpha_m -
@@ -33,16 +33,16 @@ SOLVERS: Any = exu.DynamicSolverType
 
 
 def new_system() -> tuple[Any, Any]:
-    """A container, to be kept alive, and its system."""
+    """Return a container, which must be kept alive, and its system."""
     container: Any = exu.SystemContainer()
     return container, container.AddSystem()
 
 
 def precession() -> tuple[float, float, np.ndarray]:
-    """Rates of the circle and of the spin, and the constant force (lateral, forward, normal) on the disc.
+    """Return the rates of the circle and of the spin, and the constant force (lateral, forward, normal) on the disc.
 
-    The disc's contact runs on a circle of radius r at the rate W, its plane leans to the centre by L. The moments
-    about its centre ask for W^2 cos L ((I - J) sin L + J r / a + m a (r - a sin L)) = m g a sin L.
+    The disc's contact runs on a circle of radius r at the rate W, and its plane leans to the centre by L. The moments
+    about its centre require W^2 cos L ((I - J) sin L + J r / a + m a (r - a sin L)) = m g a sin L.
     """
     across, axial = DISC.InertiaCOM()[0, 0], DISC.InertiaCOM()[1, 1]
     circle = DISTANCE - RADIUS * math.sin(LEAN)
@@ -55,7 +55,7 @@ def precession() -> tuple[float, float, np.ndarray]:
 def disc_force(
     solver: Any, step: float, duration: float, spectral_radius: float = 1.0, right_start: bool = False
 ) -> np.ndarray:
-    """Relative error of the contact force in every step, the start included."""
+    """Return the relative error of the contact force in every step, including the start."""
     _container, mbs = new_system()
     rate, spin, force = precession()
     up, left = (
@@ -103,12 +103,12 @@ def import_accelerations(mbs: Any, settings: Any, linear: np.ndarray, omega: np.
 
 
 def product(vector: np.ndarray, theta: np.ndarray) -> np.ndarray:
-    """Quaternion product of (0, vector) and theta."""
+    """Return the quaternion product of (0, vector) and theta."""
     return np.array([-vector @ theta[1:], *(theta[0] * vector + np.cross(vector, theta[1:]))])
 
 
 def pendulum_force(step: float, duration: float, spectral_radius: float) -> np.ndarray:
-    """Relative error of a swinging bar's reaction in every step, the start included."""
+    """Return the relative error of a swinging bar's reaction in every step, including the start."""
     _container, mbs = new_system()
     length, angle, rate = 0.5, 0.3, 8.0
     bar: Any = InertiaCylinder(density=1000, length=0.1, outerRadius=0.1, axis=1)
@@ -133,7 +133,7 @@ def pendulum_force(step: float, duration: float, spectral_radius: float) -> np.n
 
 
 def swing(bar: Any, length: float, angle: float, rate: float, step: float, count: int) -> np.ndarray:
-    """Size of the reaction at ``count`` times: J angle'' = -m g l sin(angle), by Runge-Kutta's method."""
+    """Return the reaction at ``count`` times: J angle'' = -m g l sin(angle), by Runge-Kutta's method."""
     mass = bar.Mass()
     pull = mass * GRAVITY * length / (bar.InertiaCOM()[1, 1] + mass * length**2)
 
@@ -145,7 +145,7 @@ def swing(bar: Any, length: float, angle: float, rate: float, step: float, count
         radial = mass * (length * state[1] ** 2 + GRAVITY * math.cos(state[0]))
         across = mass * (length * slope(state)[1] + GRAVITY * math.sin(state[0]))
         force[i] = math.hypot(radial, across)
-        for _ in range(4):  # four substeps: an error of (k h / 4)^4 is nothing here
+        for _ in range(4):  # four substeps: an error of (k h / 4)^4 is negligible here
             h = step / 4
             k1 = slope(state)
             k2 = slope(state + h / 2 * k1)
@@ -162,7 +162,7 @@ def watch(mbs: Any, item: Any, kind: Any) -> Any:
 
 
 def simulation_settings(step: float, duration: float, spectral_radius: float) -> Any:
-    """Fixed steps, every one of them sampled, Newton's method to 1e-10."""
+    """Return settings with fixed steps, each of them sampled, and Newton's method to 1e-10."""
     settings: Any = exu.SimulationSettings()
     settings.solution.file.write = False
     settings.solution.sensors.writePeriod = step

@@ -1,10 +1,10 @@
-"""A disc that rolls in a bowl, in plain Exudyn and one rolling joint: `python examples/rolling_disc_in_bowl.py`.
+"""A disc rolling in a bowl, in plain Exudyn with one rolling joint: `python examples/rolling_disc_in_bowl.py`.
 
 Steady precession: the disc's centre circles the bowl's axis at the rate W, at a constant lean L towards the
 axis. With e_r outward, e_t forward and e_z up, the disc's upward axis is u = -sin L e_r + cos L e_z, its
-axle b = -cos L e_r - sin L e_z (to the left), and the contact P = C - a u stands at a distance r from the
-axis. Its angular velocity is W e_z + s b. For mass m, radius a, moments of inertia I across and J about
-the axle, it needs
+axle b = -cos L e_r - sin L e_z (to the left), and the contact P = C - a u is at a distance r from the
+axis. Its angular velocity is W e_z + s b. For mass m, radius a, and moments of inertia I about a diameter and J
+about the axle, the equations are
 
     rolling           v_C + w x (P - C) = 0                 so  s = W r / a
     forces            m v_C' = F - m g e_z                  so  F = -m W^2 (r - a sin L) e_r + m g e_z
@@ -14,7 +14,7 @@ whose forward component is
 
     W^2 cos L ((I - J) sin L + J r / a + m a (r - a sin L)) = m g a sin L.
 
-The surface enters through the height of P alone: the disc rolls where it is closest, which it is there.
+The surface enters only through the height of P, the point of the disc that is closest to it.
 The script starts the disc in that motion and, a second time, with a kick, and shows that halving the
 step divides all errors by four.
 """
@@ -83,7 +83,7 @@ def ride(motion: Precession, step: float, duration: float, kick: float = 0.0, su
     joint = CreateRollingJointOnSurface(
         mbs, bodyNumbers=[disc], axisVector=[0, 1, 0], discRadius=RADIUS, surface=surface
     )
-    shown = {
+    sensors = {
         name: CreateRollingJointSensor(mbs, joint, name) for name in ("ContactForce", "ContactPoint", "Gap", "Slip")
     }
     kinds: Any = exu.OutputVariableType
@@ -107,10 +107,10 @@ def ride(motion: Precession, step: float, duration: float, kick: float = 0.0, su
         return mbs.GetSensorStoredData(sensor)[:, 1:]
 
     position, velocity, spin = (samples(bodies[kind]) for kind in bodies)
-    force, point, gap, slip = (samples(sensor) for sensor in shown.values())
+    force, point, gap, slip = (samples(sensor) for sensor in sensors.values())
     kinetic = 0.5 * (INERTIA.Mass() * np.sum(velocity**2, axis=1) + np.sum(spin**2 @ INERTIA.InertiaCOM(), axis=1))
     energy = kinetic + INERTIA.Mass() * GRAVITY * position[:, 2]
-    time = mbs.GetSensorStoredData(shown["Gap"])[:, 0]
+    time = mbs.GetSensorStoredData(sensors["Gap"])[:, 0]
     return Ride(time, position, force, point, gap[:, 0], slip, energy)
 
 
@@ -135,7 +135,7 @@ def add_disc(mbs: Any, motion: Precession, kick: float, surface: Surface) -> Any
 
 
 def errors(motion: Precession, found: Ride) -> tuple[float, float]:
-    """Largest distance of the centre from the steady precession [m], and of the force, relative."""
+    """Return the largest distance of the centre from the steady precession [m], and the relative one of the force."""
     angle = motion.rate * found.time
     circle = motion.distance - RADIUS * math.sin(motion.lean)
     centre = np.column_stack([circle * np.cos(angle), circle * np.sin(angle), np.full(len(angle), found.centre[0, 2])])

@@ -1,10 +1,10 @@
-"""Anchors of the solution families: where their curves are got hold of.
+"""Anchors of the solution families: the points from which their curves are followed.
 
-Random starts land on spurious roots, and the families reconnect as a bowl deepens. So every family has
-*anchors*: points of the benchmark bicycle on the level plane, reached from a named one, carried by
-continuation to the wanted bicycle and surface. Where families have joined or exchanged parts, an anchor
-stays on its part: the last of a family is the one whose curve bears the family's number, the others hold on
-to parts that it may leave behind.
+Newton's method from random starts finds spurious roots, and the families reconnect as a bowl deepens. Every family
+therefore has *anchors*: points of the benchmark bicycle's curves on the level plane, reached from a point named in
+the paper and carried by continuation to the wanted bicycle and surface. Where families have joined or exchanged
+parts, an anchor stays on its part: the curve of a family's last anchor bears the family's number, the other anchors
+stay on parts that it may have lost.
 
 =======  =====================================  ============================================
 family   anchors                                followed towards
@@ -19,13 +19,13 @@ family   anchors                                followed towards
          circle of 6 m; and H = G, pivoting     cusp I
 =======  =====================================  ============================================
 
-The circles that tend to C are family 2's until the cusps D and I collide, family 4's from there (paraboloids
-from alpha = 0.017), and a curve of their own where the pivoting motion has left them (from 0.42). In a static
-equilibrium begins what no anchor reaches: curves of slow circles, of which steep paraboloids have some that the
-plane has not (with the handlebar reversed from alpha = 0.34, else from 0.40).
+The circles that tend to C belong to family 2 until the cusps D and I collide, then to family 4 (on paraboloids from
+alpha = 0.017), and form a curve of their own where the pivoting motion has left them (from 0.42). Some curves are
+reached from no anchor: curves of slow circles that begin in a static equilibrium. Steep paraboloids have some of
+them that the plane does not have (with the handlebar reversed from alpha = 0.34, otherwise from 0.40).
 
-Where an anchor cannot be carried, as into a trough that has no ground for so small a circle, another point of
-its curve is: the circle half-way between the edges of the ground.
+Where an anchor cannot be carried, for instance to a trough that has no ground for so small a circle, another point
+of its curve is carried instead: the circle half-way between the edges of the ground.
 """
 
 from __future__ import annotations
@@ -64,14 +64,15 @@ from .surface import Plane, SurfaceOfRevolution, evaluate, is_level
 _POINT_A, _POINT_D, _POINT_G = (0.0, 1.33973991149), (0.62, 2.78), (-0.01206, 1.6019)
 # Rear rates of each family's anchors; None is the pivoting motion. The last one's curve is the family's.
 ANCHORS: dict[int, tuple[float | None, ...]] = {1: (15.0,), 2: (20.0,), 3: (20.0, None), 4: (None,)}
-# Radius of D's circle on the way to C [m]: wider than at the cusps D and I, where families exchange their parts,
-# and of angles that change little with the bowl.
+# Radius of D's circle on the way to C [m]: larger than at the cusps D and I, where families exchange their parts,
+# and at angles that change little with the bowl.
 _TOWARDS_C = 6.0
-# Starts that lead to static equilibria: with a bowl's depth their pitch falls to -0.8.
+# Guesses of static equilibria: as a bowl deepens, their pitch falls to -0.8.
 _STEERS, _PITCHES = np.pi * (np.arange(8) + 0.5) / 8, (0.0, -0.3, -0.6)
 _SMALLEST_CIRCLE = 1e-100  # [m]: the squares of smaller ones underflow
-_LARGEST_MOVE = 0.05  # of an unknown of order one, in a step of carrying an anchor
-_SAME = 1e-6  # two solutions of one condition; round-off, 1e-14, splits them by its root where they meet
+_LARGEST_MOVE = 0.05  # largest change of an unknown of order one in one step of carrying an anchor
+# Two solutions of one condition are the same below this. Round-off, 1e-14, splits a double root by its square root.
+_SAME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -84,9 +85,10 @@ class Anchor:
     equations : Steady
     unknowns : ndarray, shape (22,)
     directions : tuple of ndarray, shape (22,)
-        One or two in which the curve runs from there.
+        One or two directions in which the curve is followed from there.
     condition : callable
-        What singles the solution out on its curve: maps unknowns to a `velodrome.reference.circular.Condition`.
+        Condition that singles the solution out on its curve: maps unknowns to a
+        `velodrome.reference.circular.Condition`.
     """
 
     family: int
@@ -95,14 +97,14 @@ class Anchor:
     directions: tuple[np.ndarray, ...]
     condition: Callable[[np.ndarray], Condition]
 
-    def met_by(self, unknowns: np.ndarray) -> bool:
-        """Whether another solution is the anchor itself, its wheels running either way."""
+    def is_same_as(self, unknowns: np.ndarray) -> bool:
+        """Return whether another solution is the anchor itself, with its wheels running either way."""
         change = np.abs(unknowns - self.unknowns) / (1 + np.abs(self.unknowns))
         return bool(max(change[: STEER + 1].max(), change[SIGMA]) < _SAME)
 
 
 def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
-    """Guess of the 22 unknowns on the level plane from two angles alone.
+    """Guess the 22 unknowns on the level plane from two angles alone.
 
     At fixed lean and steer the bicycle can roll in exactly one circle: the null vector of the rolling
     rows gives the directions of all speeds and the circle's centre. The speed and the forces then fit
@@ -147,16 +149,16 @@ def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
 def _carry(
     path: Callable[[float], Steady], u: np.ndarray, condition: Callable, what: str, step: float = 0.02
 ) -> np.ndarray:
-    """Carry a solution along a path of equations, 0 to 1, at a fixed condition; steps as long as converge.
+    """Carry a solution along a path of equations, from 0 to 1, at a fixed condition.
 
-    Newton's method may well converge to another branch: a step that moves an angle or a speed by much
-    more than a step should is taken again, shorter.
+    Newton's method may well converge to another branch. A step that moves an angle or a speed too far is therefore
+    repeated with half its length; the step grows again while Newton's method converges fast.
     """
     reached = 0.0
     u = as_solved(u)
     while reached < 1:
         wanted = min(1.0, reached + step)
-        carried = _step_on(path(wanted), u, condition)
+        carried = _take_step(path(wanted), u, condition)
         if carried is None:
             step /= 2
             if step < 1e-6:
@@ -169,8 +171,8 @@ def _carry(
     return u
 
 
-def _step_on(equations: Steady, u: np.ndarray, condition: Callable) -> tuple[np.ndarray, int] | None:
-    """Solution of neighbouring equations and the iterations it took; None where it fails or jumps."""
+def _take_step(equations: Steady, u: np.ndarray, condition: Callable) -> tuple[np.ndarray, int] | None:
+    """Return the solution of neighbouring equations and its iterations; None where it fails or jumps."""
     try:
         new, iterations = newton(equations, u, condition, most=8)
     except ValueError:
@@ -179,15 +181,18 @@ def _step_on(equations: Steady, u: np.ndarray, condition: Callable) -> tuple[np.
     return (new, iterations) if moved.max() <= _LARGEST_MOVE else None
 
 
-def _between(bicycle: Bicycle, fraction: float) -> Bicycle:
-    """Bicycle between the benchmark and another; rigid bodies stay so, since their inertias are a convex set."""
-    one, other = asdict(Bicycle()), asdict(bicycle)
-    return Bicycle(**{name: (1 - fraction) * one[name] + fraction * other[name] for name in one})
+def _interpolate_bicycle(bicycle: Bicycle, fraction: float) -> Bicycle:
+    """Interpolate between the benchmark and another bicycle.
+
+    Rigid bodies remain rigid bodies, since the inertias of rigid bodies form a convex set.
+    """
+    benchmark, wanted = asdict(Bicycle()), asdict(bicycle)
+    return Bicycle(**{name: (1 - fraction) * benchmark[name] + fraction * wanted[name] for name in benchmark})
 
 
 @cache
 def _named_point(name: str) -> np.ndarray:
-    """A, D or G of the benchmark on the level plane."""
+    """Return point A, D or G of the benchmark on the level plane."""
     angles, condition = {
         "A": (_POINT_A, unknown_condition(SIGMA, 0.0)),
         "D": (_POINT_D, nearest_condition()),
@@ -197,15 +202,15 @@ def _named_point(name: str) -> np.ndarray:
 
 
 @cache
-def _on_the_plane(family: int, rear_rate: float | None) -> np.ndarray:
-    """The benchmark's anchor on the level plane, from the paper's named points."""
+def _plane_anchor(family: int, rear_rate: float | None) -> np.ndarray:
+    """Return the benchmark's anchor on the level plane, found from the paper's named points."""
     name, towards = {1: ("A", _unit(SIGMA)), 2: ("D", _unit(LEAN))}.get(family, ("G", -_unit(STEER)))
     start = _named_point(name)
-    return start if rear_rate is None else _met_from(start, towards, _anchored(rear_rate))
+    return start if rear_rate is None else _first_crossing(start, towards, _anchor_condition(rear_rate))
 
 
-def _met_from(start: np.ndarray, towards: np.ndarray, condition: Callable[[np.ndarray], Condition]) -> np.ndarray:
-    """The first solution of a condition on the benchmark's curve on the plane."""
+def _first_crossing(start: np.ndarray, towards: np.ndarray, condition: Callable[[np.ndarray], Condition]) -> np.ndarray:
+    """Return the first solution of a condition on the benchmark's curve on the plane."""
     level = Steady(Bicycle(), Plane())
     return next(crossings(level, follow_curve(level, start, towards), condition))
 
@@ -214,7 +219,7 @@ def _unit(index: int) -> np.ndarray:
     return np.eye(UNKNOWNS)[index]
 
 
-def _anchored(rear_rate: float | None) -> Callable[[np.ndarray], Condition]:
+def _anchor_condition(rear_rate: float | None) -> Callable[[np.ndarray], Condition]:
     return unknown_condition(REAR_SPEED, 0.0) if rear_rate is None else rear_rate_condition(rear_rate)
 
 
@@ -246,13 +251,13 @@ def anchor(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rat
     ValueError
         If the anchor is lost on the way.
     """
-    condition, directions = _anchored(rear_rate), _directions(family, rear_rate)
-    u = _to_bicycle(bicycle, _on_the_plane(family, rear_rate), condition)
+    condition, directions = _anchor_condition(rear_rate), _directions(family, rear_rate)
+    u = _to_bicycle(bicycle, _plane_anchor(family, rear_rate), condition)
     if rear_rate is None:
         try:
             u = _to_surface(bicycle, surface, u, condition)
         except ValueError:
-            u = _other_pivot(bicycle, surface)
+            u = _find_other_pivot(bicycle, surface)
     else:
         u, condition = _to_surface_or_middle(bicycle, surface, u, condition, directions)
     return _anchor_at(family, Steady(bicycle, surface), u, directions, condition)
@@ -265,7 +270,7 @@ def _anchor_at(
     directions: tuple[np.ndarray, ...],
     condition: Callable[[np.ndarray], Condition],
 ) -> Anchor:
-    """An anchor at a solution; a pivoting motion turns as those do that its curve is followed to."""
+    """Make an anchor at a solution; a pivoting motion turns as its neighbours in the anchor's direction do."""
     u = unknowns
     if abs(u[REAR_SPEED]) < STANDING:
         along = tangent(equations, u)
@@ -275,28 +280,28 @@ def _anchor_at(
 
 
 def next_anchor(path: Callable[[float], Steady], family: int, rear_rate: float | None, unknowns: np.ndarray) -> Anchor:
-    """Carry an anchor from neighbouring equations, the path at 0, to those at 1; arguments as of `anchor`.
+    """Carry an anchor from neighbouring equations, at 0 on the path, to those at 1; see `anchor` for the arguments.
 
     Raises
     ------
     ValueError
         If the anchor is lost on the way.
     """
-    there, condition = path(1.0), _anchored(rear_rate)
+    there, condition = path(1.0), _anchor_condition(rear_rate)
     u = _carry(path, unknowns, condition, str(there.surface), step=1.0)
     return _anchor_at(family, there, u, _directions(family, rear_rate), condition)
 
 
 def further_anchors(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Iterator[Anchor]:
-    """Anchors whose curves may be those of the families, or hold what the families have left behind.
+    """Yield anchors of further curves that may hold parts of the families.
 
-    First the anchors of which a family has more than one, then every static equilibrium: in one a curve begins
-    that ends in circles of growing radius, as family 1 does, whose number it bears.
+    The families' anchors other than their last come first, then every static equilibrium. The curve that begins in a
+    static equilibrium ends in circles of growing radius, as family 1 does, and bears its number.
 
     Yields
     ------
     Anchor
-        Those that can be carried to the bicycle and the surface.
+        Anchors that can be carried to the bicycle and the surface.
     """
     for family, rates in ANCHORS.items():
         for rate in rates[:-1]:
@@ -310,15 +315,15 @@ def further_anchors(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Iterator[
 
 
 def _anchor_towards_c(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Anchor:
-    """The anchor on the circles that tend to C; a ValueError where it is lost."""
+    """Return the anchor on the circles that tend to C; raise ValueError where it is lost."""
     condition, directions = _radius_condition(_TOWARDS_C), (_unit(STEER), -_unit(STEER))
-    u = _to_bicycle(bicycle, _met_from(_named_point("D"), -_unit(LEAN), condition), condition)
+    u = _to_bicycle(bicycle, _first_crossing(_named_point("D"), -_unit(LEAN), condition), condition)
     u, condition = _to_surface_or_middle(bicycle, surface, u, condition, directions)
     return Anchor(4, Steady(bicycle, surface), u, directions, condition)
 
 
 def static_equilibria(equations: Steady) -> list[np.ndarray]:
-    """Static equilibria of the bicycle upright on its wheels and steered to the left, from a grid of starts.
+    """Find static equilibria of the bicycle upright on its wheels and steered to the left, from a grid of guesses.
 
     Parameters
     ----------
@@ -327,7 +332,7 @@ def static_equilibria(equations: Steady) -> list[np.ndarray]:
     Returns
     -------
     list of ndarray, shape (22,)
-        By rising steer.
+        In order of rising steer.
     """
     found: list[np.ndarray] = []
     for steer in _STEERS:
@@ -342,24 +347,27 @@ def static_equilibria(equations: Steady) -> list[np.ndarray]:
                 u, _ = newton(equations, start, unknown_condition(SIGMA, 0.0), most=25)
             except ValueError:
                 continue
-            if _stands(equations, u) and not any(np.abs(u - other)[: STEER + 1].max() < _SAME for other in found):
+            if _is_standing(equations, u) and not any(np.abs(u - other)[: STEER + 1].max() < _SAME for other in found):
                 found.append(u)
     return sorted(found, key=lambda u: float(u[STEER]))
 
 
-def _stands(equations: Steady, unknowns: np.ndarray) -> bool:
-    """Whether a bicycle stands on its wheels, above the ground and steered to the left: one that is no root alone."""
+def _is_standing(equations: Steady, unknowns: np.ndarray) -> bool:
+    """Return whether the bicycle stands on its wheels, above the ground and steered to the left.
+
+    Other roots of the equations are no equilibria of a real bicycle.
+    """
     return bool(0 < unknowns[STEER] < np.pi) and above_ground(equations, unknowns)
 
 
 def above_ground(equations: Steady, unknowns: np.ndarray) -> bool:
-    """Whether a solution (22,) is of a bicycle above its ground that leans and pitches as one can."""
+    """Return whether a solution (22,) lies above the ground, with a lean and a pitch that a bicycle can have."""
     if np.abs(unknowns[[LEAN, PITCH]]).max() > LARGEST_LEAN:
         return False
     q = np.zeros((1, 9))
     q[0, :3], q[0, 4:7] = unknowns[:3], unknowns[3:6]
     centres = body_positions(equations.bicycle, q)[0]
-    # The wheels touch the ground from below just as well.
+    # The wheels may as well touch the ground from below.
     return bool(np.all(centres[:, 2] > evaluate(equations.surface, centres[:, 0], centres[:, 1])[:, 0]))
 
 
@@ -367,7 +375,7 @@ def _to_bicycle(bicycle: Bicycle, u: np.ndarray, condition: Callable[[np.ndarray
     """Carry the benchmark's solution on the plane to a bicycle."""
     if bicycle == Bicycle():
         return u
-    return _carry(lambda s: Steady(_between(bicycle, s), Plane()), u, condition, "this bicycle")
+    return _carry(lambda s: Steady(_interpolate_bicycle(bicycle, s), Plane()), u, condition, "this bicycle")
 
 
 def _to_surface(
@@ -386,10 +394,10 @@ def _to_surface_or_middle(
     condition: Callable[[np.ndarray], Condition],
     directions: tuple[np.ndarray, ...],
 ) -> tuple[np.ndarray, Callable[[np.ndarray], Condition]]:
-    """Carry a solution to a surface; where it is lost, another of its curve, half-way between the ground's edges.
+    """Carry a solution to a surface; where it is lost, carry the circle half-way between the ground's edges.
 
-    An anchor rides on a small circle: around a trough there is no ground for it. The first error is raised where
-    the curve on the plane, followed in the ``directions``, has no such circle, or where it is lost on the way too.
+    An anchor rides on a small circle, and a trough may have no ground for it. The first error is raised where the curve
+    on the plane, followed in the ``directions``, has no circle half-way, or where that circle is lost as well.
     """
     try:
         return _to_surface(bicycle, surface, u, condition), condition
@@ -408,22 +416,22 @@ def _to_surface_or_middle(
     raise lost
 
 
-def _other_pivot(bicycle: Bicycle, surface: SurfaceOfRevolution) -> np.ndarray:
-    """The pivoting motion in which family 2 ends on steep bowls.
+def _find_other_pivot(bicycle: Bicycle, surface: SurfaceOfRevolution) -> np.ndarray:
+    """Return the pivoting motion in which family 2 ends on steep bowls.
 
-    The one known from the plane comes to rest as a bowl deepens (the benchmark's on a paraboloid at
-    alpha = 0.42); another appears further on (at 0.46), first infinitely fast.
+    The pivoting motion known from the plane comes to rest as a bowl deepens (the benchmark's on a paraboloid at
+    alpha = 0.42). Another one appears further on (at 0.46), at first infinitely fast.
     """
     branch = anchor(bicycle, surface, 2, ANCHORS[2][-1])
     for towards in branch.directions:
         points = follow_curve(branch.equations, branch.unknowns, towards)
-        for u in crossings(branch.equations, points, _anchored(None)):
+        for u in crossings(branch.equations, points, _anchor_condition(None)):
             return u
     raise ValueError(f"there is no pivoting motion on {surface}")
 
 
 def _radius_condition(radius: float) -> Callable[[np.ndarray], Condition]:
-    """Condition of a given radius of D's circle, in units of its square."""
+    """Make the condition of a given radius of D's circle, in units of its square."""
 
     def condition(u: np.ndarray) -> Condition:
         gradient = np.zeros(UNKNOWNS)

@@ -1,4 +1,4 @@
-"""The atlas of circular motions: every family end to end over alpha, where it is stable, and why it ceases to be."""
+"""The atlas of circular motions: every family from end to end over alpha, and where and why it is stable."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .surface import Paraboloid
 
 ATLAS_SIZE = 400_000
 _CROWDED = 0.04  # the last stable section vanishes at 0.033, the cusps meet at 0.017
-_ARC = 38.0  # of all four families together, a mean over alpha
-_LONGEST_STEP = 0.05  # of the arc: no section known is so short that its neighbours would not tell of it
+_ARC = 38.0  # arclength of all four families together, a mean over alpha
+_LONGEST_STEP = 0.05  # of the arc: every known section is long enough to be found with this step
 
 
 @dataclass(frozen=True)
 class AtlasCurve:
-    """One family at one alpha.
+    """One family at one alpha, sampled.
 
     Attributes
     ----------
@@ -33,16 +33,16 @@ class AtlasCurve:
     family : int
     ends : tuple of str
         See `velodrome.reference.families.Family`.
-    seen : Samples
+    samples : Samples
         Its motions in the order of the curve.
     sections : list of (SectionEnd, SectionEnd)
-        Its stable sections, ends solved to round-off.
+        Its stable sections, their ends solved to round-off.
     """
 
     alpha: float
     family: int
     ends: tuple[str, str]
-    seen: Samples
+    samples: Samples
     sections: list[tuple[SectionEnd, SectionEnd]]
 
 
@@ -58,7 +58,7 @@ class Boundary:
     ends : list of (SectionEnd, SectionEnd)
         At each alpha, in the order of the family's points.
     vanishing : CriticalPoint or None
-        Where both ends meet, and the section vanishes, as alpha grows; None where it reaches the last alpha.
+        Where both ends meet and the section vanishes as alpha grows; None where it reaches the last alpha.
     """
 
     family: int
@@ -78,7 +78,7 @@ class Absence:
 
 @dataclass(frozen=True)
 class Atlas:
-    """All curves, the boundaries of their stable sections, and where families touch.
+    """All curves, the boundaries of their stable sections, and the points where families touch.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Atlas:
     alphas : ndarray, shape (k,)
         Rising [1/m].
     curves : list of AtlasCurve
-        By rising alpha, then family.
+        In order of rising alpha, then family.
     absent : list of Absence
     boundaries : list of Boundary
     reconnections : list of CriticalPoint
@@ -103,14 +103,14 @@ class Atlas:
     @property
     def size(self) -> int:
         """Number of motions."""
-        return sum(len(curve.seen.lean) for curve in self.curves)
+        return sum(len(curve.samples.lean) for curve in self.curves)
 
 
 def spacing(size: int = ATLAS_SIZE, largest: float = 1.0) -> tuple[np.ndarray, float]:
-    """Shapes and longest step of the arc for an atlas of some ``size`` motions.
+    """Choose the shapes and the longest step of the arc for an atlas of about ``size`` motions.
 
-    Half of the shapes lie evenly up to 0.04, where things happen, the others evenly in log alpha up to the
-    largest.
+    Half of the shapes lie evenly between 0 and 0.04, where the stable sections and the cusps vanish, the others evenly
+    in log alpha up to the largest.
 
     Returns
     -------
@@ -154,31 +154,34 @@ def compute_atlas(
     for k, alpha in enumerate(map(float, alphas)):
         for family in FAMILIES:
             try:
-                curves.append(_curve(bicycle, alpha, family, longest, anchors))
+                curves.append(_compute_curve(bicycle, alpha, family, longest, anchors))
             except ValueError as error:
                 absent.append(Absence(alpha, family, str(error)))
         progress(0.9 * (k + 1) / len(alphas))
     largest = float(alphas[-1])
     touching = reconnections(bicycle, largest=largest)
     progress(0.95)
-    boundaries = [boundary for family in FAMILIES for boundary in _boundaries(bicycle, curves, family)]
+    boundaries = [boundary for family in FAMILIES for boundary in _follow_boundaries(bicycle, curves, family)]
     progress(1.0)
     return Atlas(bicycle, np.asarray(alphas, float), curves, absent, boundaries, touching)
 
 
-def _curve(
+def _compute_curve(
     bicycle: Bicycle, alpha: float, number: int, longest: float, anchors: dict[float | None, tuple[float, np.ndarray]]
 ) -> AtlasCurve:
-    """One family at one alpha, its anchor carried from where ``anchors`` has it, which takes the new one."""
+    """Compute one family at one alpha.
+
+    Its anchor is carried from the last alpha, where ``anchors`` holds it, and the new one replaces it there.
+    """
     rear_rate = ANCHORS[number][-1]
-    start = _anchor(bicycle, alpha, number, anchors.pop(rear_rate, None))
+    start = _carry_anchor(bicycle, alpha, number, anchors.pop(rear_rate, None))
     anchors[rear_rate] = alpha, start.unknowns
     family = trace_from(start, longest)
     seen = sample_family(family)
     return AtlasCurve(alpha, number, family.ends, seen, stable_sections(family, seen.growth_rate))
 
 
-def _anchor(bicycle: Bicycle, alpha: float, number: int, known: tuple[float, np.ndarray] | None) -> Anchor:
+def _carry_anchor(bicycle: Bicycle, alpha: float, number: int, known: tuple[float, np.ndarray] | None) -> Anchor:
     rear_rate = ANCHORS[number][-1]
     if known is not None:
         low, unknowns = known
@@ -187,12 +190,12 @@ def _anchor(bicycle: Bicycle, alpha: float, number: int, known: tuple[float, np.
                 lambda s: Steady(bicycle, Paraboloid(low + s * (alpha - low))), number, rear_rate, unknowns
             )
         except ValueError:
-            pass  # one pivoting motion is gone; there may be another
+            pass  # one pivoting motion has vanished; there may be another
     return anchor(bicycle, Paraboloid(alpha), number, rear_rate)
 
 
-def _boundaries(bicycle: Bicycle, curves: list[AtlasCurve], number: int) -> list[Boundary]:
-    """Stable sections of a family, each followed from its first alpha to its last."""
+def _follow_boundaries(bicycle: Bicycle, curves: list[AtlasCurve], number: int) -> list[Boundary]:
+    """Follow the stable sections of a family, each from its first alpha to its last."""
     found: list[Boundary] = []
     current: list[Boundary] = []
     before = None

@@ -1,4 +1,4 @@
-"""Bowls of a textbook's shapes: sphere, cone and torus, each a surface of revolution about z."""
+"""Bowls of simple shapes: sphere, cone and torus, each a surface of revolution about z."""
 
 from __future__ import annotations
 
@@ -42,15 +42,15 @@ def _torus(x, y, parameters):
 _SHARPEST = 1e-100  # rounding of a cone's tip [m]
 
 
-def _refuse(name: str, value: object, what: str) -> ValueError:
+def _number_error(name: str, value: object, what: str) -> ValueError:
     return ValueError(f"{name} is {value!r}; it must be a finite number {what}")
 
 
 @dataclass(frozen=True)
 class Sphere:
-    """The lower half of a sphere, z = R - sqrt(R^2 - r^2); no ground from its equator on.
+    """The lower half of a sphere, z = R - sqrt(R^2 - r^2); there is no ground at and beyond its equator.
 
-    Near the axis it is the paraboloid of alpha = 1 / (2 R) but for r^4 / (8 R^3).
+    Near the axis it differs from the paraboloid of alpha = 1 / (2 R) by r^4 / (8 R^3).
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class Sphere:
 
     def __post_init__(self) -> None:
         if not (is_number(self.radius) and self.radius > 0):
-            raise _refuse("radius", self.radius, "> 0")
+            raise _number_error("radius", self.radius, "> 0")
 
     @property
     def function(self) -> SurfaceFunction:
@@ -81,11 +81,11 @@ class Sphere:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """From the axis to the equator."""
+        """Radii of the ground, from the axis to the equator [m]."""
         return 0.0, float(self.radius)
 
     def flattened(self, fraction: float) -> SurfaceOfRevolution:
-        """The sphere of a fraction of the curvature."""
+        """Return the sphere with a fraction of the curvature."""
         return Sphere(self.radius / fraction) if fraction > 0 else Plane()
 
 
@@ -93,8 +93,8 @@ class Sphere:
 class Cone:
     """A cone with a rounded tip, z = slope (sqrt(r^2 + rounding^2) - rounding).
 
-    Near the axis it is the paraboloid of alpha = slope / (2 rounding), far from it a cone, r >> rounding.
-    A sharp tip has no normal: a wheel's contact there would be undefined, so the tip is always rounded.
+    Near the axis it is the paraboloid of alpha = slope / (2 rounding); where r >> rounding it is a cone.
+    A sharp tip has no normal, and a wheel's contact there would be undefined, so the tip is always rounded.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class Cone:
     Raises
     ------
     ValueError
-        If one of them is not positive and finite, or the rounding is next to nothing.
+        If one of them is not positive and finite, or the rounding is below 1e-100 m.
     """
 
     slope: float
@@ -116,9 +116,9 @@ class Cone:
         for name in ("slope", "rounding"):
             value = getattr(self, name)
             if not (is_number(value) and value > 0):
-                raise _refuse(name, value, "> 0")
+                raise _number_error(name, value, "> 0")
         if self.rounding < _SHARPEST:
-            raise _refuse("rounding", self.rounding, f">= {_SHARPEST!r}: the square of a smaller one underflows")
+            raise _number_error("rounding", self.rounding, f">= {_SHARPEST!r}: the square of a smaller one underflows")
 
     @property
     def function(self) -> SurfaceFunction:
@@ -132,7 +132,7 @@ class Cone:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """It has no edge."""
+        """Radii of the ground [m]; it has no edge."""
         return 0.0, math.inf
 
     @property
@@ -141,7 +141,7 @@ class Cone:
         return self.slope / self.rounding
 
     def flattened(self, fraction: float) -> SurfaceOfRevolution:
-        """The cone of a fraction of the slope."""
+        """Return the cone with a fraction of the slope."""
         return Cone(fraction * self.slope, self.rounding) if fraction > 0 else Plane()
 
 
@@ -149,9 +149,9 @@ class Cone:
 class Torus:
     """A circular trough, the lower half of a torus: z = tube - sqrt(tube^2 - (r - ring)^2).
 
-    The bottom of the trough is the circle r = ring at z = 0. From there the ground rises both ways, and
-    ends where it is upright, at r = ring +- tube. With a tube wider than the ring the inner slope meets
-    itself on the axis in a tip, which has no normal; with ring = 0 this is the sphere.
+    The bottom of the trough is the circle r = ring at z = 0. From there the ground rises both ways and ends where it
+    is vertical, at r = ring +- tube. If the tube is wider than the ring, the inner slope meets itself on the axis in a
+    tip, which has no normal; with ring = 0 this is the sphere.
 
     Parameters
     ----------
@@ -171,9 +171,9 @@ class Torus:
 
     def __post_init__(self) -> None:
         if not (is_number(self.ring) and self.ring >= 0):
-            raise _refuse("ring", self.ring, ">= 0")
+            raise _number_error("ring", self.ring, ">= 0")
         if not (is_number(self.tube) and self.tube > 0):
-            raise _refuse("tube", self.tube, "> 0")
+            raise _number_error("tube", self.tube, "> 0")
 
     @property
     def function(self) -> SurfaceFunction:
@@ -187,9 +187,9 @@ class Torus:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """From the inner upright wall, or the axis, to the outer one."""
+        """Radii of the ground, from the inner vertical wall, or the axis, to the outer one [m]."""
         return max(0.0, float(self.ring - self.tube)), float(self.ring + self.tube)
 
     def flattened(self, fraction: float) -> SurfaceOfRevolution:
-        """The torus of a fraction of the tube's curvature, around the same ring."""
+        """Return the torus with a fraction of the tube's curvature, around the same ring."""
         return Torus(self.ring, self.tube / fraction) if fraction > 0 else Plane()

@@ -1,6 +1,6 @@
 """One circular motion: 21 constants (Xiong et al. 2020, Eqs. 9-14).
 
-Solved are the eight equations in nine unknowns of `velodrome.reference.kernels.circle`; speeds, contact points and
+The eight equations in nine unknowns of `velodrome.reference.kernels.circle` are solved; speeds, contact points and
 forces follow from them, and all 22 unknowns of `velodrome.reference.kernels.steady` describe the solution.
 """
 
@@ -22,7 +22,7 @@ from .surface import SurfaceOfRevolution
 LEAN, PITCH, STEER, YAW_SPEED, REAR_SPEED, FRONT_SPEED, SIGMA = range(3, 10)
 CONTACT, FORCE = slice(10, 16), slice(16, 22)
 
-# Rows are of order one: round-off of a solution is some 1e-14, times the heights on large circles.
+# Rows are of order one: the round-off of a solution is about 1e-14, times the heights on large circles.
 LARGEST_RESIDUAL = 1e-12
 
 
@@ -33,7 +33,7 @@ class CircularMotion:
     Attributes
     ----------
     position : ndarray, shape (3,)
-        D [m].
+        Position of D [m].
     lean, pitch, steer : float
         Angles [rad].
     yaw_rate, rear_rate, front_rate : float
@@ -43,7 +43,7 @@ class CircularMotion:
     force : ndarray, shape (2, 3)
         Contact forces on the wheels [N].
     residual : float
-        Largest of the 21 equations: forces in weights, lengths in m, rolling speeds as fractions of
+        Largest of the 21 equations: forces in units of the weight, lengths in m, rolling speeds as fractions of
         the root of the sum of the squared rates.
     """
 
@@ -67,16 +67,18 @@ class CircularMotion:
 
 
 class Expansion(NamedTuple):
-    """The equations at nine unknowns, to first order.
+    """The equations and all unknowns at nine unknowns, to first order.
 
     Attributes
     ----------
     rows : ndarray, shape (8,)
+        Residuals of the equations.
     jacobian : ndarray, shape (8, 9)
+        Their Jacobian.
     full : ndarray, shape (22,)
         All unknowns.
     basis : ndarray, shape (22, 9)
-        Their Jacobian in the nine.
+        Their derivatives with respect to the nine.
     """
 
     rows: np.ndarray
@@ -94,31 +96,31 @@ class Steady:
 
     @cached_property
     def where(self) -> tuple[Any, Any, np.ndarray, Any]:
-        """What compiled kernels take: the surface for real and for complex numbers, its parameters, the bicycle."""
+        """Arguments of compiled kernels: the surface for real and for complex numbers, its parameters, the bicycle."""
         function = self.surface.function
         return function.real, function.complex, self.surface.parameters, aligned(constants(self.bicycle))
 
     def expand(self, chosen: np.ndarray) -> Expansion:
-        """The eight equations and all 22 unknowns at the nine, shape (9,), with their Jacobians."""
+        """Evaluate the eight equations and all 22 unknowns at the nine, shape (9,), with their Jacobians."""
         out = Expansion(np.empty(8), np.empty((8, 9)), np.empty(kernel.UNKNOWNS), np.empty((kernel.UNKNOWNS, 9)))
         curve.expanded(chosen, *self.where[1:], *out)
         return out
 
     def residual(self, unknowns: np.ndarray) -> np.ndarray:
-        """Residual of the 21 equations and the normalisation of the speeds, shape (22,)."""
+        """Evaluate the 21 equations and the normalisation of the speeds, shape (22,)."""
         out, function = np.empty(kernel.UNKNOWNS), self.surface.function.real
         kernel.steady_residual(unknowns, function, self.surface.parameters, constants(self.bicycle), out)
         return out
 
     def jacobian(self, unknowns: np.ndarray) -> np.ndarray:
-        """Its Jacobian, shape (22, 22), rank 21: power balance makes one equation redundant."""
+        """Evaluate the Jacobian of `residual`, shape (22, 22), rank 21: power balance makes one equation redundant."""
         out = np.empty((kernel.UNKNOWNS, kernel.UNKNOWNS))
         function = self.surface.function.complex
         kernel.steady_jacobian(unknowns, function, self.surface.parameters, constants(self.bicycle), out)
         return out
 
     def motion(self, unknowns: np.ndarray) -> CircularMotion:
-        """The motion behind a solution, run so that the rear wheel rolls forward (`kernels.steady.direction`).
+        """Return the motion of a solution, run so that the rear wheel rolls forward (`kernels.steady.direction`).
 
         Raises
         ------
@@ -145,14 +147,14 @@ class Steady:
 
 
 def reverse_speeds(unknowns: np.ndarray) -> np.ndarray:
-    """The same solution, or its tangent, (22,) each, with the signs of all three speeds exchanged."""
+    """Return the same solution, or its tangent, (22,) each, with the signs of all three speeds reversed."""
     other = unknowns.copy()
     other[YAW_SPEED : FRONT_SPEED + 1] *= -1
     return other
 
 
 def as_solved(unknowns: np.ndarray) -> np.ndarray:
-    """The same solution (22,) with the signs of the speeds that solvers give: a turn to the left."""
+    """Return the same solution (22,) with the signs of the speeds that the solvers use: a turn to the left."""
     return reverse_speeds(unknowns) if unknowns[YAW_SPEED] < 0 else unknowns
 
 
@@ -165,7 +167,7 @@ class Condition:
 
 
 def rear_rate_condition(rear_rate: float):
-    """Condition of a given rear-wheel rate: sigma b^2 = rate^2, in units of the rate's square or of 1."""
+    """Make the condition of a given rear-wheel rate: sigma b^2 = rate^2, in units of the rate's square or of 1."""
     scale = kernel.SIGMA_UNIT / max(rear_rate**2, 1.0)
 
     def condition(u: np.ndarray) -> Condition:
@@ -178,7 +180,7 @@ def rear_rate_condition(rear_rate: float):
 
 
 def unknown_condition(index: int, value: float):
-    """Condition that one unknown has a given value."""
+    """Make the condition that one unknown has a given value."""
 
     def condition(u: np.ndarray) -> Condition:
         gradient = np.zeros(kernel.UNKNOWNS)
@@ -189,12 +191,12 @@ def unknown_condition(index: int, value: float):
 
 
 def nearest_condition():
-    """No condition: least squares takes the guess to the nearest point of the curve."""
+    """Make an empty condition: least squares takes the guess to the nearest point of the curve."""
     return lambda u: Condition(0.0, np.zeros(kernel.UNKNOWNS))
 
 
 def plane_condition(start: np.ndarray, tangent: np.ndarray, distance: float):
-    """Condition of pseudo-arclength: at ``distance`` from ``start`` along ``tangent`` (a weighted covector)."""
+    """Make the condition of pseudo-arclength: ``distance`` from ``start`` along ``tangent`` (a weighted covector)."""
 
     def condition(u: np.ndarray) -> Condition:
         return Condition(float(tangent @ (u - start)) - distance, tangent)
@@ -213,7 +215,7 @@ def newton(equations: Steady, unknowns: np.ndarray, condition, most: int = 12) -
     condition : callable
         Maps the unknowns to a `Condition`.
     most : int
-        Iterations allowed.
+        Largest number of iterations.
 
     Returns
     -------
@@ -237,7 +239,7 @@ def newton(equations: Steady, unknowns: np.ndarray, condition, most: int = 12) -
         step = np.linalg.lstsq(matrix, -values, rcond=None)[0]
         size = float(np.abs(step / (1 + np.abs(u))).max())
         u = u + step * min(1.0, 0.5 / size if size > 0 else 1.0)
-        if size < 1e-9:  # quadratic: what is left is round-off
+        if size < 1e-9:  # convergence is quadratic: what remains is round-off
             full = equations.expand(u).full
             # Least squares may also settle where the equations have no solution.
             if np.abs(equations.residual(full)).max() > LARGEST_RESIDUAL * (1 + np.abs(full).max()):

@@ -15,7 +15,7 @@ from .surface import Surface
 
 @dataclass(frozen=True)
 class Observation:
-    """What a trajectory looks like at its contacts; wheels in the order rear, front.
+    """Contacts and energies along a trajectory; wheels in the order rear, front.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Observation:
     slip : ndarray, shape (n, 2, 2)
         Lateral and forward material velocity of that point [m/s].
     kinetic_energy, potential_energy : ndarray, shape (n,)
-        Energies, the potential's datum at z = 0 [J].
+        Energies [J]; the potential energy is zero at z = 0.
     found : bool
         False where a closest approach could not be computed.
     """
@@ -52,8 +52,8 @@ def observe(
     q, qd : ndarray, shape (n, 9)
         Coordinates and rates.
     contact : ndarray, shape (n, 2, 3), optional
-        Contact parameters (xi, eta, rim angle), where an integrator has them. Without them the contact is searched
-        from each pose alone, and is the place where the rim is deepest.
+        Contact parameters (xi, eta, rim angle), where an integrator has them. Without them the contact is computed from
+        each pose alone, as the point where the rim is deepest.
     """
     n = len(q)
     contacts = np.empty((n, 6)) if contact is None else np.array(contact, float).reshape(n, 6)

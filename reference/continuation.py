@@ -15,17 +15,18 @@ from .kernels import curve as kernel
 from .kernels.steady import UNKNOWNS
 from .surface import SurfaceOfRevolution, has_tip
 
-FARTHEST = 1e3  # of D from the origin [m]: beyond, a large circle differs from its limit by round-off
+FARTHEST = 1e3  # distance of D from the origin [m]: a larger circle differs from its limit by round-off only
 LARGEST_LEAN = 1.5
-LARGEST_SIGMA = 100.0  # 200 rad/s: a curve can run off to infinite speed at finite angles
+LARGEST_SIGMA = 100.0  # 200 rad/s: a curve can lead to infinite speed at finite angles
 LONGEST_STEP = 0.15
 _FIRST_STEP = 0.02
-_REAR_SIDE = CONTACT.start + 1  # eta of the rear contact; its xi is zero, the rear wheel heads along its circle
-_CHUNK = 32  # points that are followed at once
-# Of the radius where the ground ends. Towards the rim of a sphere derivatives of the height lose digits like
-# the inverse of the distance, and steps of the arc can only creep: within a thousandth a curve is at its end.
+_REAR_SIDE = CONTACT.start + 1  # eta of the rear contact; its xi is zero, as the rear wheel heads along its circle
+_CHUNK = 32  # points followed in one call of the kernel
+# Fraction of the radius where the ground ends. Towards the rim of a sphere, derivatives of the height lose digits in
+# proportion to the inverse of the distance, and steps of the arc become very short: a curve ends within a thousandth.
 _AT_THE_EDGE = 1e-3
-_FULFILLED = 1e-11  # by a condition: of order one, solved to round-off, some 1e-14, times the equations' condition
+# Value, of order one, below which a condition is fulfilled: round-off, about 1e-14, times the equations' condition.
+_FULFILLED = 1e-11
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Point:
     unknowns : ndarray, shape (22,)
         See `velodrome.reference.kernels.steady`.
     tangent : ndarray, shape (22,)
-        Of unit length in the arclength's metric.
+        Unit tangent in the arclength's metric.
     """
 
     unknowns: np.ndarray
@@ -45,14 +46,14 @@ class Point:
 
 
 def metric(u: np.ndarray) -> np.ndarray:
-    """Diagonal of the arclength's metric at a point: unknowns that grow without bound count relatively."""
+    """Return the diagonal of the arclength's metric at a point: unknowns that grow without bound count relatively."""
     weights = np.empty(UNKNOWNS)
     kernel.metric(u, weights)
     return weights
 
 
 def tangent(equations: Steady, u: np.ndarray) -> np.ndarray:
-    """Direction of the curve at a solution `as_solved`, of unit length in the arclength's metric, of either sign."""
+    """Return the unit tangent of the curve, in the arclength's metric and of either sign, at a solution `as_solved`."""
     chosen, full, along = u[kernel.CHOSEN], np.empty(UNKNOWNS), np.empty(UNKNOWNS)
     # Rank 8 of 9: the singular vector of the smallest singular value.
     null = np.linalg.svd(equations.expand(chosen).jacobian)[2][-1]
@@ -71,26 +72,26 @@ def follow_curve(
     start : ndarray, shape (22,)
         A solution.
     towards : ndarray, shape (22,)
-        Direction whose scalar product with the first tangent is to be positive.
+        Direction whose scalar product with the first tangent shall be positive.
     longest : float
         Longest step of the arc.
     most : int
-        Number of points at the most.
+        Largest number of points after the start.
 
     Yields
     ------
     Point
-        The start, then points along the curve, until it ends: with the first point of sigma < 0, beyond
+        The start, then points along the curve until it ends: with the first point of sigma < 0, beyond
         the largest lean, circle or speed, at the edge of the ground, before a tip of it, or where the shortest
-        steps no longer converge. The speeds of all are `as_solved`.
+        steps no longer converge. All of them are `as_solved`.
     """
     if as_solved(start) is not start:
         start, towards = reverse_speeds(start), reverse_speeds(towards)
     direction = tangent(equations, start)
     first = Point(start, direction if direction @ towards > 0 else -direction)
     tip, side = has_tip(equations.surface), start[_REAR_SIDE]
-    for point in _steps(equations, first, longest, most):
-        # The rear wheel comes to the axis sideways; there a tip has no normal, and no motion to solve for.
+    for point in _follow_steps(equations, first, longest, most):
+        # The rear wheel reaches the axis sideways; a tip there has no normal, and no motion can be solved for.
         if tip and side * point.unknowns[_REAR_SIDE] <= 0:
             return
         yield point
@@ -99,7 +100,7 @@ def follow_curve(
 
 
 def at_edge(surface: SurfaceOfRevolution, point: Point) -> bool:
-    """Whether a wheel stands where the ground ends."""
+    """Return whether a wheel is at the edge of the ground."""
     inner, outer = surface.extent
     if (inner, outer) == (0.0, np.inf):  # no edge to look for
         return False
@@ -107,8 +108,8 @@ def at_edge(surface: SurfaceOfRevolution, point: Point) -> bool:
     return bool(contact.max() > (1 - _AT_THE_EDGE) * outer or contact.min() < (1 + _AT_THE_EDGE) * inner)
 
 
-def _steps(equations: Steady, first: Point, longest: float, most: int) -> Iterator[Point]:
-    """A point and those that follow, as if the ground had no edge."""
+def _follow_steps(equations: Steady, first: Point, longest: float, most: int) -> Iterator[Point]:
+    """Yield a point and those that follow it, ignoring edges of the ground."""
     yield first
     distance, ended, largest = min(_FIRST_STEP, longest), False, (LARGEST_LEAN, LARGEST_SIGMA, FARTHEST)
     while most > 0 and not ended:
@@ -120,11 +121,12 @@ def _steps(equations: Steady, first: Point, longest: float, most: int) -> Iterat
         first, most = points[-1] if points else first, most - len(points)
 
 
-def _arc(equations: Steady, first: Point, second: Point) -> tuple[Callable[[float], Point], float]:
-    """Points of the curve between two neighbours, by their distance along the first one's tangent, and its end.
+def _interpolate_arc(equations: Steady, first: Point, second: Point) -> tuple[Callable[[float], Point], float]:
+    """Interpolate the curve between two neighbours.
 
-    Newton's method starts from the cubic through both: it knows where the curve bends, which a step from one of
-    them does not.
+    Returns a function from the distance along the first one's tangent to the point of the curve there, and the distance
+    of the second. Newton's method starts from the cubic through both, which has the curve's bend; a step from one of
+    them has not.
     """
     covector = (metric(first.unknowns) * first.tangent)[kernel.CHOSEN]
     start, along, end, onward = (
@@ -140,14 +142,14 @@ def _arc(equations: Steady, first: Point, second: Point) -> tuple[Callable[[floa
         if distance not in points:
             share = distance / length
             bend = share * (1 - share) * ((1 - share) * left + share * right)
-            points[distance] = _corrected(equations, start + share * chord + bend, covector)
+            points[distance] = _correct_point(equations, start + share * chord + bend, covector)
         return points[distance]
 
     return at, length
 
 
-def _corrected(equations: Steady, guess: np.ndarray, covector: np.ndarray) -> Point:
-    """Point of the curve in the plane through a guess (9,) square to a covector (9,)."""
+def _correct_point(equations: Steady, guess: np.ndarray, covector: np.ndarray) -> Point:
+    """Solve for the point of the curve in the plane through a guess (9,) perpendicular to a covector (9,)."""
     chosen, direction, (unknowns, along) = guess.copy(), np.empty(len(guess)), np.empty((2, UNKNOWNS))
     if not kernel.correct(chosen, covector, *equations.where, direction)[0]:
         raise ValueError("no circular motion is found along the curve")
@@ -164,31 +166,31 @@ def root_between(equations: Steady, first: Point, second: Point, function: Calla
     first, second : Point
         Neighbours, in the order in which they were followed.
     function : callable
-        Maps a `Point`, its tangent in the direction followed, to a number.
+        Maps a `Point`, with its tangent in the direction followed, to a number.
 
     Returns
     -------
     Point
         To round-off of the arc's length.
     """
-    at, length = _arc(equations, first, second)
+    at, length = _interpolate_arc(equations, first, second)
     root: Any = brentq(lambda distance: function(at(distance)), 0.0, length, xtol=1e-15)
     return at(root)
 
 
 def sign_changes(values: Sequence[float] | np.ndarray, zero: float = 0.0) -> list[tuple[int, int]]:
-    """Pairs of places between which a sequence of numbers changes its sign.
+    """Return the pairs of indices between which a sequence of numbers changes its sign.
 
     Parameters
     ----------
     values : sequence of float, shape (n,)
     zero : float
-        Largest size of a number that is zero but for round-off. It has no sign and is passed over.
+        Magnitude up to which a number counts as zero because of round-off. Zeros have no sign and are skipped.
 
     Returns
     -------
     list of (int, int)
-        Places of opposite signs, neighbours but for the zeros between them.
+        Indices of opposite signs; only zeros lie between the two.
     """
     numbers = np.asarray(values, float)
     signed = np.flatnonzero(np.abs(numbers) > zero)
@@ -203,7 +205,7 @@ def roots_along(
     values: Sequence[float] | np.ndarray | None = None,
     zero: float = 0.0,
 ) -> Iterator[tuple[int, Point]]:
-    """Points at which a function changes its sign along a followed curve.
+    """Yield the points at which a function changes its sign along a followed curve.
 
     Parameters
     ----------
@@ -211,18 +213,18 @@ def roots_along(
     points : sequence of Point, length n
         In the order followed.
     function : callable
-        Maps a `Point`, its tangent in the direction followed, to a number.
+        Maps a `Point`, with its tangent in the direction followed, to a number.
     values : sequence of float, shape (n,), optional
-        The function at the points, where it is known already.
+        Values of the function at the points, where they are known already.
     zero : float
         See `sign_changes`.
 
     Yields
     ------
     place : int
-        Of the last of the points before the root.
+        Index of the last of the points before the root.
     root : Point
-        To round-off of the arc's length; one of the points where the function is zero there.
+        Accurate to round-off of the arc's length; one of the points where the function is zero there.
     """
     numbers = [function(point) for point in points] if values is None else values
     for i, j in sign_changes(numbers, zero):
@@ -232,10 +234,10 @@ def roots_along(
 def crossings(
     equations: Steady, points: Iterable[Point], condition: Callable[[np.ndarray], Condition]
 ) -> Iterator[np.ndarray]:
-    """Solutions on a followed curve that fulfil a condition.
+    """Yield the solutions on a followed curve that fulfil a condition.
 
-    Between two neighbours there may be two, on either side of where the condition's value is extreme along
-    the curve: that point is solved for.
+    Between two neighbours there may be two solutions, one on either side of an extremum of the condition's value along
+    the curve. The extremum is solved for first.
 
     Parameters
     ----------
@@ -248,7 +250,7 @@ def crossings(
     Yields
     ------
     ndarray, shape (22,)
-        In the order met.
+        In the order along the curve.
     """
 
     def slope(point: Point) -> float:
@@ -271,8 +273,8 @@ def crossings(
 
 
 def least_between(equations: Steady, first: Point, second: Point, function: Callable[[Point], float]) -> Point:
-    """Find where a function is least between two near points of a followed curve, to some 1e-6 of their distance."""
-    at, length = _arc(equations, first, second)
+    """Find the minimum of a function between two near points of a followed curve, to about 1e-6 of their distance."""
+    at, length = _interpolate_arc(equations, first, second)
     found: Any = minimize_scalar(
         lambda distance: function(at(distance)),
         bounds=(0.0, length),

@@ -29,7 +29,7 @@ from .sections import SectionEnd, linearise_point, stable_sections
 from .stability import linearise
 from .surface import Paraboloid
 
-_STEP = 1e-6  # of second derivatives by central differences: they only steer Newton's method
+_STEP = 1e-6  # relative step of central differences; their errors affect only the convergence of Newton's method
 _SCAN = np.linspace(0.0, 1.0, 41)
 _BRACKET = 2e-3
 _SECTION_BRACKET = 2e-7
@@ -46,7 +46,7 @@ class CriticalPoint:
         [1/m].
     motion : CircularMotion
     residual : float
-        Largest of the defining equations; the growth rate [1/s] where a section vanishes.
+        Largest residual of the defining equations; the growth rate [1/s] where a section vanishes.
     kind : str
         ``reconnection``; ``tangency`` or ``crossing`` where a stable section vanishes.
     """
@@ -61,7 +61,7 @@ class CriticalPoint:
 def reconnections(
     bicycle: Bicycle, progress: Callable[[float], None] = lambda _: None, largest: float = 1.0
 ) -> list[CriticalPoint]:
-    """All alpha up to ``largest`` at which family 1 or 2 exchanges a part with another family.
+    """Find all alpha up to ``largest`` at which family 1 or 2 exchanges a part with another family.
 
     Parameters
     ----------
@@ -74,20 +74,20 @@ def reconnections(
     Returns
     -------
     list of CriticalPoint
-        With rising alpha.
+        In order of rising alpha.
     """
     found: list[CriticalPoint] = []
     for number in (1, 2):
-        for low, high in _changes(bicycle, number, largest, progress):
-            point = _touching_point(bicycle, number, low, high)
+        for low, high in _bracket_changes(bicycle, number, largest, progress):
+            point = _find_touching_point(bicycle, number, low, high)
             # Both families of a pair lead to the same point.
             if point is not None and not any(abs(point.alpha - other.alpha) < 1e-9 for other in found):
                 found.append(point)
     return sorted(found, key=lambda point: point.alpha)
 
 
-def _passing(bicycle: Bicycle, motion: CircularMotion, low: float, high: float) -> tuple[int, ...]:
-    """Families whose curve passes by a touching point on either side of its alpha."""
+def _passing_families(bicycle: Bicycle, motion: CircularMotion, low: float, high: float) -> tuple[int, ...]:
+    """Return the families whose curves pass near a touching point on either side of its alpha."""
     passing = []
     for number in FAMILIES:
         gaps = []
@@ -97,39 +97,39 @@ def _passing(bicycle: Bicycle, motion: CircularMotion, low: float, high: float) 
             except ValueError:
                 continue
             gaps += [np.hypot(p.unknowns[LEAN] - motion.lean, p.unknowns[STEER] - motion.steer) for p in points]
-        # Points lie 0.03 apart, curves some root of the bracket from the touching point.
+        # Points lie 0.03 apart, and curves about the square root of the bracket from the touching point.
         if gaps and min(gaps) < 0.06:
             passing.append(number)
     return tuple(passing)
 
 
-def _ends(bicycle: Bicycle, alpha: float, number: int) -> tuple[str, str] | None:
+def _trace_ends(bicycle: Bicycle, alpha: float, number: int) -> tuple[str, str] | None:
     try:
         return trace(bicycle, Paraboloid(alpha), number).ends
     except ValueError:
         return None
 
 
-def _changes(
+def _bracket_changes(
     bicycle: Bicycle, number: int, largest: float, progress: Callable[[float], None]
 ) -> Iterator[tuple[float, float]]:
-    """Brackets of alpha in which the ends of a family change."""
+    """Yield the brackets of alpha in which the ends of a family change."""
     grid = [float(alpha) for alpha in _SCAN if alpha <= largest]
-    before = _ends(bicycle, grid[0], number)
+    before = _trace_ends(bicycle, grid[0], number)
     for i in range(1, len(grid)):
-        here = _ends(bicycle, grid[i], number)
+        here = _trace_ends(bicycle, grid[i], number)
         progress(grid[i])
         if here != before:
             low, high = grid[i - 1], grid[i]
             while high - low > _BRACKET:
                 middle = 0.5 * (low + high)
-                low, high = (middle, high) if _ends(bicycle, middle, number) == before else (low, middle)
+                low, high = (middle, high) if _trace_ends(bicycle, middle, number) == before else (low, middle)
             yield low, high
         before = here
 
 
-def _touching_point(bicycle: Bicycle, number: int, low: float, high: float) -> CriticalPoint | None:
-    """Solve for the touching point near a family; None where its ends change without one."""
+def _find_touching_point(bicycle: Bicycle, number: int, low: float, high: float) -> CriticalPoint | None:
+    """Solve for the touching point near a family; None where its ends change without such a point."""
     family = trace(bicycle, Paraboloid(low), number, 0.05)
     jacobians = [family.equations.expand(point.unknowns[CHOSEN]).jacobian for point in family.points]
     rank = [float(np.linalg.svd(jacobian)[1][-1]) for jacobian in jacobians]
@@ -141,12 +141,12 @@ def _touching_point(bicycle: Bicycle, number: int, low: float, high: float) -> C
             continue
         if low - 5 * _BRACKET < alpha < high + 5 * _BRACKET and unknowns[SIGMA] > 0:
             motion = Steady(bicycle, Paraboloid(alpha)).motion(unknowns)
-            return CriticalPoint(_passing(bicycle, motion, low, high), alpha, motion, residual, "reconnection")
+            return CriticalPoint(_passing_families(bicycle, motion, low, high), alpha, motion, residual, "reconnection")
     return None
 
 
 def _solve_touching(bicycle: Bicycle, unknowns: np.ndarray, alpha: float) -> tuple[np.ndarray, float, float]:
-    """Newton's method on the 18 equations; returns the unknowns, alpha and the residual."""
+    """Solve the 18 equations by Newton's method; return the unknowns, alpha and the residual."""
 
     def equations(x: np.ndarray) -> np.ndarray:
         here, w = Steady(bicycle, Paraboloid(float(x[COORDINATES]))).expand(x[:COORDINATES]), x[COORDINATES + 1 :]
@@ -160,7 +160,7 @@ def _solve_touching(bicycle: Bicycle, unknowns: np.ndarray, alpha: float) -> tup
         size = float(np.abs(step / (1 + np.abs(x))).max())
         x = x + step * min(1.0, 0.2 / size)
         values = equations(x)
-        # The equations' round-off, 1e-14, times their condition, some 1e3.
+        # The equations' round-off, 1e-14, times their condition number, about 1e3, lies below.
         if size < 1e-10:
             alpha = float(x[COORDINATES])
             full = Steady(bicycle, Paraboloid(alpha)).expand(x[:COORDINATES]).full
@@ -178,7 +178,7 @@ def _difference_jacobian(function: Callable[[np.ndarray], np.ndarray], x: np.nda
 
 
 def last_stable(bicycle: Bicycle, number: int, largest: float = 1.0) -> CriticalPoint | None:
-    """Where the last Lyapunov-stable section of a family vanishes as alpha grows.
+    """Find where the last Lyapunov-stable section of a family vanishes as alpha grows.
 
     Parameters
     ----------
@@ -186,16 +186,21 @@ def last_stable(bicycle: Bicycle, number: int, largest: float = 1.0) -> Critical
     number : int
         Family.
     largest : float
-        Largest alpha looked at [1/m].
+        Largest alpha scanned [1/m].
 
     Returns
     -------
     CriticalPoint or None
-        None where the family has no stable section at any alpha of a scan.
+        None where the family has no stable section at any alpha of the scan.
+
+    Raises
+    ------
+    ValueError
+        If the family is still stable at the largest alpha.
     """
     grid = [0.0, 0.0025, 0.005, 0.0075, *(float(alpha) for alpha in _SCAN[1:] if alpha <= largest)]
     grid = sorted({*grid, 0.01, 0.015, 0.02, 0.03, 0.035, 0.04})
-    stable = [alpha for alpha in grid if _sections(bicycle, alpha, number)]
+    stable = [alpha for alpha in grid if _find_sections(bicycle, alpha, number)]
     if not stable:
         return None
     low = stable[-1]
@@ -206,7 +211,7 @@ def last_stable(bicycle: Bicycle, number: int, largest: float = 1.0) -> Critical
 
 
 def vanishing_between(bicycle: Bicycle, number: int, stable: float, unstable: float) -> CriticalPoint:
-    """Where the last stable section of a family vanishes between an alpha that has one and one that has none.
+    """Find where a family's last stable section vanishes between an alpha that has one and an alpha that has none.
 
     Parameters
     ----------
@@ -214,7 +219,7 @@ def vanishing_between(bicycle: Bicycle, number: int, stable: float, unstable: fl
     number : int
         Family.
     stable, unstable : float
-        [1/m].
+        Alphas with and without a stable section [1/m].
 
     Returns
     -------
@@ -222,20 +227,20 @@ def vanishing_between(bicycle: Bicycle, number: int, stable: float, unstable: fl
     """
     while abs(unstable - stable) > _SECTION_BRACKET:
         middle = 0.5 * (stable + unstable)
-        stable, unstable = (middle, unstable) if _sections(bicycle, middle, number) else (stable, middle)
-    return _vanishing(bicycle, number, stable)
+        stable, unstable = (middle, unstable) if _find_sections(bicycle, middle, number) else (stable, middle)
+    return _solve_vanishing(bicycle, number, stable)
 
 
-def _sections(bicycle: Bicycle, alpha: float, number: int) -> list[tuple[SectionEnd, SectionEnd]]:
+def _find_sections(bicycle: Bicycle, alpha: float, number: int) -> list[tuple[SectionEnd, SectionEnd]]:
     try:
         return stable_sections(trace(bicycle, Paraboloid(alpha), number, 0.05))
     except ValueError:
         return []
 
 
-def _vanishing(bicycle: Bicycle, number: int, alpha: float) -> CriticalPoint:
-    """Solve for the point at which the ends of the section at alpha, just before it vanishes, meet."""
-    ends = _sections(bicycle, alpha, number)[-1]
+def _solve_vanishing(bicycle: Bicycle, number: int, alpha: float) -> CriticalPoint:
+    """Solve for the point where the ends of a section meet, starting from an alpha just before it vanishes."""
+    ends = _find_sections(bicycle, alpha, number)[-1]
     family = trace(bicycle, Paraboloid(alpha), number, 0.02)
     middle = 0.5 * (ends[0].motion.lean + ends[1].motion.lean), 0.5 * (ends[0].motion.steer + ends[1].motion.steer)
     near = min(family.points, key=lambda p: np.hypot(p.unknowns[LEAN] - middle[0], p.unknowns[STEER] - middle[1]))
@@ -249,7 +254,7 @@ def _vanishing(bicycle: Bicycle, number: int, alpha: float) -> CriticalPoint:
         return motion, reduced.eigenvalues
 
     tracked = [end.eigenvalue.imag for end in ends]
-    # One pair that touches the axis has nearly one frequency at both ends, far from the other pair's.
+    # A single pair that touches the axis has nearly the same frequency at both ends, far from the other pair's.
     surface = Paraboloid(alpha)
     others = [
         abs(value.imag - imaginary)
@@ -273,7 +278,7 @@ def _vanishing(bicycle: Bicycle, number: int, alpha: float) -> CriticalPoint:
     def worst(distance: float) -> float:
         return max(value.real for value in eigenvalues(distance, alpha)[1] if value.imag > 1e-3)
 
-    # The section is shorter than the points' distance: start where the growth is least around the point.
+    # The section is shorter than the distance of the points: start where the growth rate is least near the point.
     rough = min(np.linspace(-0.03, 0.03, 61), key=worst)
     fine: Any = minimize_scalar(worst, bounds=(rough - 1e-3, rough + 1e-3), method="bounded", options={"xatol": 1e-8})
     x = np.array([float(fine.x), alpha])
@@ -285,7 +290,7 @@ def _vanishing(bicycle: Bicycle, number: int, alpha: float) -> CriticalPoint:
         if abs(step[1]) < 1e-12 and abs(step[0]) < 1e-5:
             break
     motion, _ = eigenvalues(float(x[0]), float(x[1]))
-    # Growth at the point; at a tangency its slope is the other equation, whose round-off moves the point
-    # along the arc only.
+    # Growth rate at the point. At a tangency its slope is the other equation, whose round-off moves the point only
+    # along the arc.
     left = equations(x)[:1] if kind == "tangency" else equations(x)
     return CriticalPoint((number,), float(x[1]), motion, float(np.abs(left).max()), kind)

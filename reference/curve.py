@@ -1,4 +1,4 @@
-"""What circular motions along a curve are like: rates, energy, forces and stability of many at once."""
+"""Properties of circular motions along a curve: rates, energy, forces and stability of many at once."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .stability import growth_rates, sorted_eigenvalues
 
 @dataclass(frozen=True)
 class Samples:
-    """n circular motions, all run so that the rear wheel rolls forward.
+    """Properties of n circular motions, all run so that the rear wheel rolls forward.
 
     Attributes
     ----------
@@ -25,12 +25,12 @@ class Samples:
     radius : ndarray, shape (n,)
         Distance of D from the axis [m].
     energy : ndarray, shape (n,)
-        Kinetic and potential [J].
+        Kinetic plus potential energy [J].
     normal_force : ndarray, shape (n, 2)
-        Of the ground on the rear and the front wheel [N].
+        Normal force of the ground on the rear and the front wheel [N].
     eigenvalues : ndarray, shape (n, 7), complex
         In the order of `velodrome.reference.stability.eigenvalue_order` [1/s].
-    growth_rate : ndarray, shape (n,)
+    Largest real part among the eigenvalues that symmetry does not fix [1/s].
         Largest real part among those that symmetry does not fix [1/s].
     """
 
@@ -48,12 +48,12 @@ class Samples:
 
     @property
     def stable(self) -> np.ndarray:
-        """Whether a motion is Lyapunov stable, shape (n,)."""
+        """Whether each motion is Lyapunov stable, shape (n,)."""
         return self.growth_rate < 0
 
     @property
     def physical(self) -> np.ndarray:
-        """Whether the ground pushes both wheels, shape (n,)."""
+        """Whether the ground pushes on both wheels, shape (n,)."""
         return np.all(self.normal_force > 0, axis=1)
 
 

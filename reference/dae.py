@@ -14,14 +14,14 @@ from .surface import Surface, evaluate
 
 @dataclass(frozen=True)
 class Dynamics:
-    """Accelerations and multipliers of one state.
+    """Accelerations and multipliers at one state.
 
     Attributes
     ----------
     acceleration : ndarray, shape (9,)
         Second derivatives of the generalised coordinates [m/s^2, rad/s^2].
     force : ndarray, shape (2, 3)
-        The six Lagrange multipliers: force of the ground on the rear and the front wheel, inertial
+        The six Lagrange multipliers: forces of the ground on the rear and the front wheel in inertial
         axes [N].
     contact : ndarray, shape (2, 3)
         Contact parameters (xi, eta, rim angle) of both wheels [m, m, rad].
@@ -36,12 +36,12 @@ class Dynamics:
 
 
 def contact_parameters(bicycle: Bicycle, surface: Surface, q: np.ndarray) -> np.ndarray:
-    """Solve the contact equations (Eq. 4) at coordinates (9,); returns (6,) [m, m, rad per wheel].
+    """Solve the contact equations (Eq. 4) at coordinates (9,); return (6,) [m, m, rad per wheel].
 
     Raises
     ------
     ValueError
-        If a wheel has no closest approach that Newton's method finds.
+        If Newton's method finds no closest approach of a wheel.
     """
     p = np.empty(6, q.dtype)
     function = surface.function.complex if np.iscomplexobj(q) else surface.function.real
@@ -52,7 +52,7 @@ def contact_parameters(bicycle: Bicycle, surface: Surface, q: np.ndarray) -> np.
 
 
 def dynamics(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> Dynamics:
-    """Accelerations and contact forces of a state that satisfies the constraints.
+    """Compute the accelerations and contact forces of a state that satisfies the constraints.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def dynamics(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) 
 
 
 def mass_matrix(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
-    """Mass matrix of the free four-body tree at coordinates (9,), shape (9, 9)."""
+    """Compute the mass matrix of the unconstrained four-body tree at coordinates (9,), shape (9, 9)."""
     mass, bias = np.empty((9, 9)), np.empty(9)
     kernel.mass_and_bias(q, np.zeros(9), constants(bicycle), mass, bias)
     return mass
@@ -87,7 +87,7 @@ def mass_matrix(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
 def residual(
     bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, p: np.ndarray, force: np.ndarray
 ) -> np.ndarray:
-    """Residual of all 21 equations (Eq. 8).
+    """Compute the residual of all 21 equations (Eq. 8).
 
     Parameters
     ----------
@@ -96,9 +96,9 @@ def residual(
     q, qd, qdd : ndarray, shape (9,)
         Coordinates, rates, accelerations.
     p : ndarray, shape (6,)
-        Contact parameters of the rear, then the front wheel.
+        Contact parameters of the rear wheel, then of the front wheel.
     force : ndarray, shape (6,)
-        Contact forces on the rear, then the front wheel, inertial axes [N].
+        Contact forces on the rear wheel, then on the front wheel, in inertial axes [N].
 
     Returns
     -------
@@ -122,7 +122,7 @@ def consistent_state(
     yaw: float = 0.0,
     guess: tuple[float, float] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """State on all constraints from the seven independent variables x, y, lean, steer and three rates.
+    """Solve for the state on all constraints from seven independent variables: x, y, lean, steer and three rates.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def consistent_state(
     yaw : float
         Heading [rad].
     guess : tuple of float, optional
-        Height of D [m] and pitch [rad] to start Newton's method from.
+        Height of D [m] and pitch [rad] from which Newton's method starts.
 
     Returns
     -------

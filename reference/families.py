@@ -1,7 +1,7 @@
 """Solution families: curves of circular motions, followed from their anchors to both ends.
 
-See `velodrome.reference.anchors` for where they are got hold of. From there a curve is followed by pseudo-arclength.
-On steep bowls families join and leave parts behind: those are further curves, each under the number of the
+See `velodrome.reference.anchors` for the points from which curves are followed, by pseudo-arclength continuation.
+On steep bowls families join and leave parts behind: these are further curves, each under the number of the
 family that it was a part of.
 """
 
@@ -44,16 +44,16 @@ from .surface import SurfaceOfRevolution, has_tip
 
 FAMILIES = (1, 2, 3, 4)
 
-_NEAR_ENOUGH = 0.2  # rad: a motion further from what was asked for is another one
+_NEAR_ENOUGH = 0.2  # rad: a motion further from the requested angles is another one
 
 
 def rear_rate_slope(point: Point) -> float:
-    """Derivative of the squared rear rate along the curve; zero at a fold in it and at the pivot."""
+    """Return the derivative of the squared rear rate along the curve; zero at a fold in it and at the pivot."""
     return _squared_rate_slope(point, REAR_SPEED)
 
 
 def front_rate_slope(point: Point) -> float:
-    """Derivative of the squared front rate along the curve; zero at a cusp of the paper's figures."""
+    """Return the derivative of the squared front rate along the curve; zero at a cusp of the paper's figures."""
     return _squared_rate_slope(point, FRONT_SPEED)
 
 
@@ -64,15 +64,15 @@ def _squared_rate_slope(point: Point, wheel: int) -> float:
 
 @dataclass(frozen=True)
 class Family:
-    """A solution family, end to end.
+    """A solution family from end to end.
 
     Attributes
     ----------
     number : int
     equations : Steady
     points : list of Point
-        In the order of one direction; all tangents point that way. At a pivoting end the speeds have the sign with
-        which the motion turns as its neighbours on the curve do.
+        In order along the curve; all tangents point in that direction. At a pivoting end the speeds have the sign
+        with which the motion turns as its neighbours on the curve do.
     """
 
     number: int
@@ -81,10 +81,10 @@ class Family:
 
     @property
     def ends(self) -> tuple[str, str]:
-        """What it ends in.
+        """Kinds of both ends.
 
-        ``static``, ``pivot``, ``edge`` (a wheel has come to where the ground ends), ``tip`` (the rear wheel has come
-        to the axis where the ground has no normal), ``large circle``, ``flat`` or ``fast front wheel``.
+        ``static``, ``pivot``, ``edge`` (a wheel is at the edge of the ground), ``tip`` (the rear wheel has reached
+        the axis where the ground has no normal), ``large circle``, ``flat`` or ``fast front wheel``.
         """
         surface = self.equations.surface
         return _kind_of_end(surface, self.points[0]), _kind_of_end(surface, self.points[-1])
@@ -98,7 +98,7 @@ def _kind_of_end(surface: SurfaceOfRevolution, point: Point) -> str:
         return "pivot"
     if at_edge(surface, point):
         return "edge"
-    # Before a tip a curve breaks off in the midst of what it may reach.
+    # A curve that breaks off inside all limits ends before a tip, if there is one.
     within = abs(u[LEAN]) < LARGEST_LEAN and u[SIGMA] < LARGEST_SIGMA and np.linalg.norm(u[:3]) < FARTHEST
     if within and has_tip(surface):
         return "tip"
@@ -135,16 +135,16 @@ def trace(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, longest: 
 
 
 def trace_from(start: Anchor, longest: float = LONGEST_STEP) -> Family:
-    """Follow a curve from an anchor to both ends, see `velodrome.reference.anchors.anchor` and `trace`."""
+    """Follow a curve from an anchor to both ends; see `velodrome.reference.anchors.anchor` and `trace`."""
     halves = []
     for towards in start.directions:
-        points = list(_to_an_end(follow_curve(start.equations, start.unknowns, towards, longest)))
-        halves.append(_end_exactly(start.equations, points))
+        points = list(_up_to_end(follow_curve(start.equations, start.unknowns, towards, longest)))
+        halves.append(_replace_last_by_end(start.equations, points))
     forward, *backward = halves
     before = [Point(point.unknowns, -point.tangent) for half in backward for point in reversed(half[1:])]
     points = before + forward
     for end, neighbour in ((0, 1), (-1, -2)) if len(points) > 1 else ():
-        points[end] = _cleared_end(points[end], points[neighbour])
+        points[end] = _clear_end(points[end], points[neighbour])
     return Family(start.family, start.equations, points)
 
 
@@ -163,10 +163,10 @@ def trace_all(
     Returns
     -------
     curves : list of Family
-        First the curve of each family's last anchor, by number; families that have joined have the same one.
+        First the curve of each family's last anchor, by number; families that have joined have the same curve.
         Then further curves, each once, under the number of the family that it was a part of.
     absent : dict
-        Number of a family that has no curve to the reason.
+        Reasons why families have no curve, by the family's number.
     """
     own, absent = [], {}
     for number in FAMILIES:
@@ -174,33 +174,33 @@ def trace_all(
             own.append(trace(bicycle, surface, number, longest))
         except ValueError as error:
             absent[number] = str(error)
-    curves = [*own, *_further(bicycle, surface, own, longest)]
+    curves = [*own, *_follow_further(bicycle, surface, own, longest)]
     return curves, {number: why for number, why in absent.items() if all(number != curve.number for curve in curves)}
 
 
-def _further(
+def _follow_further(
     bicycle: Bicycle, surface: SurfaceOfRevolution, followed: Sequence[Family], longest: float = LONGEST_STEP
 ) -> list[Family]:
-    """Curves of anchors that none of the followed ones passes through."""
+    """Follow the curves of those further anchors that no curve passes through yet."""
     found: list[Family] = []
     for start in further_anchors(bicycle, surface):
-        if not any(_passes(curve, start) for curve in (*followed, *found)):
+        if not any(_passes_through(curve, start) for curve in (*followed, *found)):
             found.append(trace_from(start, longest))
     return found
 
 
-def _passes(curve: Family, start: Anchor) -> bool:
-    """Whether a followed curve passes through an anchor: whether it is one of its solutions of the same condition."""
-    return any(start.met_by(u) for u in crossings(curve.equations, curve.points, start.condition))
+def _passes_through(curve: Family, start: Anchor) -> bool:
+    """Return whether a followed curve passes through an anchor, as one of its solutions of the anchor's condition."""
+    return any(start.is_same_as(u) for u in crossings(curve.equations, curve.points, start.condition))
 
 
 def _is_zero(unknowns: np.ndarray, unknown: int) -> bool:
-    """Whether the squared speed or the rear speed is zero, as it is solved for in a static equilibrium and a pivot."""
+    """Return whether the squared speed or the rear speed is zero, as it is at a static equilibrium or at a pivot."""
     return abs(float(unknowns[unknown])) < STANDING
 
 
-def _cleared_end(end: Point, neighbour: Point) -> Point:
-    """An end of a curve with its zero without round-off; a pivoting motion there turns as its neighbour does."""
+def _clear_end(end: Point, neighbour: Point) -> Point:
+    """Set the zero of a curve's end exactly to zero; a pivoting motion there turns as its neighbour does."""
     u, along = end.unknowns.copy(), end.tangent
     for unknown in (SIGMA, REAR_SPEED):
         if _is_zero(u, unknown):
@@ -211,22 +211,22 @@ def _cleared_end(end: Point, neighbour: Point) -> Point:
     return Point(u, along)
 
 
-def _to_an_end(points: Iterable[Point]) -> Iterator[Point]:
-    """Points up to and with the first beyond the pivoting motion, or to the end of the curve."""
+def _up_to_end(points: Iterable[Point]) -> Iterator[Point]:
+    """Yield the points up to and including the first beyond the pivoting motion, or to the end of the curve."""
     start = 0.0
     for point in points:
         yield point
         speed = point.unknowns[REAR_SPEED]
         if start * speed < 0:
             return
-        if abs(speed) > 1e-9:  # not yet: the curve may start at the pivot
+        if abs(speed) > 1e-9:  # the curve may start at the pivot
             start = speed
 
 
-def _end_exactly(equations: Steady, points: list[Point]) -> list[Point]:
+def _replace_last_by_end(equations: Steady, points: list[Point]) -> list[Point]:
     """Replace a last point beyond the static equilibrium or the pivoting motion by that end itself."""
     for unknown in (SIGMA, REAR_SPEED):
-        last = max(len(points) - 3, 0)  # a point of the curve may be the end itself, and the next one lie beyond
+        last = max(len(points) - 3, 0)  # a point may be the end itself, and the next one lie beyond it
         ends = roots_along(equations, points[last:], lambda point, k=unknown: float(point.unknowns[k]), zero=STANDING)
         for place, end in ends:
             return [*points[: last + place + 1], end]
@@ -234,13 +234,13 @@ def _end_exactly(equations: Steady, points: list[Point]) -> list[Point]:
 
 
 @lru_cache(maxsize=8)
-def _all_curves(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Sequence[Family]:
-    """All curves; motions of many rates on one ground are looked for on them."""
+def _follow_all_curves(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Sequence[Family]:
+    """Follow all curves. Cached, since motions of many rates are searched for on the same ground."""
     return trace_all(bicycle, surface)[0]
 
 
 def find_motions(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float) -> list[CircularMotion]:
-    """All motions of a family at a rear-wheel rate, nearest to the family's anchor first.
+    """Find all motions of a family at a rear-wheel rate, the one nearest to the family's anchor first.
 
     Parameters
     ----------
@@ -254,18 +254,20 @@ def find_motions(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, re
     Returns
     -------
     list of CircularMotion
-        Empty where the family has none.
+        Empty where the family has no such motion.
 
     Raises
     ------
     ValueError
         If the family has no curve on this surface.
     """
-    return list(_met(bicycle, surface, family, rear_rate))
+    return list(_yield_motions(bicycle, surface, family, rear_rate))
 
 
-def _met(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float) -> Iterator[CircularMotion]:
-    """The motions as they are met; all curves are followed only after those of the family's anchors."""
+def _yield_motions(
+    bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float
+) -> Iterator[CircularMotion]:
+    """Yield the motions as they are found; all curves are followed only after those of the family's anchors."""
     found: list[CircularMotion] = []
     anchors, failures = [], []
     for anchor_rate in ANCHORS[family]:
@@ -276,20 +278,20 @@ def _met(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate:
             continue
         anchors.append(start)
         for towards in start.directions:
-            points = _to_an_end(follow_curve(start.equations, start.unknowns, towards))
-            yield from _new(found, start.equations, points, rear_rate)
-    every = _all_curves(bicycle, surface)  # type: ignore[arg-type]
-    others = [c for c in every if c.number == family and not any(_passes(c, start) for start in anchors)]
+            points = _up_to_end(follow_curve(start.equations, start.unknowns, towards))
+            yield from _append_new_motions(found, start.equations, points, rear_rate)
+    every = _follow_all_curves(bicycle, surface)  # type: ignore[arg-type]
+    others = [c for c in every if c.number == family and not any(_passes_through(c, start) for start in anchors)]
     for curve in others:
-        yield from _new(found, curve.equations, curve.points, rear_rate)
+        yield from _append_new_motions(found, curve.equations, curve.points, rear_rate)
     if not anchors and not others:
         raise failures[-1]
 
 
-def _new(
+def _append_new_motions(
     found: list[CircularMotion], equations: Steady, points: Iterable[Point], rear_rate: float
 ) -> Iterator[CircularMotion]:
-    """Motions of a rear rate along a curve that are not among those found, which takes them."""
+    """Yield motions of a rear rate along a curve that are not in ``found``, and append them to it."""
     for u in crossings(equations, points, rear_rate_condition(rear_rate)):
         motion = equations.motion(u)
         if not any(np.hypot(motion.lean - m.lean, motion.steer - m.steer) < 1e-7 for m in found):
@@ -304,7 +306,7 @@ def find_motion(
     family: int | None = None,
     near: tuple[float, float] | None = None,
 ) -> tuple[int, CircularMotion]:
-    """One circular motion by its family, by the angles it is near to, or by both.
+    """Find one circular motion by its family, by angles near to it, or by both.
 
     Parameters
     ----------
@@ -313,10 +315,9 @@ def find_motion(
     rear_rate : float
         Rear-wheel rate, positive [rad/s].
     family : int, optional
-        1 to 4. Where the family has several solutions and ``near`` is not given, the one nearest to the
-        family's anchor along the curve.
+        1 to 4. Without ``near``, the solution nearest to the family's anchor along the curve is returned.
     near : tuple of float, optional
-        Lean and steer [rad]; of all solutions (of the family, if given) the nearest is taken.
+        Lean and steer [rad]. The nearest of all solutions (of the family, if given) is returned.
 
     Returns
     -------
@@ -326,7 +327,7 @@ def find_motion(
     Raises
     ------
     ValueError
-        If there is no such motion, or the input is not one, or a rim of the motion lies inside the ground.
+        If there is no such motion, an argument is invalid, or a rim of the motion lies inside the ground.
     """
     if not (np.isfinite(rear_rate) and rear_rate > 0):
         raise ValueError(f"rear rate is {rear_rate!r}; it must be a positive number of rad/s")
@@ -339,7 +340,7 @@ def find_motion(
     found, failures = [], []
     for number in FAMILIES if family is None else (family,):
         try:
-            met = _met(bicycle, surface, number, rear_rate)
+            met = _yield_motions(bicycle, surface, number, rear_rate)
             found += [(number, motion) for motion in (islice(met, 1) if near is None else met)]
         except ValueError as error:
             failures.append(f"family {number}: {error}")

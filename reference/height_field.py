@@ -1,4 +1,4 @@
-"""Ground from a grid of heights: z = f(x, y) without any symmetry, for simulation."""
+"""Ground through a grid of heights: z = f(x, y) without any symmetry, for simulation."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def _tensor_spline(x, y, parameters):
 
 
 def _spline_coefficients(samples: np.ndarray) -> np.ndarray:
-    """Coefficients (n + 4, m) of uniform quintic B-splines through samples (n, m) along the first axis.
+    """Compute coefficients (n + 4, m) of uniform quintic B-splines through samples (n, m) along the first axis.
 
-    The fifth derivative jumps by the sixth difference of the coefficients: two such jumps are taken out
-    next to either end ("not a knot"), which keeps the order 6 up to the edge.
+    The fifth derivative jumps by the sixth difference of the coefficients. Two such jumps next to either end are set
+    to zero ("not a knot"), which keeps the order 6 up to the edge.
     """
     n = len(samples)
     matrix, right = np.zeros((n + 4, n + 4)), np.zeros((n + 4, samples.shape[1]))
@@ -50,23 +50,23 @@ def _spline_coefficients(samples: np.ndarray) -> np.ndarray:
 class HeightField:
     """Ground through a regular grid of heights, by tensor-product quintic splines.
 
-    The height has four continuous derivatives and an error of order 6 in the spacing. Outside the grid
-    there is no ground: a ride ends there.
+    The height has four continuous derivatives and an error of order 6 in the spacing. There is no ground
+    outside the grid: a ride ends there.
 
     Parameters
     ----------
     heights : array_like, shape (nx, ny)
-        Row i, column j is the height at (x0 + i spacing, y0 + j spacing) [m]; six or more each way, not
+        Row i, column j is the height at (x0 + i spacing, y0 + j spacing) [m]; at least six each way, not
         all equal.
     spacing : float
-        Of the grid, both ways [m].
+        Distance of neighbouring samples, the same both ways [m].
     origin : tuple of float
-        (x0, y0) [m].
+        Position (x0, y0) of the first sample [m].
 
     Raises
     ------
     ValueError
-        If they are not so.
+        If the grid is too small, not rectangular or level, or a number is not finite or not in its range.
     """
 
     heights: Sequence[Sequence[float]] = field(repr=False)
@@ -74,7 +74,7 @@ class HeightField:
     origin: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        rows = _rows(self.heights)
+        rows = _height_rows(self.heights)
         object.__setattr__(self, "heights", rows)
         if not (is_number(self.spacing) and self.spacing > 0):
             raise ValueError(f"spacing is {self.spacing!r}; it must be a finite number > 0")
@@ -91,7 +91,7 @@ class HeightField:
 
     @property
     def parameters(self) -> np.ndarray:
-        """Origin, spacing, numbers of samples, then the splines' coefficients row by row."""
+        """Origin, spacing and numbers of samples, then the spline's coefficients row by row."""
         return self._parameters
 
     @cached_property
@@ -103,9 +103,9 @@ class HeightField:
 
     @cached_property
     def bend(self) -> float:
-        """Bound of the largest eigenvalue of the Hessian [1/m].
+        """Upper bound of the largest eigenvalue of the Hessian [1/m].
 
-        A derivative of the spline is a mean of differences of its coefficients with positive weights.
+        The spline's second derivatives are means of differences of its coefficients with positive weights.
         """
         nx, ny = len(self.heights), len(self.heights[0])
         c = self._parameters[5:].reshape(nx + 4, ny + 4) / self.spacing**2
@@ -119,8 +119,8 @@ class HeightField:
         return float(self.spacing)
 
 
-def _rows(heights: Sequence[Sequence[float]]) -> tuple[tuple[float, ...], ...]:
-    """The heights as tuples; ValueError if they are no grid of numbers."""
+def _height_rows(heights: Sequence[Sequence[float]]) -> tuple[tuple[float, ...], ...]:
+    """Return the heights as tuples; raise ValueError if they are not a grid of numbers."""
     grid = heights.tolist() if isinstance(heights, np.ndarray) else heights
     if len(grid) < _FEWEST or any(len(row) != len(grid[0]) for row in grid) or len(grid[0]) < _FEWEST:
         raise ValueError(f"heights must be a grid of {_FEWEST} x {_FEWEST} or more, its rows of one length")

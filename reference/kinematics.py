@@ -16,7 +16,7 @@ WHEELS = ("rear", "front")
 
 @lru_cache(maxsize=64)
 def constants(bicycle: Bicycle) -> kernel.Constants:
-    """Lump a bicycle into rear and front assemblies about D, as the kernels want it."""
+    """Combine the bodies into a rear and a front assembly about D and return the kernels' constants."""
     origin = bicycle.reference_point
 
     def assembly(frame: str, wheel: str) -> tuple[float, np.ndarray, np.ndarray]:
@@ -30,25 +30,45 @@ def constants(bicycle: Bicycle) -> kernel.Constants:
     m1, s1, i1 = assembly("rear_frame", "rear_wheel")
     m2, s2, i2 = assembly("front_frame", "front_wheel")
     rear, front = bicycle.centre("rear_wheel") - origin, bicycle.centre("front_wheel") - origin
-    values = (
-        *(bicycle.gravity, m1, s1[0], s1[2], i1[0, 0], i1[1, 1], i1[2, 2], i1[0, 2]),
-        *(m2, s2[0], s2[2], i2[0, 0], i2[1, 1], i2[2, 2], i2[0, 2]),
-        *(bicycle.rear_wheel_Iyy, bicycle.front_wheel_Iyy, rear[0], rear[2], front[0], front[2]),
-        *(bicycle.rear_wheel_radius, bicycle.front_wheel_radius),
-        *(np.sin(bicycle.steer_axis_tilt), np.cos(bicycle.steer_axis_tilt)),
-    )
-    return kernel.Constants(*(float(value) for value in values))
+    parameters = {
+        "gravity": bicycle.gravity,
+        "m1": m1,
+        "s1x": s1[0],
+        "s1z": s1[2],
+        "i1xx": i1[0, 0],
+        "i1yy": i1[1, 1],
+        "i1zz": i1[2, 2],
+        "i1xz": i1[0, 2],
+        "m2": m2,
+        "s2x": s2[0],
+        "s2z": s2[2],
+        "i2xx": i2[0, 0],
+        "i2yy": i2[1, 1],
+        "i2zz": i2[2, 2],
+        "i2xz": i2[0, 2],
+        "spin_rear": bicycle.rear_wheel_Iyy,
+        "spin_front": bicycle.front_wheel_Iyy,
+        "rear_x": rear[0],
+        "rear_z": rear[2],
+        "front_x": front[0],
+        "front_z": front[2],
+        "rear_radius": bicycle.rear_wheel_radius,
+        "front_radius": bicycle.front_wheel_radius,
+        "sin_tilt": np.sin(bicycle.steer_axis_tilt),
+        "cos_tilt": np.cos(bicycle.steer_axis_tilt),
+    }
+    return kernel.Constants(**{name: float(value) for name, value in parameters.items()})
 
 
 def _axis_angle(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Rotation matrices (n, 3, 3) about one unit axis."""
+    """Rotation matrices (n, 3, 3) about a fixed unit axis."""
     k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     sine, cosine = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
     return np.eye(3) + sine * k + (1 - cosine) * (k @ k)
 
 
 def rotations(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
-    """Rotation matrices of the four bodies along a trajectory.
+    """Compute the rotation matrices of the four bodies along a trajectory.
 
     Parameters
     ----------
@@ -68,22 +88,22 @@ def rotations(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
 
 
 def _frame_rotations(bicycle: Bicycle, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation matrices of the rear and the front frame, each of shape (n, 3, 3)."""
+    """Compute the rotation matrices of the rear and the front frame, each of shape (n, 3, 3)."""
     x, y, z = np.eye(3)
     rear = _axis_angle(z, q[:, YAW]) @ _axis_angle(x, q[:, LEAN]) @ _axis_angle(y, q[:, PITCH])
     return rear, rear @ _axis_angle(bicycle.steer_axis, q[:, STEER])
 
 
 def body_positions(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
-    """Centres of mass of the four bodies, shape (n, 4, 3) [m], from coordinates (n, 9)."""
-    # A wheel's centre lies on its axle: turning it with the wheel would move it.
+    """Compute the centres of mass of the four bodies, shape (n, 4, 3) [m], from coordinates (n, 9)."""
+    # A wheel's centre lies on its axle, so the wheel's own rotation does not move it.
     carriers = 2 * _frame_rotations(bicycle, q)
     offsets = (bicycle.centre(body) - bicycle.reference_point for body in BODIES)
     return q[:, None, :3] + np.stack([turned @ offset for turned, offset in zip(carriers, offsets, strict=True)], 1)
 
 
 def body_quaternions(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
-    """Orientations of the four bodies as unit quaternions, from coordinates.
+    """Compute the orientations of the four bodies as unit quaternions from coordinates.
 
     Parameters
     ----------
@@ -97,25 +117,28 @@ def body_quaternions(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
         (w, x, y, z), body to inertial axes, bodies in the order of `BODIES`; as continuous as the coordinates.
     """
     x, y, z = np.eye(3)
-    rear = _half_angle(z, q[:, YAW])
+    rear = _axis_quaternion(z, q[:, YAW])
     for axis, angle in ((x, q[:, LEAN]), (y, q[:, PITCH])):
-        rear = _product(rear, _half_angle(axis, angle))
-    front = _product(rear, _half_angle(bicycle.steer_axis, q[:, STEER]))
-    wheels = (_product(rear, _half_angle(y, q[:, REAR_ANGLE])), _product(front, _half_angle(y, q[:, FRONT_ANGLE])))
+        rear = _multiply(rear, _axis_quaternion(axis, angle))
+    front = _multiply(rear, _axis_quaternion(bicycle.steer_axis, q[:, STEER]))
+    wheels = (
+        _multiply(rear, _axis_quaternion(y, q[:, REAR_ANGLE])),
+        _multiply(front, _axis_quaternion(y, q[:, FRONT_ANGLE])),
+    )
     return np.stack([np.stack(quaternion, axis=-1) for quaternion in (rear, front, *wheels)], axis=1)
 
 
 _Quaternion = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # w, x, y, z, each of shape (n,)
 
 
-def _half_angle(axis: np.ndarray, angle: np.ndarray) -> _Quaternion:
-    """Quaternion of rotations about one unit axis."""
+def _axis_quaternion(axis: np.ndarray, angle: np.ndarray) -> _Quaternion:
+    """Quaternions of rotations about a fixed unit axis."""
     sine = np.sin(angle / 2)
     return np.cos(angle / 2), axis[0] * sine, axis[1] * sine, axis[2] * sine
 
 
-def _product(a: _Quaternion, b: _Quaternion) -> _Quaternion:
-    """Hamilton's product."""
+def _multiply(a: _Quaternion, b: _Quaternion) -> _Quaternion:
+    """Hamilton product of two quaternions."""
     return (
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
         a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
@@ -125,7 +148,7 @@ def _product(a: _Quaternion, b: _Quaternion) -> _Quaternion:
 
 
 def angular_velocities(bicycle: Bicycle, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-    """Angular velocities of the four bodies in inertial axes, shape (n, 4, 3) [rad/s]."""
+    """Compute the angular velocities of the four bodies in inertial axes, shape (n, 4, 3) [rad/s]."""
     x, _, z = np.eye(3)
     yawed = _axis_angle(z, q[:, YAW])
     turned = rotations(bicycle, q)
@@ -137,16 +160,16 @@ def angular_velocities(bicycle: Bicycle, q: np.ndarray, qd: np.ndarray) -> np.nd
 
 
 def body_velocities(bicycle: Bicycle, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-    """Velocities of the four centres of mass in inertial axes, shape (n, 4, 3) [m/s]."""
+    """Compute the velocities of the four centres of mass in inertial axes, shape (n, 4, 3) [m/s]."""
     arms = body_positions(bicycle, q) - q[:, None, :3]
     spins = angular_velocities(bicycle, q, qd)[:, [0, 1, 0, 1]]
     return qd[:, None, :3] + np.cross(spins, arms)
 
 
 def quaternions(matrices: np.ndarray) -> np.ndarray:
-    """Unit quaternions (w, x, y, z) of rotation matrices (..., 3, 3), continuous along the first axis."""
+    """Convert rotation matrices (..., 3, 3) to unit quaternions (w, x, y, z), continuous along the first axis."""
     shape = matrices.shape[:-2]
-    # Imported here: it takes a third of a second, which most commands need not wait for.
+    # Imported here: the import takes a third of a second, and most commands do not need it.
     from scipy.spatial.transform import Rotation
 
     xyzw = Rotation.from_matrix(matrices.reshape(-1, 3, 3)).as_quat().reshape(*shape, 4)
@@ -165,15 +188,15 @@ def coordinates_from_bodies(
     rotation: np.ndarray,
     spin: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Generalised coordinates and rates from the motion of four separate rigid bodies.
+    """Compute generalised coordinates and rates from the motion of four separate rigid bodies.
 
     Parameters
     ----------
     bicycle : Bicycle
     times : ndarray, shape (n,)
-        Sampling times [s], for continuity of the angles beyond half a turn.
+        Sampling times [s], needed for the continuity of angles that change by more than half a turn between samples.
     position, velocity : ndarray, shape (n, 3)
-        Of the rear frame's centre of mass [m, m/s].
+        Centre of mass of the rear frame and its velocity [m, m/s].
     rotation : ndarray, shape (n, 4, 3, 3)
         Body to inertial axes, bodies in the order of `BODIES`.
     spin : ndarray, shape (n, 4, 3)
@@ -198,7 +221,7 @@ def coordinates_from_bodies(
     for carrier, wheel in ((0, 2), (1, 3)):
         turned = np.einsum("nji,njk->nik", rotation[:, carrier], rotation[:, wheel])
         angles.append(np.arctan2(turned[:, 0, 2], turned[:, 2, 2]))
-    # rates: w_rear = yaw_rate z + lean_rate a + pitch_rate y_r, with y_r . a = 0 and z . a = 0
+    # Rates: w_rear = yaw_rate z + lean_rate a + pitch_rate y_r, with y_r . a = 0 and z . a = 0.
     cosine = np.cos(lean)
     a_lean = np.stack([np.cos(yaw), np.sin(yaw), np.zeros_like(yaw)], axis=1)
     ahead = np.cross(a_lean, rear[:, :, 1])
@@ -215,10 +238,10 @@ def coordinates_from_bodies(
 
 
 def unwrap(times: np.ndarray, angle: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """Continue an angle known modulo 2 pi with the help of its rate, both of shape (n,).
+    """Make an angle known modulo 2 pi continuous with the help of its rate, both of shape (n,).
 
-    Between two samples the turn nearest to the trapezoidal integral of the rate is taken, so samples
-    may lie more than half a turn apart.
+    Between two samples, the change nearest to the trapezoidal integral of the rate is taken, so samples may lie more
+    than half a turn apart.
     """
     expected = 0.5 * (rate[1:] + rate[:-1]) * np.diff(times)
     step = np.diff(angle)

@@ -1,4 +1,4 @@
-"""Bowls of any profile z = g(r): an even polynomial, a spline through points, a function of one's own."""
+"""Bowls of any profile z = g(r): an even polynomial, a spline through points or a user's function."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def _spline(x, y, parameters):
     return of_square(x, y, *piecewise(parameters, x * x + y * y))
 
 
-def _numbers(name: str, values: Sequence[float]) -> tuple[float, ...]:
-    """Finite numbers as floats; ValueError with the first that is none."""
+def _as_floats(name: str, values: Sequence[float]) -> tuple[float, ...]:
+    """Return finite numbers as floats; raise ValueError with the first that is not one."""
     for i, value in enumerate(values):
         if not is_number(value):
             raise ValueError(f"{name}[{i}] is {value!r}; it must be a finite number")
@@ -53,12 +53,12 @@ class PolynomialProfile:
     coefficients: Sequence[float]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "coefficients", _numbers("coefficients", self.coefficients))
+        object.__setattr__(self, "coefficients", _as_floats("coefficients", self.coefficients))
         if not any(self.coefficients):
             raise ValueError("coefficients are all zero; level ground is the plane")
 
     def __repr__(self) -> str:
-        # There may be a thousand; a line that names the ground must stay one.
+        # There may be a thousand coefficients; the surface is named in messages of one line.
         return f"{type(self).__name__}(coefficients={reprlib.repr(self.coefficients)})"
 
     @property
@@ -68,16 +68,16 @@ class PolynomialProfile:
 
     @property
     def parameters(self) -> np.ndarray:
-        """Coefficients of the powers of r^2 from the zeroth, shape (n + 1,)."""
+        """Coefficients of the powers of r^2, from the zeroth, shape (n + 1,)."""
         return np.array([0.0, *self.coefficients])
 
     @property
     def extent(self) -> tuple[float, float]:
-        """It has no edge."""
+        """Radii of the ground [m]; it has no edge."""
         return 0.0, math.inf
 
     def flattened(self, fraction: float) -> SurfaceOfRevolution:
-        """All heights times the fraction."""
+        """Return the bowl with all heights times the fraction."""
         return PolynomialProfile(tuple(fraction * c for c in self.coefficients)) if fraction > 0 else Plane()
 
 
@@ -85,20 +85,20 @@ class PolynomialProfile:
 class SplineProfile:
     """The bowl through points (r, z) of its profile.
 
-    A quintic spline in r^2: smooth on the axis, with four continuous derivatives elsewhere; through fewer
-    than seven points the one polynomial. There is no ground outside the points.
+    A quintic spline in r^2: smooth on the axis, with four continuous derivatives elsewhere. With fewer than seven
+    points it is a single polynomial. There is no ground outside the points.
 
     Parameters
     ----------
     radii : sequence of float
-        Rising, the first >= 0 [m]; two or more. The axis is ground if the first is 0.
+        In rising order, the first >= 0 [m]; two or more. The axis has ground if the first is 0.
     heights : sequence of float
-        As many, not all equal [m].
+        One for each radius, not all equal [m].
 
     Raises
     ------
     ValueError
-        If they are not so.
+        If the radii do not rise, the numbers of radii and heights differ, or the heights are all equal.
     """
 
     radii: Sequence[float]
@@ -106,7 +106,7 @@ class SplineProfile:
 
     def __post_init__(self) -> None:
         for name in ("radii", "heights"):
-            object.__setattr__(self, name, _numbers(name, getattr(self, name)))
+            object.__setattr__(self, name, _as_floats(name, getattr(self, name)))
         if len(self.radii) != len(self.heights) or len(self.radii) < 2:
             counts = f"{len(self.radii)} radii and {len(self.heights)} heights"
             raise ValueError(f"there are {counts}; there must be as many of each, two or more")
@@ -132,48 +132,48 @@ class SplineProfile:
 
     @property
     def parameters(self) -> np.ndarray:
-        """As `velodrome.reference.kernels.spline.piecewise` takes them: breaks in r^2, then coefficients."""
+        """Parameters of `velodrome.reference.kernels.spline.piecewise`: breaks in r^2, then coefficients."""
         return self._parameters
 
     @cached_property
     def _parameters(self) -> np.ndarray:
-        # A quarter of a second that only this surface needs.
+        # Imported here: the import takes a quarter of a second, and only this surface needs it.
         from scipy.interpolate import PPoly, make_interp_spline
 
         squares = np.array(self.radii) ** 2
         spline = make_interp_spline(squares, np.array(self.heights), k=min(DEGREE, len(squares) - 1))
         pieces = PPoly.from_spline(spline)
-        solid = np.diff(pieces.x) > 0  # the knots at both ends are multiple
+        solid = np.diff(pieces.x) > 0  # the knots at both ends are repeated
         powers = np.zeros((int(solid.sum()), DEGREE + 1))
         powers[:, : len(pieces.c)] = pieces.c[::-1, solid].T
         return np.concatenate([np.unique(pieces.x), powers.ravel()])
 
     @property
     def extent(self) -> tuple[float, float]:
-        """From the first point to the last."""
+        """Radii of the ground, from the first point to the last [m]."""
         return self.radii[0], self.radii[-1]
 
     @property
     def detail(self) -> float:
-        """Least distance of two points [m]."""
+        """Smallest distance between two neighbouring points [m]."""
         return min(outer - inner for inner, outer in pairwise(self.radii))
 
     def flattened(self, fraction: float) -> SurfaceOfRevolution:
-        """All heights times the fraction."""
+        """Return the bowl with all heights times the fraction."""
         return SplineProfile(self.radii, tuple(fraction * z for z in self.heights)) if fraction > 0 else Plane()
 
 
 def profile_function(profile: Callable[..., tuple]) -> SurfaceFunction:
     """Make ``profile(r, constants) -> (g, g', g'')`` the function of a `Profile`.
 
-    All three results must be of the type of ``r``, which is real or complex, and analytic: no `abs`, no
-    comparison other than through the real part; nan where there is no ground.
+    All three results must have the type of ``r``, which is real or complex, and the function must be analytic: no
+    `abs`, no comparison other than of real parts. It returns nan where there is no ground.
 
     Parameters
     ----------
     profile : callable
-        Height [m] and its first [-] and second derivative [1/m] at r [m], in numba's subset of Python;
-        ``constants`` are those of the `Profile`, an array.
+        Height [m] and its first [-] and second derivative [1/m] at r [m], in numba's subset of Python.
+        ``constants`` is the array of the `Profile`'s constants.
 
     Returns
     -------
@@ -192,23 +192,23 @@ def profile_function(profile: Callable[..., tuple]) -> SurfaceFunction:
 
 @dataclass(frozen=True)
 class Profile:
-    """The bowl z = g(r) of a profile of one's own.
+    """The bowl z = g(r) of a user's profile.
 
     Parameters
     ----------
     function : SurfaceFunction
-        What `profile_function` makes of g.
+        Result of `profile_function` for g.
     constants : sequence of float
-        Handed to g.
+        Passed to g.
     extent : tuple of float
-        Smallest and largest radius that g has ground for [m].
+        Smallest and largest radius where g has ground [m].
     scale : float
         Factor of all heights, positive.
 
     Raises
     ------
     ValueError
-        If a constant is not finite, or the extent or the scale is impossible.
+        If a constant is not finite, the extent is not 0 <= inner < outer, or the scale is not positive and finite.
     """
 
     function: SurfaceFunction
@@ -217,7 +217,7 @@ class Profile:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "constants", _numbers("constants", self.constants))
+        object.__setattr__(self, "constants", _as_floats("constants", self.constants))
         inner, outer = self.extent
         if not 0 <= inner < outer:
             raise ValueError(f"extent is {self.extent!r}; it must be two radii, 0 <= inner < outer")
@@ -230,5 +230,5 @@ class Profile:
         return np.array([float(self.scale), *self.constants])
 
     def flattened(self, fraction: float) -> SurfaceOfRevolution:
-        """All heights times the fraction."""
+        """Return the bowl with all heights times the fraction."""
         return replace(self, scale=fraction * self.scale) if fraction > 0 else Plane()

@@ -1,7 +1,7 @@
-"""The whole rims of both wheels above the ground, see `velodrome.reference.kernels.rim`.
+"""Clearance of both wheels' whole rims from the ground, see `velodrome.reference.kernels.rim`.
 
-A wheel that rolls touches the ground in one point. Where its rim comes to touch a second one, something hits
-the wheel: a ride ends there. A start with a rim inside the ground is no start.
+A rolling wheel touches the ground in one point. Where its rim touches a second one, an impact follows, and a ride
+ends there. A start with a rim inside the ground is refused.
 """
 
 from __future__ import annotations
@@ -22,37 +22,44 @@ from .kinematics import WHEELS, constants
 from .surface import Surface, SurfaceOfRevolution, evaluate
 
 _SAMPLES_A_DETAIL = 4
-# Samples of a rim: what smooth ground needs, and as many as resolve a detail of 2 mm along a wheel of a bicycle.
+# Samples of a rim: as many as smooth ground needs, and as many as resolve a detail of 2 mm along a bicycle's wheel.
 _FEWEST, _MOST = 32, 4096
-_TOUCHING = 1e-9  # [m] no depth worth a number
-# Bounds of a bowl's curvature: rings of an eighth of a wheel, out to where most rides end, each sampled.
+_TOUCHING = 1e-9  # [m] smallest depth that is reported
+# Bounds of a bowl's curvature: rings an eighth of a wheel wide, out to where most rides end, each sampled.
 _RINGS_A_WHEEL, _SAMPLES_A_RING, _FARTHEST = 8, 16, 200.0
 
 
 def rim_search(surface: Surface, radii: Sequence[float] | np.ndarray) -> kernel.RimSearch:
-    """How closely to look at the rims of wheels of some radii [m], from the surface's ``bend`` and ``detail``."""
+    """Choose how finely to search the rims of wheels of some radii [m], from the surface's ``bend`` and ``detail``."""
     largest, smallest = max(radii), min(radii)
     finest = 2 * math.pi * largest * _SAMPLES_A_DETAIL / _MOST
-    # Within a wheel's radius smooth ground does not bend to and fro, or no wheel could be said to touch it in a point.
+    # Smooth ground does not bend to and fro within a wheel's radius: otherwise a wheel could not touch it in a point.
     detail = max(min(float(getattr(surface, "detail", math.inf)), smallest), finest)
     samples = max(_FEWEST, math.ceil(2 * math.pi * largest / detail * _SAMPLES_A_DETAIL))
     bend = getattr(surface, "bend", None)
     bends, width = np.array([math.inf if bend is None else float(bend)]), math.inf
     if bend is None and isinstance(surface, SurfaceOfRevolution):
-        bends, width = _bends(surface, 2 * largest, detail)  # type: ignore[arg-type]
+        bends, width = _bound_curvature(surface, 2 * largest, detail)  # type: ignore[arg-type]
     return kernel.RimSearch(bool(bends[0] > 0 or len(bends) > 1), bends, width, detail, samples)
 
 
 def bicycle_rim_search(bicycle: Bicycle, surface: Surface) -> kernel.RimSearch:
-    """How closely to look at the rims of a bicycle, see `rim_search`."""
+    """Choose how finely to search the rims of a bicycle, see `rim_search`."""
     return rim_search(surface, (bicycle.rear_wheel_radius, bicycle.front_wheel_radius))
 
 
 @lru_cache(maxsize=64)
-def _bends(surface: SurfaceOfRevolution, reach: float, detail: float) -> tuple[np.ndarray, float]:
-    """Bounds of a bowl's upward curvature within ``reach`` of its rings, shape (k,) [1/m], and the rings' width [m].
+def _bound_curvature(surface: SurfaceOfRevolution, reach: float, detail: float) -> tuple[np.ndarray, float]:
+    """Bound a bowl's upward curvature within ``reach`` of its rings.
 
-    The principal curvatures are sampled, and may exceed the samples by what those differ between neighbours.
+    The principal curvatures are sampled; they may exceed the samples by the difference between neighbouring samples.
+
+    Returns
+    -------
+    bends : ndarray, shape (k,)
+        Bounds by ring [1/m].
+    width : float
+        Width of the rings [m].
     """
     width = reach / _RINGS_A_WHEEL
     rings = math.ceil(min(surface.extent[1], _FARTHEST) / width)
@@ -64,19 +71,19 @@ def _bends(surface: SurfaceOfRevolution, reach: float, detail: float) -> tuple[n
         steps = np.maximum(curvature[1:], curvature[:-1]) + np.abs(np.diff(curvature))
     steps[np.isnan(steps)] = math.inf
     spread = _RINGS_A_WHEEL + 1
-    # Nothing is within reach across the axis that is not on this side of it; nothing is known beyond the last ring.
+    # What lies across the axis has the same radii as this side of it; nothing is known beyond the last ring.
     edges = np.full(spread, -math.inf), np.full(spread, math.inf)
     rows = np.concatenate([edges[0], steps.reshape(rings, samples).max(axis=1), edges[1]])
     return np.lib.stride_tricks.sliding_window_view(rows, 2 * spread + 1).max(axis=1), width
 
 
 def second_touch(wheel: str, time: float) -> str:
-    """Why a ride ends at a time [s]."""
+    """Describe why a ride ends at a time [s] at which a rim touches the ground a second time."""
     return f"the {wheel} rim touches the ground at a second place at t = {time:.6g} s"
 
 
 def rim_clearances(bicycle: Bicycle, surface: Surface, q: np.ndarray, contact: np.ndarray) -> np.ndarray:
-    """Least clearances of the rear and the front rim, shape (2,), dimensionless; positive if each touches once.
+    """Compute the least clearances of both rims, shape (2,), dimensionless; positive where a rim touches only once.
 
     Parameters
     ----------
@@ -85,7 +92,7 @@ def rim_clearances(bicycle: Bicycle, surface: Surface, q: np.ndarray, contact: n
     q : ndarray, shape (9,)
         Coordinates.
     contact : ndarray, shape (6,)
-        Contact parameters of both wheels there, as `velodrome.reference.dae.contact_parameters` gives them.
+        Contact parameters of both wheels at q, as `velodrome.reference.dae.contact_parameters` returns them.
     """
     known, function, parameters = bicycle_rim_search(bicycle, surface), surface.function.real, surface.parameters
     clearances = np.empty(2)
@@ -93,8 +100,9 @@ def rim_clearances(bicycle: Bicycle, surface: Surface, q: np.ndarray, contact: n
         angle = contact[3 * k + 2]
         clearances[k] = kernel.bound(centre, x, z, radius, angle, known, function, parameters)
         if not clearances[k] > 0:
-            where = (centre, x, z, radius, angle, True, known.samples, function, parameters)
-            clearances[k], _ = kernel.least_clearance(*where)
+            clearances[k], _ = kernel.least_clearance(
+                centre, x, z, radius, angle, True, known.samples, function, parameters
+            )
     return clearances
 
 
@@ -106,38 +114,40 @@ def require_clear_rims(
     Parameters
     ----------
     bicycle, surface, q, contact
-        As in `rim_clearances`; without ``contact`` it is searched.
+        As in `rim_clearances`; without ``contact`` it is computed from the pose.
     may_sink : bool
         Whether a contact itself may lie inside the ground, as soft contacts do.
 
     Raises
     ------
     ValueError
-        With the wheel, the depth and the place; or if a wheel has no contact.
+        If a rim is not clear, with the wheel, the depth and the place; or if a wheel has no contact.
     """
     if not bicycle_rim_search(bicycle, surface).curved:
         return
     if contact is None:
         contact = contact_parameters(bicycle, surface, q)
-    deepest = [_deepest(bicycle, surface, q, k) for k in (0, 1)]
+    deepest = [_find_deepest(bicycle, surface, q, k) for k in (0, 1)]
     distance, k, point = min(deepest)
-    # The contact that is searched anew may itself lie inside the ground: the start has settled on another place.
+    # A contact computed anew may itself lie inside the ground if the start has settled on another place of the rim.
     if not may_sink and distance < -_TOUCHING:
-        place = _place(point)
+        place = _format_xy(point)
         raise ValueError(f"the {WHEELS[k]} rim lies {-1e3 * distance:.3g} mm inside the ground at {place}")
     for (depth, k, point), clear in zip(deepest, rim_clearances(bicycle, surface, q, contact) > 0, strict=True):
         if not clear and depth < -_TOUCHING:
-            raise ValueError(f"the {WHEELS[k]} rim lies {-1e3 * depth:.3g} mm inside the ground at {_place(point)}")
+            raise ValueError(f"the {WHEELS[k]} rim lies {-1e3 * depth:.3g} mm inside the ground at {_format_xy(point)}")
         if not clear:
-            raise ValueError(f"the {WHEELS[k]} rim touches the ground at a second place, not only at {_place(point)}")
+            raise ValueError(
+                f"the {WHEELS[k]} rim touches the ground at a second place, not only at {_format_xy(point)}"
+            )
 
 
-def _place(point: tuple[float, float]) -> str:
+def _format_xy(point: tuple[float, float]) -> str:
     return f"x = {point[0]:.4g} m, y = {point[1]:.4g} m"
 
 
-def _deepest(bicycle: Bicycle, surface: Surface, q: np.ndarray, k: int) -> tuple[float, int, tuple[float, float]]:
-    """Signed distance of a wheel's deepest rim point from the ground [m], the wheel, and x and y of that point [m]."""
+def _find_deepest(bicycle: Bicycle, surface: Surface, q: np.ndarray, k: int) -> tuple[float, int, tuple[float, float]]:
+    """Return a wheel's deepest rim point: signed distance from the ground [m], wheel, and (x, y) of the point [m]."""
     centre, x, _, z, radius = wheels(q, constants(bicycle))[k]
     samples = bicycle_rim_search(bicycle, surface).samples
     distance, angle = kernel.deepest(centre, x, z, radius, samples, surface.function.real, surface.parameters)
@@ -147,14 +157,14 @@ def _deepest(bicycle: Bicycle, surface: Surface, q: np.ndarray, k: int) -> tuple
 
 @dataclass(frozen=True)
 class Ending:
-    """When a ride ends [s], and why."""
+    """Time [s] and reason of a ride's end."""
 
     time: float
     why: str
 
 
 class RimWatch:
-    """Looks at the rims of both wheels during a ride, of an engine that has fixed steps.
+    """Watch over the rims of both wheels during a ride of an engine with fixed steps.
 
     Parameters
     ----------
@@ -166,9 +176,9 @@ class RimWatch:
     Attributes
     ----------
     centre, axle : ndarray, shape (2, 3)
-        Of both wheels [m, unit vectors]: to be written before each look.
+        Centres [m] and axles [unit vectors] of both wheels, to be written before each `look`.
     needed : bool
-        False where no rim can touch twice: on the level plane.
+        False where no rim can touch twice, as on the level plane.
 
     Raises
     ------
@@ -182,15 +192,22 @@ class RimWatch:
         self.needed = known.curved
         self.centre, self.axle = np.zeros((2, 3)), np.zeros((2, 3))
         self._clock, self._clearance = np.zeros(2), np.full((2, 2), np.nan)
-        # The watch does not keep the surface's compiled function alive.
+        # The surface's compiled function must stay alive as long as the watch.
         self._function = surface.function.real
         radii = np.array([bicycle.rear_wheel_radius, bicycle.front_wheel_radius])
-        arrays = (self.centre, self.axle, radii, self._clock)
-        where = (known, self._function, surface.parameters)
-        self._look = touch.watch(*arrays, *where, self._clearance).__next__
+        self._look = touch.watch(
+            self.centre,
+            self.axle,
+            radii,
+            self._clock,
+            known,
+            self._function,
+            surface.parameters,
+            self._clearance,
+        ).__next__
 
     def look(self, time: float) -> Ending | None:
-        """Look at the rims at a time [s]; why the ride ends, None if it does not.
+        """Look at the rims at a time [s]; return why the ride ends, None if it does not.
 
         The time of a touch is interpolated between two looks.
         """
@@ -221,7 +238,7 @@ def find_second_touch(
     Returns
     -------
     Ending or None
-        What happens between two samples is seen where they are closer than half the ground's detail.
+        A touch between two samples is found where they are closer than half the ground's detail.
     """
     known = bicycle_rim_search(bicycle, surface)
     if not known.curved:

@@ -20,11 +20,11 @@ class SectionEnd:
     Attributes
     ----------
     cause : str
-        ``hopf`` where a pair of eigenvalues crosses the imaginary axis, ``energy`` where a real one crosses
-        zero (the energy is extreme along the family there), ``end`` where the family itself ends stable.
+        ``hopf`` where a pair of eigenvalues crosses the imaginary axis, ``energy`` where a real eigenvalue crosses
+        zero (there the energy is extreme along the family), ``end`` where the family itself ends stable.
     motion : CircularMotion
     eigenvalue : complex
-        The crossing one, of positive imaginary part [1/s].
+        The crossing eigenvalue, of positive imaginary part [1/s].
     """
 
     cause: str
@@ -33,26 +33,26 @@ class SectionEnd:
 
 
 def linearise_point(equations: Steady, point: Point) -> tuple[CircularMotion, Linearisation]:
-    """Motion and reduced linear system at a point of a family."""
+    """Return the motion and the reduced linear system at a point of a family."""
     motion = equations.motion(point.unknowns)
     return motion, linearise(equations.bicycle, equations.surface, *motion.state())
 
 
 def growth_along(equations: Steady, point: Point) -> float:
-    """Growth rate of disturbances at a point of a family [1/s]."""
+    """Return the growth rate of disturbances at a point of a family [1/s]."""
     return float(sample_curve(equations, point.unknowns[None]).growth_rate[0])
 
 
 def sample_family(family: Family) -> Samples:
-    """All points of a family."""
+    """Evaluate all points of a family."""
     return sample_curve(family.equations, np.array([point.unknowns for point in family.points]))
 
 
 def stable_sections(family: Family, growth: np.ndarray | None = None) -> list[tuple[SectionEnd, SectionEnd]]:
-    """Lyapunov-stable sections of a family, both ends solved to round-off.
+    """Find the Lyapunov-stable sections of a family, both ends solved to round-off.
 
-    A section may lie between two points that are both unstable: wherever the growth rate has a least
-    value among the points and falls steeply enough to reach zero, its least value between them is looked for.
+    A section may lie between two points that are both unstable. Where the growth rate has a minimum among the points
+    and falls steeply enough to reach zero, the minimum between the points is therefore searched for.
 
     Parameters
     ----------
@@ -66,21 +66,21 @@ def stable_sections(family: Family, growth: np.ndarray | None = None) -> list[tu
         In the order of the family's points.
     """
     equations = family.equations
-    points, rates = _with_least(family, sample_family(family).growth_rate if growth is None else growth)
+    points, rates = _insert_minima(family, sample_family(family).growth_rate if growth is None else growth)
     ends = [
-        _end(equations, root)
+        _make_end(equations, root)
         for _, root in roots_along(equations, points, lambda point: growth_along(equations, point), rates)
     ]
     signed = [rate for rate in rates if rate != 0] or [0.0]
     if signed[0] < 0:
-        ends.insert(0, _end(equations, points[0], "end"))
+        ends.insert(0, _make_end(equations, points[0], "end"))
     if signed[-1] < 0:
-        ends.append(_end(equations, points[-1], "end"))
+        ends.append(_make_end(equations, points[-1], "end"))
     return list(zip(ends[::2], ends[1::2], strict=True))
 
 
-def _with_least(family: Family, growth: np.ndarray) -> tuple[list[Point], list[float]]:
-    """Points and growth rates of a family, with those points added where the growth rate dips below zero."""
+def _insert_minima(family: Family, growth: np.ndarray) -> tuple[list[Point], list[float]]:
+    """Return the points and growth rates of a family, with points added where the growth rate dips below zero."""
     equations = family.equations
     points, rates = [family.points[0]], [float(growth[0])]
     for i in range(1, len(growth)):
@@ -97,26 +97,27 @@ def _with_least(family: Family, growth: np.ndarray) -> tuple[list[Point], list[f
 
 
 def _may_dip(growth: np.ndarray, i: int) -> bool:
-    """Whether the growth rate may be negative between the positive ones at i - 1 and i.
+    """Return whether the growth rate may be negative between the positive ones at i - 1 and i.
 
-    The dip is on one side of a least point or the other. The growth rate is the largest of several smooth
-    functions, so it stays above each side's continuation; thrice its slope leaves room for curvature.
+    The dip lies on one side of a minimum among the points or the other. The growth rate is the largest of several
+    smooth functions, so it stays above the continuation from each side; three times the slope leaves room for
+    curvature.
     """
-    if min(growth[i - 1], growth[i]) <= 0 or not (_least(growth, i - 1) or _least(growth, i)):
+    if min(growth[i - 1], growth[i]) <= 0 or not (_is_minimum(growth, i - 1) or _is_minimum(growth, i)):
         return False
     before, after = growth[max(i - 2, 0)], growth[min(i + 1, len(growth) - 1)]
     return max(growth[i - 1] - 3 * (before - growth[i - 1]), growth[i] - 3 * (after - growth[i])) < 0
 
 
-def _least(values: np.ndarray, i: int) -> bool:
+def _is_minimum(values: np.ndarray, i: int) -> bool:
     return 0 < i < len(values) - 1 and values[i] <= min(values[i - 1], values[i + 1])
 
 
-def _end(equations: Steady, point: Point, cause: str | None = None) -> SectionEnd:
+def _make_end(equations: Steady, point: Point, cause: str | None = None) -> SectionEnd:
     motion, reduced = linearise_point(equations, point)
     free = free_eigenvalues(equations.surface, reduced.eigenvalues, motion.yaw_rate)
     critical = max(free, key=lambda value: (value.real, value.imag))
-    # Two zeros that meet split by the root of round-off, 1e-7; the slowest pair that crosses turns at 1/s.
+    # A double zero splits by the square root of round-off, 1e-7; the slowest pair that crosses has about 1 rad/s.
     turning = abs(critical.imag) > 1e-3
     eigenvalue = complex(critical.real, abs(critical.imag) if turning else 0.0)
     return SectionEnd(cause or ("hopf" if turning else "energy"), motion, eigenvalue)

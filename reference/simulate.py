@@ -1,4 +1,4 @@
-"""Integration of the equations of motion: the precise one, and the paper's own."""
+"""Integration of the equations of motion: a precise method, and the method of the paper."""
 
 from __future__ import annotations
 
@@ -15,29 +15,31 @@ from .kinematics import WHEELS, constants
 from .rim import bicycle_rim_search, require_clear_rims, second_touch
 from .surface import Surface, evaluate
 
-# Coefficients as data, from the library that everybody checks them against.
+# The coefficients of the Dormand-Prince method as scipy has them.
 _TABLEAU = tuple(
     np.ascontiguousarray(table, float) for table in (DOP853.A, DOP853.B, DOP853.E3, DOP853.E5, DOP853.A_EXTRA, DOP853.D)
 )
-_TOUCHED = {kernel.REAR_TOUCHED: WHEELS[0], kernel.FRONT_TOUCHED: WHEELS[1]}
-_STEPS_A_CALL = 200  # between two reports of progress; a step takes some 6 us
-# Steps shrink to `kernel.SMALLEST_STEP` before the edge of the ground: at 100 m/s a wheel is within 1 um of it, but
-# where the ground turns upright, as a sphere does, they shrink earlier.
-_AT_THE_EDGE = 1e-3  # [m]
+_TOUCHING_WHEEL = {kernel.REAR_TOUCHED: WHEELS[0], kernel.FRONT_TOUCHED: WHEELS[1]}
+_STEPS_A_CALL = 200  # between two reports of progress; a step takes about 6 us
+# Steps shrink to `kernel.SMALLEST_STEP` before the edge of the ground: at 100 m/s a wheel is then within 1 um of it.
+# Where the ground becomes vertical, as on a sphere, they shrink earlier.
+_EDGE_DISTANCE = 1e-3  # [m]
 
 
 @dataclass(frozen=True)
 class PreciseMotion:
-    """A computed motion; the arrays end early where the integration did.
+    """A computed motion; the arrays end early if the integration does.
 
     Attributes
     ----------
     time : ndarray, shape (n,)
+        [s].
     q, qd : ndarray, shape (n, 9)
+        Generalised coordinates and rates.
     contact : ndarray, shape (n, 2, 3)
         Contact parameters (xi, eta, rim angle).
     force : ndarray, shape (n, 2, 3)
-        Contact forces on the wheels, inertial axes [N].
+        Contact forces on the wheels in inertial axes [N].
     steps, evaluations : int
         Integration steps and evaluations of the right-hand side.
     ended : str or None
@@ -54,7 +56,7 @@ class PreciseMotion:
     ended: str | None
 
 
-def _motion(
+def _make_motion(
     bicycle: Bicycle,
     surface: Surface,
     times: np.ndarray,
@@ -79,10 +81,10 @@ def simulate(
     tolerance: float = 1e-13,
     progress: Callable[[float], None] | None = None,
 ) -> PreciseMotion:
-    """Integrate precisely: Dormand-Prince 8(5,3), adaptive, projected on all constraints.
+    """Integrate precisely: Dormand-Prince 8(5,3), adaptive, projected onto all constraints.
 
-    The motion ends where a rim touches the ground at a second place: what follows is an impact, which the
-    equations do not know.
+    The motion ends where a rim touches the ground at a second place: an impact follows, which the equations do not
+    describe.
 
     Parameters
     ----------
@@ -91,15 +93,15 @@ def simulate(
     q, qd : ndarray, shape (9,)
         Start, on the constraints.
     times : ndarray, shape (n,)
-        Output times, not falling, the first >= 0 [s].
+        Output times, not decreasing, the first >= 0 [s].
     tolerance : float
-        Of a step's error, relative to 1 + |state|.
+        Tolerance of a step's error, relative to 1 + |state|.
     progress : callable, optional
         Called with the time reached.
 
     Returns
     -------
-    Motion
+    PreciseMotion
 
     Raises
     ------
@@ -115,26 +117,37 @@ def simulate(
     status = kernel.MORE
     while status == kernel.MORE:
         status, index, t, h, more, count = kernel.dop853(
-            *(y, times, index, t, h, tolerance, _STEPS_A_CALL, _TABLEAU, rims),
-            *(surface.function.real, surface.parameters, constants(bicycle), out),
+            y,
+            times,
+            index,
+            t,
+            h,
+            tolerance,
+            _STEPS_A_CALL,
+            _TABLEAU,
+            rims,
+            surface.function.real,
+            surface.parameters,
+            constants(bicycle),
+            out,
         )
         steps, evaluations = steps + more, evaluations + count
         if progress is not None:
             progress(min(t, float(times[-1])))
     ended = None
-    if status in _TOUCHED:
-        ended = second_touch(_TOUCHED[status], t)
+    if status in _TOUCHING_WHEEL:
+        ended = second_touch(_TOUCHING_WHEEL[status], t)
     elif status != kernel.DONE:
-        why = _where_the_ground_ends(surface, y[18:]) or "the equations of motion become singular"
+        why = _describe_edge_of_ground(surface, y[18:]) or "the equations of motion become singular"
         ended = f"no solution beyond t = {t:.6g} s: {why}"
-    return _motion(bicycle, surface, times, out[:index], steps, evaluations, ended)
+    return _make_motion(bicycle, surface, times, out[:index], steps, evaluations, ended)
 
 
-def _where_the_ground_ends(surface: Surface, contact: np.ndarray) -> str | None:
-    """Which wheel, of those with contact parameters (6,), has come to the edge of the ground; None if none has."""
+def _describe_edge_of_ground(surface: Surface, contact: np.ndarray) -> str | None:
+    """Describe which wheel, at contact parameters (6,), has reached the edge of the ground; None if none has."""
     angle = np.arange(8) * np.pi / 4
     for wheel, (x, y) in zip(WHEELS, (contact[0:2], contact[3:5]), strict=True):
-        around = evaluate(surface, x + _AT_THE_EDGE * np.cos(angle), y + _AT_THE_EDGE * np.sin(angle))
+        around = evaluate(surface, x + _EDGE_DISTANCE * np.cos(angle), y + _EDGE_DISTANCE * np.sin(angle))
         if np.isfinite(x + y) and not np.all(np.isfinite(around)):
             return f"the ground ends under the {wheel} wheel"
     return None
@@ -143,9 +156,9 @@ def _where_the_ground_ends(surface: Surface, contact: np.ndarray) -> str | None:
 def simulate_modified_euler(
     bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, times: np.ndarray, step: float = 1e-3
 ) -> PreciseMotion:
-    """Integrate as the paper does (section 4.2): modified Euler with a fixed step, nothing projected.
+    """Integrate as the paper does (section 4.2): modified Euler method with a fixed step, without projection.
 
-    Ends at a second touch as `simulate` does.
+    The motion ends at a second touch, as in `simulate`.
 
     Parameters
     ----------
@@ -160,12 +173,12 @@ def simulate_modified_euler(
 
     Returns
     -------
-    Motion
+    PreciseMotion
 
     Raises
     ------
     ValueError
-        If ``times`` are no such grid, or a wheel has no contact at the start, or a rim lies inside the ground or
+        If ``times`` is not such a grid, a wheel has no contact at the start, or a rim lies inside the ground or
         touches it twice.
     """
     stride = steps_per_output(times, step)
@@ -175,25 +188,32 @@ def simulate_modified_euler(
     out[0] = y
     count = stride * (len(times) - 1)
     status, rows, reached = kernel.modified_euler(
-        *(y, step, count, stride, bicycle_rim_search(bicycle, surface)),
-        *(surface.function.real, surface.parameters, constants(bicycle), out[1:]),
+        y,
+        step,
+        count,
+        stride,
+        bicycle_rim_search(bicycle, surface),
+        surface.function.real,
+        surface.parameters,
+        constants(bicycle),
+        out[1:],
     )
     rows += 1
     ended = None
-    if status in _TOUCHED:
-        ended = second_touch(_TOUCHED[status], reached)
+    if status in _TOUCHING_WHEEL:
+        ended = second_touch(_TOUCHING_WHEEL[status], reached)
     elif status != kernel.DONE:
         ended = f"the state is no longer finite after t = {times[rows - 1]:.6g} s"
-    return _motion(bicycle, surface, times, out[:rows], (rows - 1) * stride, 2 * (rows - 1) * stride, ended)
+    return _make_motion(bicycle, surface, times, out[:rows], (rows - 1) * stride, 2 * (rows - 1) * stride, ended)
 
 
 def steps_per_output(times: np.ndarray, step: float) -> int:
-    """Number of fixed steps between two outputs.
+    """Return the number of fixed steps between two outputs.
 
     Raises
     ------
     ValueError
-        If the times are not a uniform grid from 0 or its spacing is no multiple of the step.
+        If the times are not a uniform grid from 0, or its spacing is not a multiple of the step.
     """
     if len(times) < 2 or times[0] != 0:
         raise ValueError("output times must be a grid of two or more that starts at 0")

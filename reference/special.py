@@ -1,4 +1,4 @@
-"""Special points of a family, solved from what defines them."""
+"""Special points of a family, solved from the conditions that define them."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from .surface import Plane, is_level
 
 LEAN, STEER, LEAN_RATE, STEER_RATE = (VARIABLES.index(name) for name in ("lean", "steer", "lean_rate", "steer_rate"))
 STRAIGHT = {1: ("B", 0.0), 2: ("C", np.pi)}
-SMALL_LEAN = 0.05  # the extremum of the front rate next to the pivoting motion has no letter
+SMALL_LEAN = 0.05  # [rad] the extremum of the front rate next to the pivoting motion has no letter
 
 
 @dataclass(frozen=True)
 class SpecialPoint:
-    """A point of a family that a condition singles out.
+    """A point of a family that fulfils a special condition.
 
     Attributes
     ----------
     name : str
-        The paper's letter where it has one, else the kind and a number.
+        The paper's letter where it has one, otherwise the kind and a number.
     kind : str
         ``static``, ``pivot``, ``straight``, ``cusp`` (extreme front rate), ``fold`` (extreme rear rate),
         ``energy`` (extreme energy).
@@ -53,7 +53,7 @@ class SpecialPoint:
 
 
 def energy_slope(equations: Steady) -> Callable[[Point], float]:
-    """Derivative of the energy along a family of these equations, by the complex step."""
+    """Make the derivative of the energy along a family of these equations, by the complex step."""
     c = constants(equations.bicycle)
 
     def slope(point: Point) -> float:
@@ -63,7 +63,7 @@ def energy_slope(equations: Steady) -> Callable[[Point], float]:
 
 
 def special_points(family: Family) -> list[SpecialPoint]:
-    """All special points of a family on which its wheels can stand, in the order of its points."""
+    """Find all special points of a family where its wheels can stand, in the order of its points."""
     equations = family.equations
     conditions: tuple[tuple[str, Callable[[Point], float]], ...] = (
         ("cusp", front_rate_slope),
@@ -73,27 +73,27 @@ def special_points(family: Family) -> list[SpecialPoint]:
     found: list[tuple[int, float, str, Point]] = []
     for kind, condition in conditions:
         for i, point in roots_along(equations, family.points, condition):
-            # The squared rear rate is least at the pivoting motion: that is no fold of its own.
+            # The squared rear rate is least at the pivoting motion, which is not a fold.
             if kind != "fold" or abs(point.unknowns[REAR_SPEED]) > 1e-6:
-                found.append((i, _distance(family.points[i], point), kind, point))
+                found.append((i, _arc_distance(family.points[i], point), kind, point))
     for i, end in zip((0, len(family.points) - 1), family.ends, strict=True):
         if end in ("static", "pivot"):
             found.append((i, 0.0, end, family.points[i]))
     found = sorted((item for item in found if stands(equations, item[3].unknowns)), key=lambda item: item[:2])
     ordered = [(kind, equations.motion(point.unknowns)) for *_, kind, point in found]
-    points = [SpecialPoint(name, kind, *_figures(motion)) for name, kind, motion in _named(family, ordered)]
+    points = [SpecialPoint(name, kind, *_quantities(motion)) for name, kind, motion in _name_points(family, ordered)]
     if is_level(equations.surface) and family.number in STRAIGHT:
         points.append(straight_motion(equations.bicycle, *STRAIGHT[family.number]))
     return points
 
 
-def _distance(first: Point, point: Point) -> float:
-    """How far a near point lies along the curve from the first."""
+def _arc_distance(first: Point, point: Point) -> float:
+    """Return the distance of a near point from the first, along the curve."""
     return float((metric(first.unknowns) * first.tangent) @ (point.unknowns - first.unknowns))
 
 
 def straight_motion(bicycle: Bicycle, name: str, steer: float) -> SpecialPoint:
-    """Upright straight motion on the plane that neighbouring circular motions tend to (B and C).
+    """Find the upright straight motion on the plane that neighbouring circular motions tend to (B and C).
 
     Its capsize eigenvalue is zero: the stiffness of lean and steer is singular.
 
@@ -118,16 +118,16 @@ def straight_motion(bicycle: Bicycle, name: str, steer: float) -> SpecialPoint:
     return SpecialPoint(name, "straight", 0.0, steer, rear_rate, float(rates[FRONT_ANGLE]))
 
 
-def _figures(motion: CircularMotion) -> tuple[float, float, float, float]:
+def _quantities(motion: CircularMotion) -> tuple[float, float, float, float]:
     return motion.lean, motion.steer, motion.rear_rate, motion.front_rate
 
 
-def _named(family: Family, points: list[tuple[str, CircularMotion]]) -> Iterator[tuple[str, str, CircularMotion]]:
-    """Give points the paper's letters, the others their kind and a number.
+def _name_points(family: Family, points: list[tuple[str, CircularMotion]]) -> Iterator[tuple[str, str, CircularMotion]]:
+    """Give points the paper's letters where they have one, otherwise their kind and a number.
 
-    The cusps D and I exist while family 2 runs out to large circles (to C), or to the edge of the ground on
-    its way there: then D is the least size of the front rate on family 2, I the greatest on family 4, whose end
-    is the wheel that runs backward.
+    The cusps D and I exist while family 2 ends in large circles (at C), or at the edge of the ground on its way there.
+    D is then the cusp with the smallest front rate of family 2, and I the cusp with the largest one of family 4, whose
+    end is the wheel that runs backward.
     """
     letters = {"static": "A", "pivot": "H" if family.number == 4 else "G"}
     cusps = [motion for kind, motion in points if kind == "cusp" and abs(motion.lean) > SMALL_LEAN]

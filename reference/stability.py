@@ -14,11 +14,12 @@ from .kernels.pose import aligned
 from .kinematics import FRONT_ANGLE, LEAN, REAR_ANGLE, STEER, YAW, constants
 from .surface import Surface, is_level
 
-# All of a matrix's largest eigenvalue. Real parts nearer to each other are equal but for round-off, which is some
-# 1e-15 times an eigenvalue's condition, 1e2 to 1e4 along the families. A double zero splits by the root of that, 1e-8
-# to 1e-7; the slowest pair, of circles of a kilometre on the plane, turns at 1e-4. Growth below the last cannot be
-# told from none: on other kernels of BLAS the families' growth rates differ by up to 1e-13 1/s, and their largest
-# eigenvalues are some ten. The flattest bowl that a scenario may have, 1e-12 1/m, draws its circles in at 2e-12 1/s.
+# Relative to a matrix's largest eigenvalue. Real parts that differ by less than the first are equal: their round-off
+# is about 1e-15 times an eigenvalue's condition number, which is 1e2 to 1e4 along the families. A double zero splits
+# by the square root of that, 1e-8 to 1e-7; the slowest pair, of circles of a kilometre on the plane, has 1e-4. Growth
+# below the last cannot be told from zero: between kernels of BLAS the families' growth rates differ by up to 1e-13
+# 1/s, and their largest eigenvalues are about ten. On the flattest bowl that a scenario may have, 1e-12 1/m, circles
+# decay at 2e-12 1/s.
 _EQUAL, _ZERO, _NO_GROWTH = 1e-9, 1e-6, 2e-14
 
 # x and y in the heading frame.
@@ -32,8 +33,8 @@ class Linearisation:
     Attributes
     ----------
     variables : tuple of str
-        What v is: `VARIABLES`, but for the front wheel's rate in the place of the rear's where the rear wheel
-        stands or nearly does (a pivoting motion has no rear rate that would tell its speed).
+        Names of v: `VARIABLES`, but with the front wheel's rate in place of the rear's where the rear wheel stands or
+        nearly does (a pivoting motion has no rear rate from which its speed could be seen).
     field : ndarray, shape (7,)
         X(v); zero on a circular motion.
     jacobian : ndarray, shape (7, 7)
@@ -48,7 +49,7 @@ class Linearisation:
 
 
 def independent(q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-    """Independent variables, named in `VARIABLES`, of states (..., 9); shape (..., 7)."""
+    """Return the independent variables, named in `VARIABLES`, of states (..., 9); shape (..., 7)."""
     cosine, sine = np.cos(q[..., YAW]), np.sin(q[..., YAW])
     x, y = q[..., 0], q[..., 1]
     columns = (cosine * x + sine * y, -sine * x + cosine * y, q[..., LEAN], q[..., STEER])
@@ -56,16 +57,17 @@ def independent(q: np.ndarray, qd: np.ndarray) -> np.ndarray:
 
 
 def linearise(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> Linearisation:
-    """Reduced Jacobian and eigenvalues at a state on the constraints.
+    """Linearise the reduced equations at a state on the constraints.
 
-    Derivatives are taken by the complex step and exact to round-off.
+    Derivatives are taken by the complex step and are exact to round-off.
 
     Parameters
     ----------
     bicycle : Bicycle
     surface : Surface
-        A surface of revolution about z, or a plane: X depends on no heading.
+        A surface of revolution about z, or a plane: X does not depend on the heading.
     q, qd : ndarray, shape (9,)
+        Coordinates and rates.
 
     Returns
     -------
@@ -90,19 +92,19 @@ def linearise(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray)
 
 
 def sorted_eigenvalues(jacobians: np.ndarray) -> np.ndarray:
-    """Eigenvalues of real matrices (..., n, n), shape (..., n), in the order of `eigenvalue_order`.
+    """Compute eigenvalues of real matrices (..., n, n), shape (..., n), in the order of `eigenvalue_order`.
 
-    Complex ones stand in exactly conjugate pairs.
+    Complex eigenvalues come in exactly conjugate pairs.
     """
     eigenvalues = np.linalg.eigvals(jacobians).astype(complex)
     return np.take_along_axis(eigenvalues, eigenvalue_order(eigenvalues), axis=-1)
 
 
 def eigenvalue_order(eigenvalues: np.ndarray) -> np.ndarray:
-    """Order of eigenvalues by their real parts, and of those with equal ones by their imaginary parts.
+    """Order eigenvalues by their real parts, and those with equal real parts by their imaginary parts.
 
-    Real parts are equal where they differ from the next by round-off at most, as those of eigenvalues that symmetry
-    puts on the imaginary axis do. Eigenvalues that `are_zero` count as zero.
+    Real parts are equal where they differ from the next one by no more than round-off, as those of eigenvalues do that
+    symmetry puts on the imaginary axis. Eigenvalues that `are_zero` count as zero.
 
     Parameters
     ----------
@@ -123,18 +125,18 @@ def eigenvalue_order(eigenvalues: np.ndarray) -> np.ndarray:
 
 
 def are_zero(eigenvalues: np.ndarray) -> np.ndarray:
-    """Which eigenvalues (..., n) of matrices are zero but for round-off, shape (..., n).
+    """Return which eigenvalues (..., n) of matrices are zero but for round-off, shape (..., n).
 
-    A zero that is double, as where the energy is extreme along a family or the bicycle stands, may come out as a pair.
+    A double zero, as where the energy is extreme along a family or the bicycle stands, may be computed as a pair.
     """
     size = np.abs(eigenvalues)
     return size <= _ZERO * size.max(axis=-1, keepdims=True)
 
 
 def structural_eigenvalues(surface: Surface, yaw_rate: np.ndarray | float) -> np.ndarray:
-    """Eigenvalues that symmetry alone puts on the imaginary axis, shape (..., 1 or 3) for yaw rates (...).
+    """Return the eigenvalues that symmetry alone puts on the imaginary axis, shape (..., 1 or 3) for yaw rates (...).
 
-    Circular motions come in one-parameter families, hence a zero; on a level plane the circle's centre
+    Circular motions form one-parameter families, hence a zero; on a level plane the circle's centre
     is free too, hence a pair of +-i times the yaw rate.
     """
     turns = np.array([0, 1, -1] if is_level(surface) else [0])
@@ -142,7 +144,7 @@ def structural_eigenvalues(surface: Surface, yaw_rate: np.ndarray | float) -> np
 
 
 def free_eigenvalues(surface: Surface, eigenvalues: np.ndarray, yaw_rate: np.ndarray | float) -> np.ndarray:
-    """Eigenvalues that symmetry does not fix: all but the nearest to each structural one.
+    """Select the eigenvalues that symmetry does not fix: all but the nearest to each structural one.
 
     Parameters
     ----------
@@ -164,14 +166,14 @@ def free_eigenvalues(surface: Surface, eigenvalues: np.ndarray, yaw_rate: np.nda
 
 
 def growth_rates(surface: Surface, eigenvalues: np.ndarray, yaw_rate: np.ndarray | float) -> np.ndarray:
-    """Largest real parts (...) among the eigenvalues (..., 7) that symmetry does not fix [1/s].
+    """Return the largest real parts (...) among the eigenvalues (..., 7) that symmetry does not fix [1/s].
 
-    Negative: Lyapunov stable. Zero where its sign is round-off, as on a bowl that is level but for 1e-13.
+    Negative values mean Lyapunov stable. Zero where the sign is round-off, as on a bowl that is level but for 1e-13.
     """
     growth = np.real(free_eigenvalues(surface, eigenvalues, yaw_rate)).max(axis=-1)
     return np.where(np.abs(growth) > _NO_GROWTH * np.abs(eigenvalues).max(axis=-1), growth, 0.0)
 
 
 def growth_rate(surface: Surface, eigenvalues: np.ndarray, yaw_rate: float) -> float:
-    """Growth rate of one motion, see `growth_rates`."""
+    """Return the growth rate of one motion, see `growth_rates`."""
     return float(growth_rates(surface, eigenvalues, yaw_rate))

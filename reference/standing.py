@@ -1,6 +1,6 @@
-"""Whether wheels can stand on the ground where a circular motion has them, their whole rims clear of it.
+"""Check that the wheels of a circular motion can stand on the ground, with their whole rims clear of it.
 
-The equations of circular motions know each wheel's contact alone. In a bowl that is as tight as a wheel, the rim of
+The equations of circular motions contain each wheel's contact only. In a bowl about as tight as a wheel, the rim of
 a solution may lie inside the ground elsewhere.
 """
 
@@ -15,14 +15,14 @@ from .surface import Surface
 
 
 def stands(equations: Steady, unknowns: np.ndarray) -> bool:
-    """Whether both rims are clear of the ground but for their contacts at a solution, shape (22,)."""
+    """Return whether both rims are clear of the ground except at their contacts, at a solution of shape (22,)."""
     u = unknowns
     q = np.array([u[0], u[1], u[2], 0.0, u[LEAN], u[PITCH], u[STEER], 0.0, 0.0])
     return bool(np.all(rim_clearances(equations.bicycle, equations.surface, q, u[CONTACT]) > 0))
 
 
 def motion_stands(bicycle: Bicycle, surface: Surface, motion: CircularMotion) -> bool:
-    """Whether both rims of a motion are clear of the ground but for their contacts."""
+    """Return whether both rims of a motion are clear of the ground except at their contacts."""
     return bool(np.all(rim_clearances(bicycle, surface, motion.state()[0], motion.contact.ravel()) > 0))
 
 
@@ -32,7 +32,7 @@ def require_standing(bicycle: Bicycle, surface: Surface, motion: CircularMotion)
     Raises
     ------
     ValueError
-        With the motion, the wheel, the depth and the place.
+        If a rim is not clear, with the motion, the wheel, the depth and the place.
     """
     try:
         require_clear_rims(bicycle, surface, motion.state()[0], motion.contact.ravel())

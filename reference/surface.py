@@ -1,11 +1,11 @@
-"""Surfaces z = f(x, y): what the kernels need of the ground is its height, gradient and Hessian.
+"""Surfaces z = f(x, y), described by their height, gradient and Hessian.
 
-A surface is a pair of compiled functions (real, and complex for the complex step) and an array of
+A surface consists of a pair of compiled functions (real, and complex for the complex step) and an array of
 parameters, so a kernel is compiled once and takes any surface as data. Where there is no ground (beyond
-the rim of a sphere, off a grid of heights) the functions give nan: Newton's method and the integrators
-stop at it.
+the rim of a sphere, outside a grid of heights) the functions return nan, and Newton's method and the integrators
+stop there.
 
-The level plane and the paper's paraboloid are here; `bowls`, `profile` and `height_field` have more.
+This module has the level plane and the paper's paraboloid; `bowls`, `profile` and `height_field` have further surfaces.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ def _signature(scalar: Any) -> Any:
 
 @dataclass(frozen=True)
 class SurfaceFunction:
-    """A height function, compiled for real and for complex arguments when first asked for.
+    """A height function, compiled for real and for complex arguments when first used.
 
     Attributes
     ----------
     source : callable
-        As `surface_function` takes it.
+        The function as passed to `surface_function`.
     cached : bool
-        Whether the compiled code is kept on disk; a closure's cannot be.
+        Whether the compiled code is kept on disk; that of a closure cannot be.
     """
 
     source: Callable[..., tuple[Any, ...]]
@@ -55,10 +55,10 @@ class SurfaceFunction:
 
 
 def surface_function(function: Callable[..., tuple[Any, ...]]) -> SurfaceFunction:
-    """Make ``function(x, y, parameters) -> (f, fx, fy, fxx, fxy, fyy)`` a function for the kernels.
+    """Prepare ``function(x, y, parameters) -> (f, fx, fy, fxx, fxy, fyy)`` for compilation into the kernels.
 
-    All six results must be of the type of ``x`` (write ``0 * x`` for a zero), and the function must be
-    analytic: no `abs`, no comparison of ``x`` or ``y`` other than through its real part.
+    All six results must have the type of ``x`` (write ``0 * x`` for a zero), and the function must be
+    analytic: no `abs`, no comparison of ``x`` or ``y`` other than of their real parts.
 
     Parameters
     ----------
@@ -74,12 +74,12 @@ def surface_function(function: Callable[..., tuple[Any, ...]]) -> SurfaceFunctio
 
 
 class Surface(Protocol):
-    """Any smooth ground z = f(x, y) of gravity's half space.
+    """Any smooth ground z = f(x, y), with gravity along -z.
 
-    Two more properties are read where a surface has them, when the whole rim of a wheel is looked at
-    (`velodrome.reference.rim`): ``bend``, a bound of the largest eigenvalue of the Hessian anywhere [1/m], which saves
-    most of the looking, and ``detail``, the length within which the ground does not bend to and fro [m], which says how
-    closely to look where it is less than a wheel's radius.
+    Two optional properties are used when the whole rim of a wheel is searched (`velodrome.reference.rim`): ``bend``, an
+    upper bound of the largest eigenvalue of the Hessian anywhere [1/m], which saves most of the search, and ``detail``,
+    the length within which the ground does not bend to and fro [m], which determines the number of samples where it is
+    less than a wheel's radius.
     """
 
     @property
@@ -89,21 +89,21 @@ class Surface(Protocol):
 
     @property
     def parameters(self) -> np.ndarray:
-        """Its parameters, shape (k,), float64; all zero if and only if it is the level plane."""
+        """Parameters of the function, shape (k,), float64; all zero if and only if the surface is the level plane."""
         ...
 
 
 @runtime_checkable
 class SurfaceOfRevolution(Surface, Protocol):
-    """A ground z = g(r) about the z axis: circular motions ride on it."""
+    """Ground z = g(r) about the z axis, on which circular motions exist."""
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Smallest and largest radius r that has ground [m]."""
+        """Smallest and largest radius r where there is ground [m]."""
         ...
 
     def flattened(self, fraction: float) -> SurfaceOfRevolution:
-        """The ground on the way from the level plane (fraction 0) to this one (1), smooth in the fraction."""
+        """Return the ground between the level plane (fraction 0) and this one (fraction 1), smooth in the fraction."""
         ...
 
 
@@ -131,21 +131,21 @@ class Plane:
 
     @property
     def parameters(self) -> np.ndarray:
-        """No parameters; one unused entry, shape (1,)."""
+        """One unused entry, shape (1,); the plane has no parameters."""
         return np.zeros(1)
 
     @property
     def extent(self) -> tuple[float, float]:
-        """It has no edge."""
+        """Radii of the ground [m]; it has no edge."""
         return 0.0, math.inf
 
     @property
     def bend(self) -> float:
-        """It has none."""
+        """Largest eigenvalue of the Hessian, 0 [1/m]."""
         return 0.0
 
     def flattened(self, fraction: float) -> Plane:
-        """The plane itself, which is level."""
+        """Return the plane itself, which is level."""
         return self
 
 
@@ -182,26 +182,26 @@ class Paraboloid:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """It has no edge."""
+        """Radii of the ground [m]; it has no edge."""
         return 0.0, math.inf
 
     @property
     def bend(self) -> float:
-        """2 alpha, everywhere [1/m]."""
+        """Largest eigenvalue of the Hessian, 2 alpha everywhere [1/m]."""
         return 2.0 * self.alpha
 
     def flattened(self, fraction: float) -> Paraboloid:
-        """The paraboloid of a fraction of alpha."""
+        """Return the paraboloid with a fraction of alpha."""
         return Paraboloid(fraction * self.alpha)
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is a finite real number, and no truth value."""
+    """Return whether a value is a finite real number and not a bool."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def is_level(surface: Surface) -> bool:
-    """Whether a surface is the plane z = 0: its parameters are all zero, as no other surface's may be."""
+    """Return whether a surface is the plane z = 0: only its parameters are all zero."""
     return not np.any(surface.parameters)
 
 
@@ -216,7 +216,7 @@ def _evaluate(function, parameters, x, y):
 
 
 def evaluate(surface: Surface, x: np.ndarray | float, y: np.ndarray | float) -> np.ndarray:
-    """Height, gradient and Hessian at points.
+    """Evaluate height, gradient and Hessian at points.
 
     Parameters
     ----------
@@ -235,12 +235,12 @@ def evaluate(surface: Surface, x: np.ndarray | float, y: np.ndarray | float) -> 
 
 
 def has_tip(surface: SurfaceOfRevolution) -> bool:
-    """Whether a surface's profile meets the axis at an angle: there it has a height, but no normal."""
+    """Return whether a surface's profile meets the axis at an angle: there it has a height, but no normal."""
     return surface.extent[0] == 0 and not np.all(np.isfinite(evaluate(surface, 0.0, 0.0)))
 
 
 def unit_normals(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Upward unit normals of a surface, shape (..., 3), at coordinates of any common shape [m]."""
+    """Compute upward unit normals of a surface, shape (..., 3), at coordinates of any common shape [m]."""
     values = evaluate(surface, x, y)
     normal = np.stack([-values[..., 1], -values[..., 2], np.ones_like(values[..., 0])], axis=-1)
     return normal / np.linalg.norm(normal, axis=-1, keepdims=True)

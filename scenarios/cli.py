@@ -13,6 +13,7 @@ import typer
 
 from .commands import (
     atlas_command,
+    bicycle_command,
     check_command,
     circular_command,
     critical_command,
@@ -67,6 +68,7 @@ for _command in (
     families_command,
     critical_command,
     atlas_command,
+    bicycle_command,
     paper_command,
     precision_command,
     diff_command,

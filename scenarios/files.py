@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ..engines.files import write_whole
+from ..engines.format_version import VERSION_KEY
 from .error import ScenarioError
+
+DIGEST_KEY = "sha256"
 
 
 def make_folder(out: Path) -> None:
@@ -24,9 +29,30 @@ def make_folder(out: Path) -> None:
         raise ScenarioError(f"--out {out}: the folder cannot be made: {error.strerror}") from error
 
 
-def write_json(path: Path, data: Any) -> None:
-    """Write JSON, whole or not at all."""
-    write_text(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
+def versioned(document: Mapping[str, Any]) -> dict[str, Any]:
+    """A JSON document with the version of its format first; 1 if it says none itself."""
+    return {VERSION_KEY: 1} | dict(document)
+
+
+def write_json(path: Path, document: Mapping[str, Any]) -> None:
+    """Write a JSON document with the version of its format, whole or not at all."""
+    write_text(path, json.dumps(versioned(document), indent=1, allow_nan=False) + "\n")
+
+
+def write_sealed(path: Path, document: Mapping[str, Any], version: int) -> None:
+    """Write a JSON document with its version and a digest of its contents, whole or not at all."""
+    found = {VERSION_KEY: version} | dict(document)
+    write_json(path, found | {DIGEST_KEY: content_digest(found)})
+
+
+def content_digest(document: Mapping[str, Any]) -> str:
+    """SHA-256 of everything in a JSON document but its digest, in hexadecimal digits.
+
+    Order and white space do not matter, values do, to the last bit.
+    """
+    contents = {key: value for key, value in document.items() if key != DIGEST_KEY}
+    text = json.dumps(contents, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def write_text(path: Path, text: str) -> None:

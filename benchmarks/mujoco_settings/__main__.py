@@ -1,9 +1,8 @@
-"""What to set in MuJoCo for a wheel that rolls: `python benchmarks/mujoco_settings.py`.
+"""MuJoCo's settings for a wheel that rolls: `python -m benchmarks.mujoco_settings`.
 
-Five tables: what a step costs beside MuJoCo's own step of the same tree, what single settings do to slip,
-energy and radius on a circle, the slip held against its law, the energy that integrators add, and the drifts
-of a long ride. The numbers come
-from `engines.mujoco.study` and `engines.mujoco.laws`. With `--json` they are printed as one JSON document
+Five tables: the cost of a step compared with MuJoCo's own step of the same tree, the effect of single settings on
+slip, energy and radius on a circle, the slip compared with its law, the energy that integrators add, and the drifts
+of a long ride. The numbers come from `study` and `laws`. With `--json` they are printed as one JSON document
 instead; with `--out FOLDER` that document, a figure and a Markdown table with advice are written.
 """
 
@@ -32,20 +31,20 @@ from .study import LADDER, DriftRow, Rate, Row, drift_study, plain_step_cost, se
 
 # Time constants of the contacts over more than two decades [s].
 TIME_CONSTANTS = (0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02)
-# Friction as MuJoCo has it of itself, and as hard as it helps.
+# MuJoCo's default friction, and the largest ratio that still reduces the slip.
 IMPRATIOS = (1.0, 100.0)
 STEPS = (0.004, 0.002, 0.001, 0.0005)
 SURFACES: dict[str, SurfaceOfRevolution] = {"the plane": Plane(), "the bowl, α = 1/200": Paraboloid(1 / 200)}
 
 
 def circle(surface: SurfaceOfRevolution, duration: float, interval: float = 0.01) -> Problem:
-    """The tight circle of family 2 at a rear rate of 18 rad/s: in the bowl it is the paper's Q2."""
+    """Return the tight circle of family 2 at a rear rate of 18 rad/s; in the bowl it is the paper's Q2."""
     _, motion = find_motion(Bicycle(), surface, 18.0, 2, (0.74, 2.84))
     return Problem(Bicycle(), surface, *motion.state(), np.arange(round(duration / interval) + 1) * interval)
 
 
 def costs(problem: Problem) -> list[dict[str, Any]]:
-    """CPU time of a step of each model, at its own settings, and of MuJoCo's step of the same tree [s]."""
+    """Measure the CPU time of a step of each model, at its own settings, and of MuJoCo's step of the same tree [s]."""
     rows = []
     for engine in LADDER:
         settings = engine.settings()
@@ -56,12 +55,12 @@ def costs(problem: Problem) -> list[dict[str, Any]]:
     return rows
 
 
-def _rate(rate: Rate | None, scale: float = 1.0) -> str:
+def _format_rate(rate: Rate | None, scale: float = 1.0) -> str:
     return "–" if rate is None else f"{scale * rate.value:.3g} ± {scale * rate.half_width:.1g}"
 
 
 def cost_table(rows: list[dict[str, Any]]) -> Table:
-    """Costs, and their ratio to the plain step."""
+    """Make the table of costs and of their ratio to the plain step."""
     table = Table("model", "integrator", "µs a step", "plain step µs", "ratio", box=None, pad_edge=False)
     for row in rows:
         ratio = row["cost"] / row["plain"]
@@ -72,28 +71,28 @@ def cost_table(rows: list[dict[str, Any]]) -> Table:
 
 
 def settings_table(title: str, rows: list[Row]) -> Table:
-    """One choice of settings a row."""
+    """Make the table of settings, one choice in a row."""
     columns = ("slip mm/s", "law mm/s", "dE/dt W", "of it slip W", "dR/dt mm/s", "µs a step", "ridden s", "advice")
     table = Table(title, "changed", *columns, box=None, pad_edge=False)
-    for row, words in zip(rows, advice([asdict(row) for row in rows]), strict=True):
+    for row, recommendation in zip(rows, advice([asdict(row) for row in rows]), strict=True):
         changed = ", ".join(f"{name} {value}" for name, value in row.changed.items())
         table.add_row(
             row.engine.removeprefix("mujoco-"),
             changed or "–",
             f"{1e3 * row.slip:.3g}",
             "–" if row.law is None else f"{1e3 * row.law:.3g}",
-            _rate(row.energy_rate),
+            _format_rate(row.energy_rate),
             f"{row.slip_power:.2g}",
-            _rate(row.radius_rate, 1e3),
+            _format_rate(row.radius_rate, 1e3),
             f"{1e6 * row.step_cost:.0f}",
             f"{row.ridden:g}",
-            words,
+            recommendation,
         )
     return table
 
 
 def creep_table(title: str, rows: list[CreepRow]) -> Table:
-    """Measured slip over the law and over the whole law, for the rear and the front wheel."""
+    """Make the table of measured slip over the law and over the whole law, for the rear and the front wheel."""
     columns = ("impratio", "step ms", "slip mm/s", "law mm/s", "rear, front / law", "/ whole law")
     table = Table(title, *columns, box=None, pad_edge=False)
     for row in rows:
@@ -107,7 +106,7 @@ def creep_table(title: str, rows: list[CreepRow]) -> Table:
 
 
 def energy_table(rows: list[EnergyRow]) -> Table:
-    """Energy that integrators add, in all and a millisecond of step."""
+    """Make the table of the energy that integrators add, in total and per millisecond of step."""
     table = Table("integrator", "step ms", "energy added W", "W a ms", box=None, pad_edge=False)
     for row in rows:
         table.add_row(row.integrator, f"{1e3 * row.step:g}", f"{row.gain:.3g}", f"{row.gain / row.step / 1e3:.3g}")
@@ -115,16 +114,16 @@ def energy_table(rows: list[EnergyRow]) -> Table:
 
 
 def drift_table(title: str, rows: list[DriftRow]) -> Table:
-    """Drift rates with the half widths of their confidence intervals."""
+    """Make the table of drift rates with the half widths of their confidence intervals."""
     table = Table(title, "dR/dt mm/s", "dE/dt W", "rear rate rad/s²", "slip m/s", "ridden s", box=None, pad_edge=False)
     for row in rows:
-        drifts = (_rate(row.radius, 1e3), _rate(row.energy), _rate(row.rear_rate))
+        drifts = (_format_rate(row.radius, 1e3), _format_rate(row.energy), _format_rate(row.rear_rate))
         table.add_row(row.engine, *drifts, f"{row.slip:.2g}", f"{row.ridden:g}")
     return table
 
 
 def measure(duration: float) -> dict[str, Any]:
-    """All studies; ``duration`` is that of the long ride [s]."""
+    """Run all studies; ``duration`` is that of the long ride [s]."""
     plane, bowl = SURFACES.values()
     long = circle(bowl, duration, 0.02)
     creep = {name: circle(surface, 0.5) for name, surface in SURFACES.items()}
@@ -156,7 +155,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="MuJoCo's settings for rolling wheels.")
     parser.add_argument("--json", action="store_true", help="print one JSON document")
     parser.add_argument("--out", type=Path, help="write the document, a figure and a table with advice to this folder")
-    parser.add_argument("--duration", type=float, default=120.0, help="of the long ride [s]")
+    parser.add_argument("--duration", type=float, default=120.0, help="duration of the long ride [s]")
     options, console, status = parser.parse_args(), Console(), Console(stderr=True)
     with status.status("riding"):
         found = measure(options.duration)

@@ -1,22 +1,22 @@
-"""The creep of MuJoCo's contacts, and the acceleration that it comes from.
+"""The creep of MuJoCo's contacts, and the acceleration that causes it.
 
-MuJoCo's contact rows ask for J q'' = -b J q' and leave out J' q', the acceleration that the contact point of
-a rolling wheel has at zero slip. So the slip v = J q' changes at J q'' + J' q' = -b v + J' q', and settles at
+MuJoCo's contact rows demand J q'' = -b J q' and omit J' q', the acceleration that the contact point of
+a rolling wheel has at zero slip. The slip v = J q' therefore changes by J q'' + J' q' = -b v + J' q', and settles at
 
     slip = J' q' / b,    b = 2 / (largest impedance * time constant)
 
-On a circle of radius R at speed v its size is (v^2 / R) / b, whatever the friction. Two corrections make
-the law good to a few per cent at any setting:
+On a circle of radius R at speed v its magnitude is (v^2 / R) / b, whatever the friction. Two corrections make
+the law accurate to a few per cent at any setting:
 
 - Rows are soft. A force F on a row with MuJoCo's softness R (efc_R) adds R F / b:
 
       slip = (J' q' - R F) / b,    R = w (1 - d) / d / impratio,    0.9 <= d <= 0.95 at MuJoCo's impedances
 
-  w is the inverse weight that MuJoCo gives the wheel's body. Like the law itself it goes with 1 / b: at impratio 1 it
-  adds 14 to 24 % on a tight circle of the plane, at 100 a hundredth of that.
-- Wheels sink in. MuJoCo takes the contact half the depth inside the wheel, and it is that point whose velocity the
-  rows see; the rim's own differs by w_wheel x (n gap / 2), some spin * gap / 2 forward. The depth goes with
-  1 / b^2, so this is the law's next power of 1 / b.
+    w is the inverse weight that MuJoCo gives the wheel's body. Like the law itself, this is proportional to 1 / b: at
+    impratio 1 it adds 14 to 24 % on a tight circle of the plane, at 100 a hundredth of that.
+  - Wheels sink in. MuJoCo places the contact half the depth inside the wheel, and the rows use the velocity of that
+    point; the velocity of the rim differs by w_wheel x (n gap / 2), about spin * gap / 2 forward. The depth is
+    proportional to 1 / b^2, so this is the law's next power of 1 / b.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from velodrome.reference.surface import Surface
 
 
 def contact_acceleration(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-    """Acceleration J' q' of both contact points along a trajectory, as the ground's tangents see it.
+    """Compute the acceleration J' q' of both contact points along a trajectory, along the ground's tangents.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def contact_acceleration(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: 
 
 
 def impedance(depth: np.ndarray, shape: tuple[float, float, float, float, float]) -> np.ndarray:
-    """MuJoCo's impedance at depths [m], any shape: from the least to the largest over a width (solimp)."""
+    """Compute MuJoCo's impedance at depths [m], any shape, from the smallest to the largest over a width (solimp)."""
     least, largest, width, middle, power = shape
     x = np.clip(depth / width, 0.0, 1.0)
     rising = x**power / middle ** (power - 1) if middle > 0 else np.ones_like(x)
@@ -79,15 +79,15 @@ def impedance(depth: np.ndarray, shape: tuple[float, float, float, float, float]
 def settled_slip(
     problem: Problem, trajectory: Trajectory, settings: ContactSettings, weights: tuple[float, float]
 ) -> np.ndarray:
-    """Slip of both rims by the whole law: missing acceleration, softness and sinking.
+    """Compute the slip of both rims by the whole law: missing acceleration, softness and sinking.
 
     Parameters
     ----------
     problem : Problem
     trajectory : Trajectory
-        With contact forces and gaps.
+        Must have contact forces and gaps.
     settings : ContactSettings
-        With the elliptic cone; the pyramid's rows are not along the tangents.
+        Must have the elliptic cone; the pyramid's rows are not along the tangents.
     weights : tuple of float
         MuJoCo's inverse weight of each wheel's body, ``body_invweight0`` [1/kg].
 
@@ -111,7 +111,7 @@ def settled_slip(
 
 
 def _tangents(bicycle: Bicycle, q: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Lateral and forward directions at both contacts, shape (n, 2, 2, 3)."""
+    """Return the lateral and forward directions at both contacts, shape (n, 2, 2, 3)."""
     c = constants(bicycle)
     return np.array(
         [

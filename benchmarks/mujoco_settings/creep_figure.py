@@ -1,4 +1,4 @@
-"""Figure of a study of soft contacts: how much wheels creep, why, and what less of it costs."""
+"""Figure of a study of soft contacts: how much wheels creep, why, and the cost of reducing it."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from velodrome.reports.figures.style import FAMILY_COLOURS, GREY, INK, new_figur
 from .advice import beats, cost, label, rode
 
 Row = Mapping[str, Any]
-_DARKER = 0.72  # the engines' colours are made for a dark ground
+_DARKER = 0.72  # the engines' colours are chosen for a dark background
 _GROUNDS = "os^D"
 _HUES = tuple(FAMILY_COLOURS.values())
-_WITHIN = 5.0  # the band in which the law counts as met [%]
+_WITHIN = 5.0  # half width of the band in which the law counts as met [%]
 
 
 def creep_figure(path: Path, document: Mapping[str, Any]) -> None:
@@ -28,10 +28,10 @@ def creep_figure(path: Path, document: Mapping[str, Any]) -> None:
     Parameters
     ----------
     path : Path
-        Its ending gives the format.
+        Path of the file; its ending gives the format.
     document : mapping
-        ``creep``: for each ground the rows of the creep law; ``energy``: rows of integrator, step and gain;
-        ``settings``: for each ground the choices, of which the first ground's are drawn.
+        ``creep``: rows of the creep law by ground; ``energy``: rows of integrator, step and gain;
+        ``settings``: choices by ground, of which those of the first ground are drawn.
     """
     with use_style():
         figure = new_figure(6.2)
@@ -46,20 +46,20 @@ def creep_figure(path: Path, document: Mapping[str, Any]) -> None:
         write_figure(path, figure)
 
 
-def _title(ax: Axes, text: str) -> None:
+def _set_title(ax: Axes, text: str) -> None:
     ax.set_title(text, loc="left", fontweight="bold")
 
 
-def _hard(rows: Sequence[Row]) -> list[Row]:
-    """Rows of the hardest friction, by rate, one a rate."""
+def _hardest_friction(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows with the hardest friction, one for each rate."""
     hardest = max(row["impratio"] for row in rows)
     return list({row["damping"]: row for row in rows if row["impratio"] == hardest}.values())
 
 
 def _draw_creep(ax: Axes, grounds: Mapping[str, Sequence[Row]]) -> None:
-    """Slip over the contacts' rate, both wheels' mean, and the law."""
+    """Draw the slip over the contacts' rate, the mean of both wheels, and the law."""
     for n, (name, rows) in enumerate(grounds.items()):
-        chosen = sorted(_hard(rows), key=lambda row: row["damping"])
+        chosen = sorted(_hardest_friction(rows), key=lambda row: row["damping"])
         rate = np.array([row["damping"] for row in chosen])
         slip, law = (1e3 * np.array([np.mean(row[key]) for row in chosen]) for key in ("slip", "law"))
         if n == 0:
@@ -67,16 +67,16 @@ def _draw_creep(ax: Axes, grounds: Mapping[str, Sequence[Row]]) -> None:
             for row, x, y in zip(chosen, rate, law, strict=True):
                 text = f"{1e3 * row['time_constant']:g} ms"
                 ax.annotate(text, (x, y), xytext=(5, 3), textcoords="offset points", color=GREY, fontsize=6.5)
-        size = 6 - 2.5 * n  # one inside the other where they agree
+        size = 6 - 2.5 * n  # markers that agree are drawn one inside the other
         ax.plot(rate, slip, ls="none", marker=_GROUNDS[n], ms=size, mfc="none", mew=1.2, color=_HUES[n], label=name)
     ax.margins(x=0.2)
     ax.set(xscale="log", yscale="log", xlabel="rate b of the contacts [1/s]", ylabel="slip [mm/s]")
     ax.legend(loc="lower left", title="grey: time constant (solref)", alignment="left", title_fontsize=7)
-    _title(ax, "Wheels creep, in proportion to 1 / b")
+    _set_title(ax, "Wheels creep, in proportion to 1 / b")
 
 
 def _draw_deviation(ax: Axes, grounds: Mapping[str, Sequence[Row]]) -> None:
-    """Measured slip over the law, and over the law with softness and sinking."""
+    """Draw the measured slip over the law, and over the law with softness and sinking."""
     for n, rows in enumerate(grounds.values()):
         rate = [row["damping"] for row in rows for _ in range(2)]
         plain, whole = (
@@ -88,16 +88,16 @@ def _draw_deviation(ax: Axes, grounds: Mapping[str, Sequence[Row]]) -> None:
         ax.plot(rate, plain, ms=4, mfc="none", mew=1, color=GREY, label=names[0], **look)
         ax.plot(rate, whole, ms=2.5, color=_HUES[2], label=names[1], **look)
     ax.axhspan(-_WITHIN, _WITHIN, color=_HUES[2], alpha=0.12, lw=0)
-    _name_softness(ax, next(iter(grounds.values())))
+    _label_softness(ax, next(iter(grounds.values())))
     low, high = ax.get_ylim()
     ax.set_ylim(low, high + 0.2 * (high - low))  # room for the legend
     ax.set(xscale="log", xlabel="rate b of the contacts [1/s]", ylabel="measured / law − 1 [%]")
     ax.legend(loc="upper left", ncols=2, columnspacing=1.0, handletextpad=0.2)
-    _title(ax, "Softness and sinking explain the rest")
+    _set_title(ax, "Softness and sinking explain the rest")
 
 
-def _name_softness(ax: Axes, rows: Sequence[Row]) -> None:
-    """Name each impratio below its last points: wheel by wheel where the law alone is not met."""
+def _label_softness(ax: Axes, rows: Sequence[Row]) -> None:
+    """Label each impratio below its last points, separately for each wheel where the law alone is not met."""
     last = max(row["damping"] for row in rows)
     for row in {row["impratio"]: row for row in rows if row["damping"] == last}.values():
         high = {
@@ -114,7 +114,7 @@ def _name_softness(ax: Axes, rows: Sequence[Row]) -> None:
 
 
 def _draw_energy(ax: Axes, rows: Sequence[Row]) -> None:
-    """Energy that integrators add, over the step."""
+    """Draw the energy that integrators add, over the step."""
     names = list(dict.fromkeys(row["integrator"] for row in rows))
     steps = sorted({1e3 * row["step"] for row in rows})
     first_order = []
@@ -132,11 +132,11 @@ def _draw_energy(ax: Axes, rows: Sequence[Row]) -> None:
     ax.set_xticks(steps, [f"{step:g}" for step in steps])
     ax.minorticks_off()
     ax.legend(loc="center left")
-    _title(ax, "One-step integrators add energy")
+    _set_title(ax, "One-step integrators add energy")
 
 
 def _draw_price(ax: Axes, rows: Sequence[Row], ground: str) -> None:
-    """Slip over CPU time; choices that nothing beats are full and named."""
+    """Draw the slip over CPU time; choices that no other choice beats are full and labelled."""
     shades = assign_colours(dict.fromkeys(row["engine"] for row in rows))
     labels = []
     for engine in shades:
@@ -156,5 +156,5 @@ def _draw_price(ax: Axes, rows: Sequence[Row], ground: str) -> None:
     ax.legend(
         loc="lower left", bbox_to_anchor=(0, 0.1), title=title, alignment="left", title_fontsize=7, handletextpad=0.2
     )
-    _title(ax, f"What less slip costs, on {ground}")
+    _set_title(ax, f"What less slip costs, on {ground}")
     place_labels(ax, labels)

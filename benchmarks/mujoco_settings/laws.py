@@ -1,4 +1,4 @@
-"""Two laws behind what MuJoCo's settings do, measured: creep over the contacts' rate, energy over the step."""
+"""Measurements of two laws behind MuJoCo's settings: creep over the contacts' rate, energy over the step."""
 
 # MuJoCo's compiled bindings carry no types.
 # pyright: reportAttributeAccessIssue=false
@@ -27,21 +27,21 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class CreepRow:
-    """The law of creep at one setting; of pairs the rear wheel comes first.
+    """The law of creep at one setting; in pairs the rear wheel comes first.
 
     Attributes
     ----------
     damping : float
         b [1/s].
     time_constant, step : float
-        Of the contacts, and of the integration [s].
+        Time constant of the contacts, and step of the integration [s].
     impratio : float
     speed, radius : float
-        Of D [m/s, m].
+        Speed and circle of D [m/s, m].
     slip, law, whole_law : tuple of float
-        Mean size of the slip: measured, J' q' / b, and with softness and sinking [m/s].
+        Mean magnitude of the slip: measured, J' q' / b, and with softness and sinking [m/s].
     worst, whole_worst : tuple of float
-        Largest relative deviation of a sample's size from J' q' / b and from the whole law.
+        Largest relative deviation of a sample from J' q' / b and from the whole law.
     """
 
     damping: float
@@ -59,15 +59,15 @@ class CreepRow:
 
 @dataclass(frozen=True)
 class EnergyRow:
-    """What an integrator does to the energy of wheels that hardly slip.
+    """The energy that an integrator adds to wheels that hardly slip.
 
     Attributes
     ----------
     integrator : str
     step : float
-        [s]
+        [s].
     gain : float
-        Rate of the total energy less the power of the contact forces on what slip is left [W].
+        Rate of the total energy minus the power of the contact forces on the remaining slip [W].
     """
 
     integrator: str
@@ -76,12 +76,12 @@ class EnergyRow:
 
 
 def creep_row(problem: Problem, settings: NativeSettings) -> CreepRow:
-    """Hold the slip of the native model against its law on a circular motion.
+    """Compare the slip of the native model with its law on a circular motion.
 
     Raises
     ------
     EngineError
-        If it fell before its contacts had settled.
+        If the bicycle fell before its contacts had settled.
     """
     trajectory = ride_engine(native.ENGINE, problem, settings, lambda _: None)
     settled = is_settled(trajectory, settings)
@@ -99,15 +99,15 @@ def creep_row(problem: Problem, settings: NativeSettings) -> CreepRow:
         impratio=settings.impratio,
         speed=float(np.hypot(*problem.qd[:2])),
         radius=float(np.hypot(*problem.q[:2])),
-        slip=_pair(slip.mean(axis=0)),
-        law=_pair(law.mean(axis=0)),
-        whole_law=_pair(whole.mean(axis=0)),
-        worst=_pair(np.abs(slip / law - 1).max(axis=0)),
-        whole_worst=_pair(np.abs(slip / whole - 1).max(axis=0)),
+        slip=_as_pair(slip.mean(axis=0)),
+        law=_as_pair(law.mean(axis=0)),
+        whole_law=_as_pair(whole.mean(axis=0)),
+        worst=_as_pair(np.abs(slip / law - 1).max(axis=0)),
+        whole_worst=_as_pair(np.abs(slip / whole - 1).max(axis=0)),
     )
 
 
-def _pair(values: np.ndarray) -> Pair:
+def _as_pair(values: np.ndarray) -> Pair:
     return float(values[0]), float(values[1])
 
 
@@ -118,19 +118,19 @@ def creep_study(
     impratio: float = 100.0,
     shares: Sequence[int] = (2, 4),
 ) -> list[CreepRow]:
-    """The law of creep over time constants on several motions.
+    """Compare the slip with the law of creep over time constants, on several motions.
 
     Parameters
     ----------
     problems : sequence of Problem
         Circular motions, sampled every ``interval``.
     time_constants : sequence of float
-        Of the contacts (solref) [s].
+        Time constants of the contacts (solref) [s].
     interval : float
         Each step divides it [s].
     impratio : float
     shares : sequence of int
-        Steps in a time constant, at least 2; no step exceeds 4 ms over its share.
+        Numbers of steps in a time constant, at least 2; no step exceeds 4 ms divided by them.
     """
     rows = []
     for problem in problems:
@@ -157,5 +157,5 @@ def energy_row(problem: Problem, integrator: Integrator, step: float) -> EnergyR
 def energy_study(
     problem: Problem, steps: Sequence[float], integrators: Sequence[Integrator] = INTEGRATORS
 ) -> list[EnergyRow]:
-    """The energy that integrators add, over steps that divide the problem's interval."""
+    """Measure the energy that integrators add, over steps that divide the problem's interval."""
     return [energy_row(problem, integrator, step) for integrator in integrators for step in steps]

@@ -1,8 +1,8 @@
-"""What MuJoCo's settings do to a wheel that should roll: rows of a table, one a choice of a user.
+"""The effect of MuJoCo's settings on a wheel that should roll: a table with one choice of settings in a row.
 
-`settings_study` varies one setting at a time and shows what creeps, what the energy does and what a step
-costs; `drift_study` rides for long and gives the drift of radius, energy and wheel rate with their
-confidence. Both only compute; the laws behind them are measured in `laws`.
+`settings_study` varies one setting at a time and measures creep, energy and the cost of a step; `drift_study`
+simulates long rides and measures the drift of radius, energy and wheel rate with confidence intervals. Both only
+compute; the laws behind them are measured in `laws`.
 """
 
 # MuJoCo's compiled bindings carry no types.
@@ -34,13 +34,13 @@ from .creep import contact_acceleration
 
 LADDER: tuple[MujocoEngine[Any], ...] = (default.ENGINE, native.ENGINE, exact_contact.ENGINE, multipliers.ENGINE)
 NEEDS = {exact_contact.ENGINE.name: 1, multipliers.ENGINE.name: 2}
-# A contact's slip settles at the rate b; after five time constants 1 % of the start's is left.
+# The slip of a contact settles at the rate b; after five time constants 1 % of the initial slip is left.
 SETTLING = 5.0
 CONFIDENCE = 0.95
 _BLOCKS = 10
 _REPEATS = 3
 
-# (engine, settings that differ from its own defaults): what a user would try, from MuJoCo's defaults on.
+# (engine, settings that differ from its own defaults): what a user would try, beginning with MuJoCo's defaults.
 CHOICES: tuple[tuple[MujocoEngine[Any], dict[str, Any]], ...] = (
     (default.ENGINE, {}),
     (default.ENGINE, {"friction": 2.0}),
@@ -73,7 +73,7 @@ class Rate:
     value : float
         Mean slope, in the quantity's unit per second.
     half_width : float
-        Half the width of its confidence interval, of probability `CONFIDENCE`.
+        Half the width of the confidence interval of probability `CONFIDENCE`.
     """
 
     value: float
@@ -82,7 +82,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class Row:
-    """One choice of settings, ridden.
+    """Measurements of one choice of settings.
 
     Attributes
     ----------
@@ -90,17 +90,17 @@ class Row:
     changed : dict
         Settings that differ from the engine's own.
     slip : float
-        Mean slip of both wheels once settled [m/s].
+        Mean slip of both wheels after settling [m/s].
     law : float or None
-        Slip by the law, J' q' / b; None for a model without its contacts.
+        Slip by the law, J' q' / b; None for a model without MuJoCo's contacts.
     energy_rate, radius_rate : Rate or None
         Drift of the total energy [W] and of the distance of D from the axis [m/s]; None where it fell at once.
     slip_power : float
         Mean power of the contact forces on the slipping wheels [W].
     step, step_cost : float
-        Time step, and process CPU time of one [s].
+        Time step, and process CPU time of one step [s].
     ridden, asked : float
-        Time ridden until a wheel had no ground left or the bicycle had left its circle, and time asked for [s].
+        Time ridden until a wheel had no ground left or the bicycle had left its circle, and requested time [s].
     needs : int
         What a user needs: 0 MuJoCo alone, 1 also the exact contacts, 2 also solved forces instead of contacts.
     """
@@ -121,7 +121,7 @@ class Row:
 
 @dataclass(frozen=True)
 class DriftRow:
-    """Drifts of a long ride: against the circle it started on, per second."""
+    """Drifts of a long ride from the circle it started on, per second."""
 
     engine: str
     settings: dict[str, Any]
@@ -134,15 +134,15 @@ class DriftRow:
 
 
 def drift_rate(time: np.ndarray, values: np.ndarray, blocks: int = _BLOCKS) -> Rate:
-    """Slope of a series with its confidence.
+    """Compute the slope of a series with its confidence interval.
 
     The slopes of equal parts are taken as independent measurements, so oscillations and changes of the
-    drift itself count as uncertainty; a line fit through all samples would call them none.
+    drift itself contribute to the uncertainty; a line fitted to all samples would ignore them.
 
     Parameters
     ----------
     time, values : ndarray, shape (n,)
-        At least three samples a block.
+        At least three samples per block.
     blocks : int
     """
     slopes = [
@@ -154,7 +154,7 @@ def drift_rate(time: np.ndarray, values: np.ndarray, blocks: int = _BLOCKS) -> R
 
 
 def slip_power(problem: Problem, trajectory: Trajectory) -> np.ndarray:
-    """Power of the contact forces on the slipping wheels, sample by sample, shape (n,) [W]."""
+    """Compute the power of the contact forces on the slipping wheels for each sample, shape (n,) [W]."""
     seen = observe(problem.bicycle, problem.surface, trajectory.q, trajectory.qd)
     power, c = np.zeros(len(trajectory.time)), constants(problem.bicycle)
     assert trajectory.contact_force is not None
@@ -166,53 +166,53 @@ def slip_power(problem: Problem, trajectory: Trajectory) -> np.ndarray:
 
 
 def plain_step_cost(problem: Problem, integrator: str, step: float = 0.002, steps: int = 5000) -> float:
-    """Process CPU time of MuJoCo's own step of the same tree, without ground and callbacks [s]."""
+    """Measure the process CPU time of MuJoCo's own step of the same tree, without ground and callbacks [s]."""
     settings = MultiplierSettings.model_validate({"integrator": integrator, "step": step})
     model, data = set_start(problem, settings, "nothing")
     mujoco.mj_step(model, data, 100)
-    begun = process_time()
+    start = process_time()
     mujoco.mj_step(model, data, steps)
-    return (process_time() - begun) / steps
+    return (process_time() - start) / steps
 
 
-def _quiet(_: float) -> None:
+def _ignore_progress(_: float) -> None:
     pass
 
 
 def is_settled(trajectory: Trajectory, settings: StepSettings) -> np.ndarray:
-    """Which samples come after the contacts' own transient, shape (n,)."""
+    """Return which samples come after the contacts' own transient, shape (n,)."""
     rate = settings.damping if isinstance(settings, ContactSettings) else 2 * getattr(settings, "stabilisation", 20.0)
     return trajectory.time > SETTLING / rate
 
 
-def _on_circle(trajectory: Trajectory) -> Trajectory:
-    """The part before the bicycle is half a radius off its circle, or leans half a radian otherwise."""
+def _cut_to_circle(trajectory: Trajectory) -> Trajectory:
+    """Return the part before the bicycle is half a radius off its circle, or its lean has changed by 0.5 rad."""
     radius = np.hypot(trajectory.q[:, 0], trajectory.q[:, 1])
     off = (np.abs(radius - radius[0]) > 0.5 * radius[0]) | (np.abs(trajectory.q[:, 4] - trajectory.q[0, 4]) > 0.5)
     return trajectory.first(int(np.argmax(off))) if off.any() else trajectory
 
 
-def _quickest(engine: MujocoEngine[Any], problem: Problem, settings: StepSettings) -> tuple[Trajectory, float]:
-    """The ride, and the least CPU time of a step [s] over `_REPEATS` rides: what the machine does else only adds."""
-    rides = [ride_engine(engine, problem, settings, _quiet) for _ in range(_REPEATS)]
-    return rides[0], min(one.cpu_time / one.steps for one in rides)
+def _time_rides(engine: MujocoEngine[Any], problem: Problem, settings: StepSettings) -> tuple[Trajectory, float]:
+    """Return the ride and the smallest CPU time of a step [s] over `_REPEATS` rides; other load only adds to it."""
+    rides = [ride_engine(engine, problem, settings, _ignore_progress) for _ in range(_REPEATS)]
+    return rides[0], min(ride.cpu_time / ride.steps for ride in rides)
 
 
 def ride_row(engine: MujocoEngine[Any], changed: dict[str, Any], problem: Problem) -> Row:
-    """Ride one choice of settings on a circular motion and measure it.
+    """Simulate one choice of settings on a circular motion and measure it.
 
     Raises
     ------
     EngineError
-        If not one settled sample was ridden.
+        If there is no settled sample.
     """
     settings = engine.settings(**changed)
-    whole, step_cost = _quickest(engine, problem, settings)
-    part = _on_circle(whole)
+    whole, step_cost = _time_rides(engine, problem, settings)
+    part = _cut_to_circle(whole)
     settled = is_settled(part, settings)
     seen = observe(problem.bicycle, problem.surface, part.q, part.qd)
     sizes = np.linalg.norm(seen.slip, axis=2)
-    # One that falls before it settles still has slipped.
+    # A ride that falls before it settles is measured in its second half.
     chosen = settled if settled.sum() > 1 else part.time >= part.time[-1] / 2
     law = None
     if isinstance(settings, ContactSettings) and engine is not exact_contact.ENGINE:
@@ -244,7 +244,7 @@ def settings_study(
     choices: Iterable[tuple[MujocoEngine[Any], dict[str, Any]]] = CHOICES,
     progress: Callable[[str], None] = lambda _: None,
 ) -> list[Row]:
-    """Ride a circular motion with each choice of settings.
+    """Simulate a circular motion with each choice of settings.
 
     Parameters
     ----------
@@ -266,10 +266,10 @@ def settings_study(
 
 
 def drift_row(engine: MujocoEngine[Any], changed: dict[str, Any], problem: Problem) -> DriftRow:
-    """Ride a circular motion for long; drifts are measured while it is still on its circle."""
+    """Simulate a circular motion for long and measure drifts while it is still on its circle."""
     settings = engine.settings(**changed)
-    whole = ride_engine(engine, problem, settings, _quiet)
-    part = _on_circle(whole)
+    whole = ride_engine(engine, problem, settings, _ignore_progress)
+    part = _cut_to_circle(whole)
     chosen = is_settled(part, settings)
     if chosen.sum() < 3 * _BLOCKS:
         chosen = np.ones(len(part.time), bool)
@@ -292,12 +292,12 @@ def drift_row(engine: MujocoEngine[Any], changed: dict[str, Any], problem: Probl
 def drift_study(
     problem: Problem, engines: Sequence[MujocoEngine[Any]] = LADDER, progress: Callable[[str], None] = lambda _: None
 ) -> list[DriftRow]:
-    """Ride a circular motion with every model of the ladder at its own settings.
+    """Simulate a circular motion with every model of the ladder at its own settings.
 
     Parameters
     ----------
     problem : Problem
-        Its times say how long.
+        Its times give the duration.
     engines : sequence of MujocoEngine
     progress : callable
         Called with the name of each engine before it runs.

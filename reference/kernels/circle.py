@@ -2,17 +2,17 @@
 
 Unknowns: x, y, z, lean, pitch, steer | sigma / 400 | rim angles of the rear and the front wheel. In the
 heading frame, at yaw 0 and per unit of yaw rate, a wheel's lowest rim point P = D + rho moves with
-z x P, and its material is at rest there if
+z x P, and its material point is at rest there if
 
     rim point       P lies on the surface,  P_z = f(P_x, P_y),  and  t . N = 0
     no side slip    (z x P) . (N x t) = 0
     rolling         spin = -(z x P) . t / r
 
-The spins of both wheels, b and c for unit yaw rate, follow, and with sigma = w^2 (1 + b^2 + c^2) the
-square of the yaw rate w. With rates constant a_D = -w^2 (x, y, 0), and `reduction` gives the accelerations
-that the bicycle takes on from there; they must be zero. They are always square to the motion itself, in the
+This gives the spins b and c of both wheels for unit yaw rate, and with sigma = w^2 (1 + b^2 + c^2) the
+square of the yaw rate w. At constant rates a_D = -w^2 (x, y, 0), and `reduction` gives the accelerations
+of the bicycle beyond those; they must be zero. They are always orthogonal to the motion itself, in the
 mass matrix's metric, since gravity, inertia and contact forces of a steady turn do no work in it. So two of
-the three free ones, lean'' and steer'', are enough:
+the three independent ones, lean'' and steer'', are enough:
 
     rows            rim point (2), (2) | no side slip (2) | lean'', steer''
 
@@ -32,13 +32,13 @@ from .reduction import build, front_force, solve
 from .vector import add, combine, cross, dot, scale, subtract
 
 COORDINATES, ROWS = 9, 8
-SIGMA_UNIT = 400.0  # (20 rad/s)^2: keeps the unknown of the size of the others
+SIGMA_UNIT = 400.0  # (20 rad/s)^2: makes the unknown of the same order as the others
 STEP = 1e-30  # complex step: the derivative is exact to round-off
-FULL = 22  # of `steady`
+FULL = 22  # number of unknowns of `steady`
 
 
 class RimPoint(NamedTuple):
-    """A wheel's lowest rim point over the surface; both differences are zero where it touches."""
+    """A wheel's lowest rim point over the surface; height and dip are zero where it touches."""
 
     height: Any  # of the point above the surface
     dip: Any  # t . N
@@ -48,7 +48,7 @@ class RimPoint(NamedTuple):
 
 
 class Rolling(NamedTuple):
-    """A wheel in a turn of unit yaw rate."""
+    """A rolling wheel in a turn of unit yaw rate."""
 
     point: RimPoint
     slip: Any  # sideways, times |N|
@@ -56,7 +56,7 @@ class Rolling(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """What the rows and the contact forces are made of."""
+    """Quantities from which the rows and the contact forces are computed."""
 
     here: Any
     rear: Any
@@ -68,7 +68,7 @@ class Turn(NamedTuple):
 
 @jit_inline
 def rim_point(here, wheel, x, y, z, function, parameters):
-    """`RimPoint` of a wheel of a `Pose` with D at (x, y, z)."""
+    """Return the `RimPoint` of a wheel of a `Pose` with D at (x, y, z)."""
     rho = to_inertial(here, wheel.rho)
     xi, eta = x + rho[0], y + rho[1]
     f, fx, fy, _, _, _ = function(xi, eta, parameters)
@@ -77,7 +77,7 @@ def rim_point(here, wheel, x, y, z, function, parameters):
 
 
 @jit_inline
-def _roll(here, wheel, x, y, z, function, parameters):
+def _roll_wheel(here, wheel, x, y, z, function, parameters):
     point = rim_point(here, wheel, x, y, z, function, parameters)
     velocity = to_aligned(here, -point.eta, point.xi, 0 * point.xi)
     slip = dot(velocity, cross(point.normal, wheel.t))
@@ -85,11 +85,11 @@ def _roll(here, wheel, x, y, z, function, parameters):
 
 
 @jit_inline
-def _turn(u, function, parameters, a):
+def _build_turn(u, function, parameters, a):
     """Set up a turn from the unknowns ``u`` (9,); ``a`` the `Aligned` constants."""
     here = pose(0 * u[3], u[3], u[4], u[5], u[7], u[8], a)
-    rear = _roll(here, here.rear, u[0], u[1], u[2], function, parameters)
-    front = _roll(here, here.front, u[0], u[1], u[2], function, parameters)
+    rear = _roll_wheel(here, here.rear, u[0], u[1], u[2], function, parameters)
+    front = _roll_wheel(here, here.front, u[0], u[1], u[2], function, parameters)
     size = 1 + rear.spin * rear.spin + front.spin * front.spin
     square = SIGMA_UNIT * u[6] / size
 
@@ -97,7 +97,7 @@ def _turn(u, function, parameters, a):
     roll = combine(1.0, cross(w, here.rear.rho), here.rear.radius * rear.spin, here.rear.t)
     roll2 = combine(1.0, cross(w, here.front.rho), here.front.radius * front.spin, here.front.t)
     beta = scale(square, cross(w, roll))
-    # Weight and the frame's acceleration -beta act alike.
+    # Weight and the frame's acceleration -beta act in the same way.
     fall = combine(a.gravity, w, -1.0, beta)
     force = combine(square, cross(w, cross(w, add(s1, s2))), a.mass, fall)
     spun, spun2 = times(here.i1, w), combine(1.0, times(here.i2, w), a.spin_front * front.spin, here.left)
@@ -112,7 +112,7 @@ def _turn(u, function, parameters, a):
 @jit
 def circle_residual(u, function, parameters, a, out):
     """Fill ``out`` (8,) from the unknowns ``u`` (9,); ``a`` the `Aligned` constants."""
-    turn = _turn(u, function, parameters, a)
+    turn = _build_turn(u, function, parameters, a)
     alpha, steer, _, _ = solve(turn.system)
     out[0], out[1] = turn.rear.point.height, turn.rear.point.dip
     out[2], out[3] = turn.front.point.height, turn.front.point.dip
@@ -135,7 +135,7 @@ def circle_jacobian(u, function, parameters, a, out):
 @jit
 def unfold(u, function, parameters, a, out):
     """Fill ``out`` (22,), all unknowns of `steady`, from a solution ``u`` (9,); the yaw rate is taken positive."""
-    turn = _turn(u, function, parameters, a)
+    turn = _build_turn(u, function, parameters, a)
     zero = 0 * u[0]
     rest = (zero, zero, zero)
     on_front = front_force(turn.system, rest, zero, zero, zero)

@@ -1,9 +1,9 @@
 """Compilation of kernels by numba, with compiled code cached on disk.
 
 numba renews a cached function when the function's own file changes, but not when a kernel that it calls from
-another file does. The folder of the cache therefore carries a fingerprint of all kernels: a changed kernel starts
-a new folder, and so does another version of numba. The folder holds for the functions compiled here alone;
-numba's settings are those of the user's process again after each of them.
+another file does. The name of the cache folder therefore contains a fingerprint of all kernels: a changed kernel
+starts a new folder, and so does another version of numba. The folder is used only for the functions compiled here;
+numba's settings are restored to those of the user's process after each of them.
 """
 
 # numba fills its configuration in at run time.
@@ -35,7 +35,7 @@ def jit(function: Callable[..., Any]) -> Any:
 def jit_inline(function: Callable[..., Any]) -> Any:
     """Compile a kernel as `jit` does, and always inline it.
 
-    For the parts of one function that have names for the reader's sake: a call that passes a dozen tuples through
+    For parts of one function that are separate only for readability: a call that passes a dozen tuples through
     memory costs as much as the arithmetic in it (measured: a quarter of the right-hand side).
     """
     with _cache_folder_set():
@@ -64,7 +64,7 @@ def compile_callback(signature: Any, cache: bool = True, **options: Any) -> Call
 
 @contextmanager
 def _cache_folder_set() -> Iterator[None]:
-    # numba reads the setting when a function is decorated, never afterwards.
+    """Set numba's cache folder; numba reads the setting only when a function is decorated."""
     with _lock:
         before = config.CACHE_DIR
         config.CACHE_DIR = _cache_folder(before)

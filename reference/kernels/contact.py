@@ -1,4 +1,4 @@
-"""Contact of a knife edge with a surface (Xiong et al. 2020, Eqs. 1-5), closest approach.
+"""Contact of a knife edge with a surface (Xiong et al. 2020, Eqs. 1-5), as the point of closest approach.
 
 A wheel of centre c, in-plane axes x, z and radius r has the rim point w = c + r e(a); the surface has
 the point u = (xi, eta, f(xi, eta)), tangents g1 = (1, 0, fx), g2 = (0, 1, fy) and N = (-fx, -fy, 1).
@@ -23,7 +23,7 @@ class Contact(NamedTuple):
     """A wheel and the surface at given contact parameters (real or complex numbers, vectors as tuples)."""
 
     residual: Any  # of the three contact equations
-    jacobian: Any  # of them in (xi, eta, angle), rows
+    jacobian: Any  # of the residual with respect to (xi, eta, angle), by rows
     gap: Any
     normal: Any  # unit
     arm: Any  # d = r e, from the wheel's centre to the rim point
@@ -31,13 +31,13 @@ class Contact(NamedTuple):
     tangent: Any  # t
     g1: Any
     g2: Any
-    across: Any  # N, the normal without its length
+    across: Any  # N, the normal that is not normalised
     hessian: Any  # (fxx, fxy, fyy)
 
 
 @jit
 def equations(centre, x, z, radius, xi, eta, angle, function, parameters):
-    """Evaluate the contact equations of a wheel at its contact parameters; returns a `Contact`."""
+    """Evaluate the contact equations of a wheel at its contact parameters; return a `Contact`."""
     f, fx, fy, fxx, fxy, fyy = function(xi, eta, parameters)
     e, t = rim(angle, x, z)
     d = (radius * e[0], radius * e[1], radius * e[2])
@@ -57,17 +57,17 @@ def equations(centre, x, z, radius, xi, eta, angle, function, parameters):
 
 @jit
 def search(centre, x, z, radius, xi, eta, angle, function, parameters):
-    """Newton's method on the contact equations from a guess; returns (xi, eta, angle, converged)."""
+    """Solve the contact equations by Newton's method from a guess; return (xi, eta, angle, converged)."""
     for _ in range(50):
         here = equations(centre, x, z, radius, xi, eta, angle, function, parameters)
         step = solve_three(here.jacobian, here.residual)
-        # Far from the contact a full step may wind around the rim: half a radian is the most.
+        # Far from the contact a full step may wind around the rim, so a step is limited to half a radian.
         worst = max(abs(step[0]), abs(step[1]), radius * abs(step[2]))
         limit = 0.5 * radius
         damping = 1.0 if worst <= limit else limit / worst
         xi, eta, angle = xi - damping * step[0], eta - damping * step[1], angle - damping * step[2]
-        # Convergence is quadratic: after a step of 1e-9 the error is at round-off, one more
-        # evaluation would only cost.
+        # Convergence is quadratic: after a step of 1e-9 the error is at round-off, and one more
+        # evaluation would bring nothing.
         if worst < 1e-9:
             return xi, eta, angle, True
     return xi, eta, angle, False
@@ -75,10 +75,10 @@ def search(centre, x, z, radius, xi, eta, angle, function, parameters):
 
 @jit
 def first_guess(centre, x, z, radius, function, parameters):
-    """Guess of (xi, eta, angle): the rim point that lies deepest along the normal below the centre."""
+    """Guess (xi, eta, angle): the rim point that lies deepest along the normal below the centre."""
     _, fx, fy, _, _, _ = function(centre[0], centre[1], parameters)
     n = (-fx, -fy, 1 + 0 * fx)
-    # e = -sin(a) x - cos(a) z is deepest where it points against the normal's part in the wheel's plane.
+    # e = -sin(a) x - cos(a) z is deepest where it is opposite to the normal's part in the wheel's plane.
     angle = np.arctan2(dot(n, x).real, dot(n, z).real) + 0 * fx
     e, _ = rim(angle, x, z)
     return centre[0] + radius * e[0], centre[1] + radius * e[1], angle
@@ -86,9 +86,9 @@ def first_guess(centre, x, z, radius, function, parameters):
 
 @jit
 def rates(here, velocity, w):
-    """Rates of (xi, eta, angle) on a `Contact`: jacobian rates = -(what the frame's motion adds).
+    """Compute the rates of (xi, eta, angle) on a `Contact`: jacobian rates = -(terms of the frame's motion).
 
-    ``velocity`` is that of the rim point as fixed in the frame, ``w`` the frame's angular velocity.
+    ``velocity`` is that of the rim point fixed in the frame, ``w`` the frame's angular velocity.
     """
     turn = dot(cross(w, here.tangent), here.across)
     step = solve_three(here.jacobian, (dot(velocity, here.g1), dot(velocity, here.g2), turn))
@@ -97,7 +97,7 @@ def rates(here, velocity, w):
 
 @jit
 def tangents(axle, normal):
-    """Unit vectors (lateral, forward) of the contact frame: forward = axle x normal, lateral = normal x forward."""
+    """Return unit vectors (lateral, forward) of a contact: forward = axle x normal, lateral = normal x forward."""
     f = cross(axle, normal)
     length = np.sqrt(dot(f, f))
     forward = (f[0] / length, f[1] / length, f[2] / length)

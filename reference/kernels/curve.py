@@ -1,16 +1,16 @@
-"""Steps along a curve of circular motions, and what a motion on it looks like.
+"""Steps along a curve of circular motions, and properties of the motions on it.
 
-With J (8, 9) the Jacobian of `circle` and n a covector that is not square to the curve, the inverse B of
+With J (8, 9) the Jacobian of `circle` and n a covector that is not orthogonal to the curve, the inverse B of
 
     [ J ]
     [ n ]
 
-holds both Newton's step in the plane n . du = 0, du = -B[:, :8] rows, and in its last column the curve's
-tangent. A step along the curve starts from the tangent's end, takes steps with the B found there until they
-are small, and one with the B of where they end, which gives the next tangent too: two Jacobians a point,
-and more where the curve bends so much that a step is not a tenth of the one before.
+contains both Newton's step in the plane n . du = 0, du = -B[:, :8] rows, and, in its last column, the curve's
+tangent. A step along the curve starts from the end of the tangent, takes steps with the B computed there until
+they are small, and one with the B of the point they lead to, which also gives the next tangent. This takes two
+Jacobians for each point, and more where the curve bends so much that a step is not a tenth of the one before.
 
-The arc's length counts all 22 unknowns of `steady`, in a metric in which those that grow without bound
+The arclength counts all 22 unknowns of `steady`, in a metric in which those that grow without bound
 count relatively.
 """
 
@@ -23,10 +23,10 @@ from .compilation import jit
 from .reduced import FRONT, REAR, VARIABLES, reduced_jacobian, telling_spin
 from .steady import running_rates, steady_energy
 
-CHOSEN = np.array([0, 1, 2, 3, 4, 5, 9, 12, 15])  # the nine among the 22
+CHOSEN = np.array([0, 1, 2, 3, 4, 5, 9, 12, 15])  # indices of the nine unknowns among the 22
 X, Y, Z, LEAN, REAR_SPEED, FRONT_SPEED, SIGMA = 0, 1, 2, 3, 7, 8, 9
 _FIRST_STEP, _SHORTEST_STEP = 0.02, 1e-6
-_MOST = 15  # iterations of a step, each of which takes a digit or two
+_MOST = 15  # largest number of iterations in a step, each of which gains a digit or two
 
 
 @jit
@@ -47,7 +47,7 @@ def metric(u, out):
 
 @jit
 def unfold_along(u, t, function, parameters, a, full, along):
-    """Fill all unknowns (22,) of a solution and their change (22,) with a change ``t`` (9,) of the nine."""
+    """Fill all unknowns (22,) of a solution and their derivatives (22,) along a change ``t`` (9,) of the nine."""
     z, out = u.astype(np.complex128), np.empty(FULL, np.complex128)
     for i in range(COORDINATES):
         z[i] = complex(u[i], STEP * t[i])
@@ -58,9 +58,9 @@ def unfold_along(u, t, function, parameters, a, full, along):
 
 @jit
 def expanded(u, function, parameters, a, rows, jacobian, full, basis):
-    """Fill all that Newton's method on ``u`` (9,) under any condition needs.
+    """Fill all that Newton's method on ``u`` (9,) needs under any condition.
 
-    rows (8,) and their jacobian (8, 9); all unknowns, full (22,), and their Jacobian in the nine, basis (22, 9).
+    rows (8,) and their jacobian (8, 9); all unknowns, full (22,), and their derivatives in the nine, basis (22, 9).
     """
     z, r, out = u.astype(np.complex128), np.empty(ROWS, np.complex128), np.empty(FULL, np.complex128)
     for j in range(COORDINATES):
@@ -76,7 +76,7 @@ def expanded(u, function, parameters, a, rows, jacobian, full, basis):
 
 @jit
 def _invert(a, n):
-    """Overwrite ``a`` (n, n) with its inverse by Gauss and Jordan's elimination; return its determinant's sign."""
+    """Overwrite ``a`` (n, n) with its inverse by Gauss-Jordan elimination; return its determinant's sign."""
     order, sign = np.arange(n), 1.0
     for k in range(n):
         p = k
@@ -108,8 +108,8 @@ def _invert(a, n):
 
 
 @jit
-def _bordered(u, covector, function, parameters, a, inverse):
-    """Fill the inverse (9, 9) of the Jacobian above a covector; return the determinant's sign."""
+def _invert_bordered(u, covector, function, parameters, a, inverse):
+    """Fill the inverse (9, 9) of the Jacobian bordered by a covector; return the determinant's sign."""
     circle_jacobian(u, function, parameters, a, inverse[:ROWS])
     inverse[ROWS] = covector
     return _invert(inverse, COORDINATES)
@@ -117,7 +117,7 @@ def _bordered(u, covector, function, parameters, a, inverse):
 
 @jit
 def _newton_step(u, inverse, rows):
-    """Take the step in place; return its size, relative for large unknowns."""
+    """Take a Newton step in place; return its size, relative for large unknowns."""
     size = 0.0
     for i in range(COORDINATES):
         step = 0.0
@@ -130,25 +130,25 @@ def _newton_step(u, inverse, rows):
 
 @jit
 def correct(u, covector, real, function, parameters, a, tangent):
-    """Bring ``u`` (9,) to the curve in the plane square to a covector; fill the tangent (9,) there, covector . t = 1.
+    """Move ``u`` (9,) to the curve in the plane orthogonal to a covector; fill the tangent t (9,), covector . t = 1.
 
-    ``real`` and ``function`` are the surface's for real and for complex numbers. Returns the iterations
-    it took, 0 where it failed, and the determinant's sign.
+    ``real`` and ``function`` are the surface's functions for real and for complex numbers. Returns the number of
+    iterations, 0 on failure, and the determinant's sign.
     """
     inverse, rows, before = np.empty((COORDINATES, COORDINATES)), np.empty(ROWS), 0.0
     slow = True
     for iteration in range(1, _MOST + 1):
         if slow:
-            _bordered(u, covector, function, parameters, a, inverse)
+            _invert_bordered(u, covector, function, parameters, a, inverse)
         circle_residual(u, real, parameters, a, rows)
         size = _newton_step(u, inverse, rows)
         if not size < 1.0:
             return 0, 0.0
         slow, before = iteration > 1 and size > 0.1 * before, size
         if size < 1e-9:
-            sign = _bordered(u, covector, function, parameters, a, inverse)
+            sign = _invert_bordered(u, covector, function, parameters, a, inverse)
             circle_residual(u, real, parameters, a, rows)
-            # Quadratic from here: what is left is round-off, some 1e-16 times the inverse's size.
+            # Convergence is quadratic from here: what remains is round-off, about 1e-16 times the inverse's size.
             if not _newton_step(u, inverse, rows) < 1e-8:
                 return 0, 0.0
             for i in range(COORDINATES):
@@ -174,7 +174,7 @@ def unit(u, t, function, parameters, a, full, along):
 
 @jit
 def covector_of(full, along, covector):
-    """Fill the tangent (9,) of the unknowns and their tangent, (22,) each, as a covector in the arc's metric."""
+    """Fill the covector (9,), in the arc's metric, of a tangent ``along`` (22,) at the unknowns ``full`` (22,)."""
     weights = np.empty(FULL)
     metric(full, weights)
     for i in range(COORDINATES):
@@ -183,10 +183,10 @@ def covector_of(full, along, covector):
 
 @jit
 def step(full, along, distance, real, function, parameters, a, new, new_along):
-    """One step along the arc: fill all unknowns and their unit tangent, (22,) each.
+    """Take one step along the arc: fill all unknowns and their unit tangent, (22,) each.
 
-    Returns the iterations it took, 0 where it fails, and the determinant's sign. A sharp turn means that
-    the step jumped to another branch or over a bend: it fails too.
+    Returns the number of iterations, 0 on failure, and the determinant's sign. A sharp turn means that
+    the step has jumped to another branch or over a bend: it counts as a failure too.
     """
     u, t, covector = np.empty(COORDINATES), np.empty(COORDINATES), np.empty(COORDINATES)
     covector_of(full, along, covector)
@@ -205,17 +205,17 @@ def step(full, along, distance, real, function, parameters, a, new, new_along):
 
 @jit
 def follow(distance, longest, largest, real, function, parameters, a, full, along):
-    """Follow the curve from row 0 of ``full`` and ``along`` (n, 22), the unknowns and tangents, and fill the others.
+    """Follow the curve from row 0 of ``full`` and ``along`` (n, 22), unknowns and tangents, and fill the other rows.
 
-    ``distance`` is the first step's length, ``largest`` = (lean, sigma, distance from the origin) what ends
-    the curve. Returns the number of rows filled, the next step's length, and whether the curve has ended.
+    ``distance`` is the first step's length, ``largest`` = (lean, sigma, distance from the origin) are the limits that
+    end the curve. Returns the number of rows filled, the next step's length, and whether the curve has ended.
 
-    The determinant keeps its sign on a curve, and changes it from one branch to the other where two nearly
-    touch: a step that changes it has crossed over.
+    The determinant keeps its sign along a curve and differs in sign between two branches that nearly
+    touch: a step that changes it has crossed to the other branch.
     """
     inverse, covector = np.empty((COORDINATES, COORDINATES)), np.empty(COORDINATES)
     covector_of(full[0], along[0], covector)
-    sign = _bordered(full[0][CHOSEN], covector, function, parameters, a, inverse)
+    sign = _invert_bordered(full[0][CHOSEN], covector, function, parameters, a, inverse)
     for n in range(1, len(full)):
         while True:
             iterations, new = step(
@@ -256,11 +256,11 @@ def _normal_force(full, k, real, parameters):
 
 @jit
 def sample(full, real, function, parameters, a, c, jacobians, seen):
-    """Along motions ``full`` (n, 22) fill what `reduced` and the forces say of them.
+    """Compute the properties of motions ``full`` (n, 22).
 
-    ``c`` and ``a`` are the `kinematics.Constants` and what `pose.aligned` makes of them; jacobians (n, 7, 7),
-    whose eigenvalues are the motion's; seen (n, 6), the rates of yaw and both wheels [rad/s], energy [J] and normal
-    forces of both wheels [N].
+    ``c`` and ``a`` are the `kinematics.Constants` and the result of `pose.aligned` for them. Fills jacobians (n, 7, 7),
+    whose eigenvalues are those of the motions, and seen (n, 6): the rates of yaw and both wheels [rad/s], the energy
+    [J] and the normal forces of both wheels [N].
     """
     y, field = np.empty(24), np.empty(VARIABLES)
     weight = a.mass * a.gravity

@@ -1,15 +1,15 @@
 """Mass matrix, bias forces and rolling rows of the bicycle (Xiong et al. 2020, Eqs. 6-8).
 
-With D on the steering axis every angular coordinate turns its assembly about D, so for axis a_k
+With D on the steering axis, every angular coordinate turns its assembly about D, so for axis a_k
 
     velocity of a point D + r:   v_D + sum_k rate_k a_k x r
     mass matrix:                 M[x, k] = a_k x S,   M[k, l] = a_k . I a_l   (S, I about D)
     bias:                        h[x] = b x S + w x (w x S) + m g z
                                  h[k] = a_k . (I b + w x I w + spin w x axle + S x g z)
 
-and the material velocity of both contact points, v_D + w x rho + spin_rate axle x d = 0 (three
-rows a wheel), is the four rolling constraints and the two gaps' time derivatives in one. Its own
-time derivative, J qdd + gamma = 0, needs the contact's motion along the rim, ddot = w x d + r adot t.
+The material velocity of both contact points, v_D + w x rho + spin_rate axle x d = 0 (three
+rows per wheel), combines the four rolling constraints and the time derivatives of the two gaps. Its own
+time derivative, J qdd + gamma = 0, contains the contact's motion along the rim, ddot = w x d + r adot t.
 
 The equations of motion are  M qdd + h = J^T F,  J qdd + gamma = 0,  with F the force of the ground on
 each wheel in inertial axes: the six Lagrange multipliers.
@@ -33,7 +33,7 @@ INDEPENDENT = np.array([4, 6, 7])
 
 @jit
 def inertia_times(ixx, iyy, izz, ixz, x, y, z, v):
-    """Inertia tensor with axes x, y, z applied to a vector."""
+    """Multiply an inertia tensor with axes x, y, z by a vector."""
     vx, vy, vz = dot(x, v), dot(y, v), dot(z, v)
     return add(combine(ixx * vx + ixz * vz, x, ixz * vx + izz * vz, z), scale(iyy * vy, y))
 
@@ -95,7 +95,7 @@ def mass_and_bias(q, qd, c, mass, bias):
 
 @jit
 def wheels(q, c):
-    """Both wheels as ``((centre, x, axle, z, radius), ...)``, x and z the axes of the wheel's frame."""
+    """Return both wheels as ``((centre, x, axle, z, radius), ...)``, x and z the axes of the wheel's frame."""
     _, x_r, y_r, z_r, _, x_h, y_h, z_h = frames(q[3], q[4], q[5], q[6], c)
     origin = (q[0], q[1], q[2])
     rear = add(origin, combine(c.rear_x, x_r, c.rear_z, z_r))
@@ -188,7 +188,7 @@ def accelerations(q, qd, p, function, parameters, c, qdd, force, p_rate):
 
 @jit
 def residual(q, qd, qdd, p, force, function, parameters, c, out):
-    """All 21 equations (Eq. 8), dimensionless sizes: fill ``out`` (21,).
+    """Evaluate all 21 equations (Eq. 8), scaled to order one: fill ``out`` (21,).
 
     Rows 0-8 the dynamics, divided by the weight; 9-14 the contact equations; 15-16 the gaps; 17-20
     the rolling constraints (lateral, forward of the rear, then the front wheel).
@@ -225,7 +225,7 @@ def residual(q, qd, qdd, p, force, function, parameters, c, out):
 
 @jit
 def find_contacts(q, p, function, parameters, c):
-    """Solve the contact equations at q from the guess in ``p`` (6,), in place; True where both converged."""
+    """Solve the contact equations at q from the guess in ``p`` (6,), in place; return True if both converged."""
     both = wheels(q, c)
     good = True
     for k in range(2):
@@ -250,7 +250,7 @@ def guess_contacts(q, p, function, parameters, c):
 
 @jit
 def normal_rows(q, p, function, parameters, c, jacobian, rows):
-    """Fill ``rows`` (2, 9): the gaps' gradients, normals times the velocity rows ``jacobian`` (6, 9)."""
+    """Fill ``rows`` (2, 9), the gradients of the gaps: normals times the velocity rows ``jacobian`` (6, 9)."""
     both = wheels(q, c)
     for k in range(2):
         centre, x, _, z, radius = both[k]
@@ -264,10 +264,10 @@ def normal_rows(q, p, function, parameters, c, jacobian, rows):
 
 @jit
 def settle(q, p, function, parameters, c):
-    """Bring both wheels to the ground by height and pitch alone (q and p in place); True on success.
+    """Move both wheels to the ground by height and pitch alone (q and p in place); return True on success.
 
-    Newton's method; the gap's gradient is the normal velocity row since the contact is a closest
-    approach. One iteration more than convergence asks for makes the complex step exact.
+    Newton's method; the gap's gradient is the normal velocity row, since the contact is a closest
+    approach. One iteration beyond convergence makes the complex step exact.
     """
     jacobian, rows = np.empty((6, 9), q.dtype), np.empty((2, 9), q.dtype)
     gamma, p_rate, still = np.empty(6, q.dtype), np.empty(6, q.dtype), np.zeros(9, q.dtype)
@@ -292,7 +292,7 @@ def settle(q, p, function, parameters, c):
 
 @jit
 def complete_velocity(q, qd, p, function, parameters, c):
-    """Solve the six dependent speeds from lean, steer and rear-wheel rates (qd in place)."""
+    """Solve for the six dependent speeds from the lean, steer and rear-wheel rates (qd in place)."""
     jacobian, square = np.empty((6, 9), q.dtype), np.empty((6, 6), q.dtype)
     gamma, p_rate, rhs = np.empty(6, q.dtype), np.empty(6, q.dtype), np.empty(6, q.dtype)
     rolling(q, qd, p, function, parameters, c, jacobian, gamma, p_rate)
@@ -309,7 +309,7 @@ def complete_velocity(q, qd, p, function, parameters, c):
 
 @jit
 def energies(q, qd, c):
-    """Kinetic and potential energy, the latter zero at z = 0 [J]."""
+    """Return kinetic and potential energy, the latter zero at z = 0 [J]."""
     mass, bias = np.empty((9, 9), q.dtype), np.empty(9, q.dtype)
     mass_and_bias(q, qd, c, mass, bias)
     kinetic = 0 * q[0]
@@ -323,7 +323,7 @@ def energies(q, qd, c):
 
 @jit
 def find_contacts_from_pose(q, p, ground, function, parameters, c):
-    """Fill ``p`` (6,) with the contacts where both rims are deepest at q; True where both were found."""
+    """Fill ``p`` (6,) with the contacts where both rims are deepest at q; return True if both were found."""
     both = wheels(q, c)
     good = True
     for k in range(2):
@@ -336,11 +336,11 @@ def find_contacts_from_pose(q, p, ground, function, parameters, c):
 
 @jit
 def observe(q, qd, contacts, known, ground, function, parameters, c, points, normals, gap, slip, energy):
-    """Along a trajectory of n samples fill what its constraints and energy look like.
+    """Compute contacts, gaps, slip and energies along a trajectory of n samples.
 
-    contacts (n, 6) are the contact parameters where they are ``known``, and are filled with those where the rims are
-    deepest where not. points, normals (n, 2, 3); gap (n, 2); slip (n, 2, 2), lateral and forward material velocity
-    of the contact; energy (n, 2), kinetic and potential. True where every contact was found.
+    contacts (n, 6) are the contact parameters if they are ``known``; otherwise they are filled with those where the
+    rims are deepest. Fills points and normals (n, 2, 3); gap (n, 2); slip (n, 2, 2), the lateral and forward material
+    velocity of the contact; energy (n, 2), kinetic and potential. Returns True if every contact was found.
     """
     jacobian, gamma, p_rate = np.empty((6, 9)), np.empty(6), np.empty(6)
     good = True

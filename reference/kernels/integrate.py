@@ -1,4 +1,4 @@
-"""Time integration of y = (q, qd, p), 24 states, with the contact parameters p carried along.
+"""Time integration of y = (q, qd, p), 24 states, with the contact parameters p integrated as well.
 
 Dormand and Prince's method of order 8 with error estimates of orders 5 and 3 and a dense output of
 order 7 (Hairer, Norsett, Wanner 1993, II.5 and II.6), and the modified Euler (Heun) method of Xiong
@@ -21,10 +21,10 @@ from .rim import bound, least_clearance
 
 SIZE = 24
 DONE, MORE, FAILED, REAR_TOUCHED, FRONT_TOUCHED = 0, 1, 2, 3, 4
-_LOOKS = 8  # at the rims while a wheel rolls over the ground's detail
+_LOOKS = 8  # checks of the rims while a wheel rolls over a length of the ground's detail
 _BISECTIONS = 60
 _GOLDEN = (math.sqrt(5) - 1) / 2
-# Nothing that rolls changes within 10 ns: a smaller step means that a singularity is being crept up to
+# A rolling bicycle does not change within 10 ns: a smaller step means that the integration approaches a singularity
 # (a wheel flat on the ground, lean = +-pi/2), which would take millions of steps.
 SMALLEST_STEP = 1e-8
 
@@ -42,8 +42,8 @@ def _combine(y, h, weights, count, stages, out):
 
 
 @jit
-def _error(y, new, h, stages, e3, e5, tolerance, error3, error5):
-    """Error norm of a step in units of the tolerance, which is relative above 1 and absolute below.
+def _error_norm(y, new, h, stages, e3, e5, tolerance, error3, error5):
+    """Return the error norm of a step in units of the tolerance, which is relative above 1 and absolute below.
 
     ``error3`` and ``error5`` (24,) are overwritten.
     """
@@ -63,8 +63,8 @@ def _error(y, new, h, stages, e3, e5, tolerance, error3, error5):
 
 
 @jit
-def _dense(y, new, h, stages, a_extra, d, function, parameters, bicycle, work, out):
-    """Fill ``out`` (7, 24), the coefficients of the dense output; ``stages`` gets its three extra rows."""
+def _fill_dense_output(y, new, h, stages, a_extra, d, function, parameters, bicycle, work, out):
+    """Fill ``out`` (7, 24), the coefficients of the dense output; fill the three extra rows of ``stages``."""
     for s in range(3):
         _combine(y, h, a_extra[s], 13 + s, stages, work)
         derivative(work, function, parameters, bicycle, stages[13 + s])
@@ -82,7 +82,7 @@ def _dense(y, new, h, stages, a_extra, d, function, parameters, bicycle, work, o
 
 @jit
 def _interpolate(y, coefficients, x, out):
-    """Fill out = the dense output at the fraction x of the step."""
+    """Fill ``out`` with the dense output at the fraction x of the step."""
     for i in range(SIZE):
         value = 0.0
         for k in range(7):
@@ -93,26 +93,27 @@ def _interpolate(y, coefficients, x, out):
 
 @jit
 def _rim_bounds(y, ground, function, parameters, c):
-    """Lower bounds of both rims' least clearances, from the contacts alone."""
+    """Return lower bounds of both rims' least clearances, from the contacts alone."""
     (c1, x1, _, z1, r1), (c2, x2, _, z2, r2) = wheels(y, c)
-    one = bound(c1, x1, z1, r1, y[20], ground, function, parameters)
-    return one, bound(c2, x2, z2, r2, y[23], ground, function, parameters)
+    rear = bound(c1, x1, z1, r1, y[20], ground, function, parameters)
+    return rear, bound(c2, x2, z2, r2, y[23], ground, function, parameters)
 
 
 @jit
 def rim_clearance(y, ground, function, parameters, c):
-    """Return (clearance, wheel): the least of both rims' clearances, and whose it is."""
+    """Return (clearance, wheel): the smaller of both rims' clearances and its wheel."""
     (c1, x1, _, z1, r1), (c2, x2, _, z2, r2) = wheels(y, c)
-    one, _ = least_clearance(c1, x1, z1, r1, y[20], True, ground.samples, function, parameters)
-    two, _ = least_clearance(c2, x2, z2, r2, y[23], True, ground.samples, function, parameters)
-    return (one, 0) if one <= two else (two, 1)
+    rear, _ = least_clearance(c1, x1, z1, r1, y[20], True, ground.samples, function, parameters)
+    front, _ = least_clearance(c2, x2, z2, r2, y[23], True, ground.samples, function, parameters)
+    return (rear, 0) if rear <= front else (front, 1)
 
 
 @jit
 def _are_clear(bounds, next_bounds):
-    """Whether bounds at both ends of a step say that the rims were clear all along it.
+    """Return whether bounds at both ends of a step show that the rims were clear throughout it.
 
-    They turn with the lean and the ground, which change little in a step: by less than they are above zero.
+    The bounds change with the lean and the ground, and little in a step: they must change by less than they are above
+    zero.
     """
     change = abs(bounds[0] - next_bounds[0]) + abs(bounds[1] - next_bounds[1])
     return min(min(bounds[0], bounds[1]), min(next_bounds[0], next_bounds[1])) > change
@@ -126,28 +127,28 @@ def _clearance_within(y, coefficients, x, ground, function, parameters, c, work)
 
 @jit
 def _least_within(y, coefficients, low, high, ground, function, parameters, c, work):
-    """Return the fraction of a step, between two of them, at which the clearance is least, or the first found below 0.
+    """Return the fraction of a step, in an interval, where the clearance is least, or the first found with one <= 0.
 
-    Golden section: the clearance falls and rises once in between.
+    Golden section; the clearance must have a single minimum in the interval.
     """
     x = low
     for _ in range(40):
-        one, other = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        at_one, _ = _clearance_within(y, coefficients, one, ground, function, parameters, c, work)
-        at_other, _ = _clearance_within(y, coefficients, other, ground, function, parameters, c, work)
-        x = one if at_one < at_other else other
-        if min(at_one, at_other) <= 0:
+        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        at_left, _ = _clearance_within(y, coefficients, left, ground, function, parameters, c, work)
+        at_right, _ = _clearance_within(y, coefficients, right, ground, function, parameters, c, work)
+        x = left if at_left < at_right else right
+        if min(at_left, at_right) <= 0:
             break
-        if at_one < at_other:
-            high = other
+        if at_left < at_right:
+            high = right
         else:
-            low = one
+            low = left
     return x
 
 
 @jit
 def _first_touch(y, coefficients, clear, touching, ground, function, parameters, c, work):
-    """Bisect a step between a fraction at which the rims are clear and one at which one is not: (fraction, wheel)."""
+    """Bisect a step between a fraction with both rims clear and one with a touch; return (fraction, wheel)."""
     _, wheel = _clearance_within(y, coefficients, touching, ground, function, parameters, c, work)
     for _ in range(_BISECTIONS):
         middle = 0.5 * (clear + touching)
@@ -165,15 +166,15 @@ def _first_touch(y, coefficients, clear, touching, ground, function, parameters,
 def _second_touch(y, new, coefficients, ground, function, parameters, c, work):
     """Return (fraction of a step at which a rim first touches a second place, wheel); (2, 0) if none does.
 
-    The rims are looked at so often that no wheel rolls further than a part of the ground's detail meanwhile; where a
-    touch and its end may lie between two looks, the least clearance is searched.
+    The clearance is evaluated so often that no wheel rolls further than a part of the ground's detail in between. Where
+    a touch may begin and end between two evaluations, the least clearance is searched for.
     """
     travel = math.sqrt((new[0] - y[0]) ** 2 + (new[1] - y[1]) ** 2 + (new[2] - y[2]) ** 2)
     looks = 2 + int(_LOOKS * travel / ground.detail)
     before, _ = _clearance_within(y, coefficients, 0.0, ground, function, parameters, c, work)
     here, after = before, before
     for k in range(1, looks + 2):
-        # Beyond the step's end there is nothing: the least may lie at the end.
+        # Nothing is known beyond the step's end, so the minimum may lie at the end.
         if k <= looks:
             after, _ = _clearance_within(y, coefficients, k / looks, ground, function, parameters, c, work)
             if after <= 0:
@@ -192,10 +193,10 @@ def _second_touch(y, new, coefficients, ground, function, parameters, c, work):
 def dop853(y, times, index, t, h, tolerance, most_steps, tableau, ground, function, parameters, c, out):
     """Advance ``y`` in place and fill rows ``index``... of ``out`` (n, 24) at ``times``.
 
-    Each accepted step and each output is projected onto gaps, contact equations and rolling. Stops at
-    the last time, after ``most_steps`` steps (call again with what it returns), where the step
-    shrinks to nothing or a contact is lost, or where a rim touches the ground at a second place: that is
-    looked for in the dense output, with the `rim.RimSearch` ``ground``, so that it depends on no output time.
+    Each accepted step and each output is projected onto gaps, contact equations and rolling. Stops at the last time,
+    after ``most_steps`` steps (call again with the returned values), where the step becomes too small or a contact is
+    lost, or where a rim touches the ground at a second place. That is searched for in the dense output, with the
+    `rim.RimSearch` ``ground``, so that it does not depend on the output times.
 
     Returns ``(status, index, t, h, steps, evaluations)``.
     """
@@ -215,8 +216,8 @@ def dop853(y, times, index, t, h, tolerance, most_steps, tableau, ground, functi
         _combine(y, h, b, 12, stages, new)
         derivative(new, function, parameters, bicycle, stages[12])
         evaluations += 12
-        error = _error(y, new, h, stages, e3, e5, tolerance, work, error5)
-        if not error < 1:  # also where it is not a number
+        error = _error_norm(y, new, h, stages, e3, e5, tolerance, work, error5)
+        if not error < 1:  # also if it is not a number
             h *= max(0.2, 0.9 * error ** (-1 / 8)) if error < 1e300 else 0.2
             rejected = True
             continue
@@ -224,7 +225,7 @@ def dop853(y, times, index, t, h, tolerance, most_steps, tableau, ground, functi
         clear = _are_clear(bounds, next_bounds)
         end, status = t + h, MORE
         if times[index] <= end or not clear:
-            _dense(y, new, h, stages, a_extra, d, function, parameters, bicycle, work, coefficients)
+            _fill_dense_output(y, new, h, stages, a_extra, d, function, parameters, bicycle, work, coefficients)
             evaluations += 3
             if not clear:
                 touch, wheel = _second_touch(y, new, coefficients, ground, function, parameters, c, work)
@@ -236,7 +237,7 @@ def dop853(y, times, index, t, h, tolerance, most_steps, tableau, ground, functi
                     return FAILED, index, t, h, steps, evaluations
                 index += 1
             if status != MORE:
-                # A touch after the last time is none of this motion.
+                # A touch after the last time is not part of this motion.
                 return (DONE if index == times.size else status), index, end, h, steps + 1, evaluations
         factor = 10.0 if error == 0 else min(10.0, 0.9 * error ** (-1 / 8))
         for i in range(SIZE):
@@ -255,10 +256,10 @@ def dop853(y, times, index, t, h, tolerance, most_steps, tableau, ground, functi
 def modified_euler(y, step, count, stride, ground, function, parameters, c, out):
     """Take ``count`` steps y += step (f(y) + f(y + step f(y))) / 2; every ``stride``-th fills a row of ``out``.
 
-    Nothing is projected: the constraints drift with the method's error. Stops where the state stops being finite,
+    Nothing is projected: the constraints drift with the method's error. Stops where the state is no longer finite,
     and in the step in which a rim touches the ground at a second place.
 
-    Returns ``(status, rows filled, t)``, t by linear interpolation of the clearance.
+    Returns ``(status, rows filled, t)``, with t from linear interpolation of the clearance.
     """
     bicycle = aligned(c)
     first, second, work = np.empty(SIZE), np.empty(SIZE), np.empty(SIZE)

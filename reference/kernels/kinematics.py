@@ -20,7 +20,7 @@ from .vector import add, combine, cross, scale
 
 
 class Constants(NamedTuple):
-    """The bicycle as the kernels want it: rear and front assemblies about D, wheels as spins.
+    """The bicycle's constants for the kernels: rear and front assemblies about D, wheels as spins.
 
     A wheel is symmetric about its axle, so it belongs to its frame as a rigid part (a gyrostat) and
     only its spin relative to the frame is a motion of its own. Suffix 1 is the rear assembly (frame
@@ -57,7 +57,7 @@ class Constants(NamedTuple):
 
 @jit
 def frames(yaw, lean, pitch, steer, c):
-    """Axes ``(a_lean, x_r, y_r, z_r, s, x_h, y_h, z_h)`` in the inertial frame."""
+    """Return the axes ``(a_lean, x_r, y_r, z_r, s, x_h, y_h, z_h)`` in the inertial frame."""
     cy, sy, cl, sl = np.cos(yaw), np.sin(yaw), np.cos(lean), np.sin(lean)
     cp, sp, cd, sd = np.cos(pitch), np.sin(pitch), np.cos(steer), np.sin(steer)
     zero = 0 * cy
@@ -77,14 +77,14 @@ def frames(yaw, lean, pitch, steer, c):
 
 @jit
 def rim(angle, x, z):
-    """Radial and tangent unit vectors (e, t) of a rim at ``angle``: e(0) = -z, t = de/dangle = y x e."""
+    """Return the radial and tangent unit vectors (e, t) of a rim at ``angle``: e(0) = -z, t = de/dangle = y x e."""
     ca, sa = np.cos(angle), np.sin(angle)
     return combine(-sa, x, -ca, z), combine(-ca, x, sa, z)
 
 
 @jit
 def angular_velocities(a_lean, y_r, s, yaw_rate, lean_rate, pitch_rate, steer_rate):
-    """Angular velocities of both frames and the parts of their accelerations that rates alone give.
+    """Return the angular velocities of both frames and the parts of their accelerations that depend on rates alone.
 
     w1 = yaw_rate z + lean_rate a_lean + pitch_rate y_r,  w2 = w1 + steer_rate s
     b1 = yaw_rate z x lean_rate a_lean + (yaw_rate z + lean_rate a_lean) x pitch_rate y_r

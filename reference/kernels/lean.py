@@ -4,16 +4,16 @@ Vectors have components along (u, y, s) of `pose`. With w the angular velocity o
 w + steer_rate s that of the front frame, S and I first moments and inertia about D, rho the contact
 from D, t and e the rim's tangent and radial unit vectors there (axle x e = t, axle x t = -e):
 
-rolling     v_D + w x rho + spin r t = 0 at each contact, and differentiated, with adot the rate of the
-            rim angle and j = steer_rate w x s the front frame's acceleration that rates alone give,
-
+rolling     v_D + w x rho + spin r t = 0 at each contact, and its time derivative, with adot the rate of the
+            rim angle and j = steer_rate w x s the part of the front frame's acceleration that depends on rates
+            alone,
                 a_D + alpha x rho + spin' r t + beta = 0                                    (rear)
                 beta = w x (w x rho + (adot + spin) r t) - adot spin r e
                 a_D + alpha x rho + steer'' s x rho + spin' r t + beta = 0                  (front)
                 beta = the same with the front frame's w, and + j x rho
 
-contact     its point on the surface moves with the rim point, V = v_D + w x rho, so that (xi', eta') =
-            horizontal part of V + r adot t; and t . N = 0 stays if, with H the surface's Hessian,
+contact     the contact point on the surface moves with the rim point, V = v_D + w x rho, so that (xi', eta') =
+            horizontal part of V + r adot t; and t . N = 0 is preserved if, with H the surface's Hessian,
 
                 adot (e . N + r t . H t) = (w x t) . N - t . H V
 
@@ -35,7 +35,7 @@ from .vector import add, combine, cross, dot, scale, subtract
 
 @jit_inline
 def _contact_rates(here, wheel, velocity, w, xi, eta, function, parameters):
-    """Rates of (xi, eta, rim angle), ``velocity`` the rim point's as fixed in its frame."""
+    """Return the rates of (xi, eta, rim angle); ``velocity`` is that of the rim point fixed in its frame."""
     _, fx, fy, fxx, fxy, fyy = function(xi, eta, parameters)
     t, r = wheel.t, wheel.radius
     normal = subtract(here.z, combine(fx, here.x, fy, here.y))
@@ -46,14 +46,14 @@ def _contact_rates(here, wheel, velocity, w, xi, eta, function, parameters):
 
 
 @jit_inline
-def _beta(wheel, w, carried, spin, rate):
-    """Acceleration of the contact's material point that rates alone give; ``carried`` is w x rho."""
+def _rate_acceleration(wheel, w, carried, spin, rate):
+    """Return the acceleration of the contact's material point that depends on rates alone; ``carried`` is w x rho."""
     r = wheel.radius
     return combine(1.0, cross(w, combine(1.0, carried, r * (rate + spin), wheel.t)), -r * rate * spin, wheel.e)
 
 
 class Motion(NamedTuple):
-    """What a state's accelerations and forces are made of."""
+    """Quantities from which a state's accelerations and forces are computed."""
 
     here: Any
     w: Any
@@ -65,8 +65,8 @@ class Motion(NamedTuple):
 
 
 @jit_inline
-def _motion(y, function, parameters, a):
-    """Set up the equations of y = (q, qd, contact parameters); ``a`` the `Aligned` constants."""
+def _build_motion(y, function, parameters, a):
+    """Set up the equations at y = (q, qd, contact parameters); ``a`` the `Aligned` constants."""
     here = pose(y[3], y[4], y[5], y[6], y[20], y[23], a)
     steer, rear_spin, front_spin = y[15], y[16], y[17]
     w = angular_velocity(here, y[12], y[13], y[14])
@@ -78,10 +78,10 @@ def _motion(y, function, parameters, a):
     carried, carried2 = cross(w, rear.rho), cross(w2, front.rho)
     rates = _contact_rates(here, rear, add(velocity, carried), w, y[18], y[19], function, parameters)
     rates2 = _contact_rates(here, front, add(velocity, carried2), w2, y[21], y[22], function, parameters)
-    beta = _beta(rear, w, carried, rear_spin, rates[2])
-    beta2 = add(_beta(front, w2, carried2, front_spin, rates2[2]), cross(j, front.rho))
+    beta = _rate_acceleration(rear, w, carried, rear_spin, rates[2])
+    beta2 = add(_rate_acceleration(front, w2, carried2, front_spin, rates2[2]), cross(j, front.rho))
 
-    # Weight and the frame's acceleration -beta act alike.
+    # Weight and the frame's acceleration -beta act in the same way.
     fall = combine(a.gravity, here.z, -1.0, beta)
     force = add(cross(w, cross(w, here.s1)), add(cross(w2, cross(w2, here.s2)), cross(j, here.s2)))
     force = combine(1.0, force, a.mass, fall)
@@ -96,12 +96,12 @@ def _motion(y, function, parameters, a):
 @jit
 def derivative(y, function, parameters, a, out):
     """Fill out = dy/dt (24,) of y = (q, qd, contact parameters); ``a`` the `Aligned` constants."""
-    now = _motion(y, function, parameters, a)
+    now = _build_motion(y, function, parameters, a)
     here = now.here
     alpha, steer, rear, front = solve(now.system)
     roll = scale(a.rear_radius * rear, here.rear.t)
     origin = to_inertial(here, add(now.beta, add(cross(alpha, here.rear.rho), roll)))
-    # alpha less what the angles' rates alone give: yaw_rate z x w + lean_rate pitch_rate a_lean x y_r
+    # alpha without the part that depends on the angles' rates: yaw_rate z x w + lean_rate pitch_rate a_lean x y_r
     alpha = subtract(alpha, combine(y[12], cross(here.z, now.w), y[13] * y[14], here.above))
     for i in range(9):
         out[i] = y[9 + i]
@@ -114,8 +114,8 @@ def derivative(y, function, parameters, a, out):
 
 @jit
 def contact_forces(y, function, parameters, a, force):
-    """Fill ``force`` (6,): the ground's on the rear and the front wheel, inertial axes."""
-    now = _motion(y, function, parameters, a)
+    """Fill ``force`` (6,): the ground's force on the rear and the front wheel, inertial axes."""
+    now = _build_motion(y, function, parameters, a)
     here, s2 = now.here, now.here.s2
     alpha, steer, rear, front = solve(now.system)
     on_front = front_force(now.system, alpha, steer, rear, front)

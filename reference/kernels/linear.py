@@ -1,6 +1,6 @@
-"""Small dense solves that stay analytic.
+"""Small dense solvers that stay analytic.
 
-LAPACK conjugates complex matrices, which breaks the complex step; these factorise A = L D L^T of a
+LAPACK conjugates complex matrices, which breaks the complex step. These functions factorise A = L D L^T for a
 complex *symmetric* matrix and solve square systems with pivots chosen by their real parts.
 """
 
@@ -38,7 +38,7 @@ def solve_factorised(a, b, n):
 
 @jit
 def solve(a, b, n):
-    """Overwrite ``b`` (n,) with the solution of a x = b by Gauss elimination; ``a`` is destroyed."""
+    """Overwrite ``b`` (n,) with the solution of a x = b by Gaussian elimination; ``a`` is destroyed."""
     for k in range(n):
         p = k
         for i in range(k + 1, n):
@@ -62,7 +62,7 @@ def solve(a, b, n):
 
 @jit
 def solve_three(a, b):
-    """Solution of a 3 x 3 system by Cramer's rule; rows ``a`` and right-hand side ``b`` as tuples."""
+    """Return the solution of a 3 x 3 system by Cramer's rule; rows ``a`` and right-hand side ``b`` as tuples."""
     (a00, a01, a02), (a10, a11, a12), (a20, a21, a22) = a
     c0, c1, c2 = a11 * a22 - a12 * a21, a12 * a20 - a10 * a22, a10 * a21 - a11 * a20
     inverse = 1.0 / (a00 * c0 + a01 * c1 + a02 * c2)

@@ -1,7 +1,7 @@
 """The bicycle in axes (u, y, s): the rear frame turned about its axle until its third axis is the steering axis.
 
-In these axes steer is a turn about the third axis, the rear wheel lies in the first and the third, and
-most components of what the right-hand side multiplies are zero or one. With T the tilt of the steering
+In these axes steer is a turn about the third axis, the rear wheel lies in the plane of the first and the third, and
+most of the components used in the right-hand side are zero or one. With T the tilt of the steering
 axis, x_r and z_r the axes of the rear frame (`kinematics.frames`) and e(angle), t(angle) those of a rim
 
     u = cos T x_r + sin T z_r,    s = -sin T x_r + cos T z_r
@@ -21,7 +21,7 @@ from .vector import add, combine, dot, scale
 
 
 class Aligned(NamedTuple):
-    """`kinematics.Constants` in axes (u, y, s), the front assembly's at zero steer."""
+    """`kinematics.Constants` in axes (u, y, s); those of the front assembly at zero steer."""
 
     gravity: float
     mass: float
@@ -40,12 +40,12 @@ class Aligned(NamedTuple):
 
 
 @jit
-def _turned(x, z, c):
+def _to_aligned_pair(x, z, c):
     return c.cos_tilt * x + c.sin_tilt * z, c.cos_tilt * z - c.sin_tilt * x
 
 
 @jit
-def _turned_inertia(xx, yy, zz, xz, c):
+def _to_aligned_inertia(xx, yy, zz, xz, c):
     sine, cosine = c.sin_tilt, c.cos_tilt
     both = 2 * sine * cosine * xz
     return (
@@ -62,14 +62,14 @@ def aligned(c):
     return Aligned(
         c.gravity,
         c.m1 + c.m2,
-        _turned(c.s1x, c.s1z, c),
-        _turned_inertia(c.i1xx, c.i1yy, c.i1zz, c.i1xz, c),
-        _turned(c.s2x, c.s2z, c),
-        _turned_inertia(c.i2xx, c.i2yy, c.i2zz, c.i2xz, c),
+        _to_aligned_pair(c.s1x, c.s1z, c),
+        _to_aligned_inertia(c.i1xx, c.i1yy, c.i1zz, c.i1xz, c),
+        _to_aligned_pair(c.s2x, c.s2z, c),
+        _to_aligned_inertia(c.i2xx, c.i2yy, c.i2zz, c.i2xz, c),
         c.spin_rear,
         c.spin_front,
-        _turned(c.rear_x, c.rear_z, c),
-        _turned(c.front_x, c.front_z, c),
+        _to_aligned_pair(c.rear_x, c.rear_z, c),
+        _to_aligned_pair(c.front_x, c.front_z, c),
         c.rear_radius,
         c.front_radius,
         c.sin_tilt,
@@ -78,7 +78,7 @@ def aligned(c):
 
 
 class Wheel(NamedTuple):
-    """A wheel at its contact."""
+    """Geometry of a wheel at its contact."""
 
     rho: Any  # contact from D
     e: Any  # radial unit vector, from the centre to the contact
@@ -87,7 +87,7 @@ class Wheel(NamedTuple):
 
 
 class Pose(NamedTuple):
-    """What depends on angles alone, as components along (u, y, s)."""
+    """Quantities that depend on angles alone, as components along (u, y, s)."""
 
     x: Any  # inertial axes
     y: Any
@@ -106,7 +106,7 @@ class Pose(NamedTuple):
 
 
 @jit_inline
-def _wheel(hub, radius, angle, forward, a):
+def _place_wheel(hub, radius, angle, forward, a):
     sine, cosine = np.sin(angle), np.cos(angle)
     s, c = sine * a.cos_tilt + cosine * a.sin_tilt, cosine * a.cos_tilt - sine * a.sin_tilt
     e = (-s * forward[0], -s * forward[1], -c)
@@ -117,7 +117,7 @@ def _wheel(hub, radius, angle, forward, a):
 
 @jit_inline
 def pose(yaw, lean, pitch, steer, rear_angle, front_angle, a):
-    """Pose from yaw, lean, pitch, steer and the two rim angles; ``a`` the `Aligned` constants."""
+    """Return the `Pose` at yaw, lean, pitch, steer and the two rim angles; ``a`` the `Aligned` constants."""
     cy, sy, cl, sl, cd, sd = np.cos(yaw), np.sin(yaw), np.cos(lean), np.sin(lean), np.cos(steer), np.sin(steer)
     sine, cosine = np.sin(pitch), np.cos(pitch)
     cp, sp = cosine * a.cos_tilt + sine * a.sin_tilt, sine * a.cos_tilt - cosine * a.sin_tilt
@@ -136,8 +136,8 @@ def pose(yaw, lean, pitch, steer, rear_angle, front_angle, a):
         sin_lean=sl,
         cos_lean=cl,
         left=(-sd, cd, zero),
-        rear=_wheel(a.rear, a.rear_radius, rear_angle, (one, zero, zero), a),
-        front=_wheel(a.front, a.front_radius, front_angle, forward, a),
+        rear=_place_wheel(a.rear, a.rear_radius, rear_angle, (one, zero, zero), a),
+        front=_place_wheel(a.front, a.front_radius, front_angle, forward, a),
         s1=(a.s1[0] * one, zero, a.s1[1] * one),
         s2=(cd * a.s2[0], sd * a.s2[0], a.s2[1] * one),
         i1=(a.i1[0] * one, a.i1[1] * one, a.i1[2] * one, zero, a.i1[3] * one, zero),
@@ -147,7 +147,7 @@ def pose(yaw, lean, pitch, steer, rear_angle, front_angle, a):
 
 @jit_inline
 def times(k, v):
-    """Symmetric matrix (xx, yy, zz, xy, xz, yz) times a vector."""
+    """Multiply a symmetric matrix (xx, yy, zz, xy, xz, yz) by a vector."""
     return (
         k[0] * v[0] + k[3] * v[1] + k[4] * v[2],
         k[3] * v[0] + k[1] * v[1] + k[5] * v[2],
@@ -157,25 +157,25 @@ def times(k, v):
 
 @jit_inline
 def angular_velocity(here, turn, lean, pitch):
-    """Angular velocity of the rear frame from its angles' rates."""
+    """Return the angular velocity of the rear frame from the rates of its angles."""
     w = combine(turn, here.z, lean, here.ahead)
     return w[0], w[1] + pitch, w[2]
 
 
 @jit_inline
 def angle_rates(here, w):
-    """Rates of yaw, lean and pitch from an angular velocity: the inverse of `angular_velocity`."""
+    """Return the rates of yaw, lean and pitch from an angular velocity: the inverse of `angular_velocity`."""
     turn = dot(here.above, w) / here.cos_lean
     return turn, dot(here.ahead, w), w[1] - here.sin_lean * turn
 
 
 @jit_inline
 def to_aligned(here, x, y, z):
-    """Components along (u, y, s) from inertial ones."""
+    """Return components along (u, y, s) from inertial ones."""
     return add(combine(x, here.x, y, here.y), scale(z, here.z))
 
 
 @jit_inline
 def to_inertial(here, v):
-    """Inertial components from those along (u, y, s)."""
+    """Return inertial components from those along (u, y, s)."""
     return dot(here.x, v), dot(here.y, v), dot(here.z, v)

@@ -1,9 +1,9 @@
-"""Return of a state to contact and rolling by the smallest change.
+"""Projection of a state onto contact and rolling by the smallest change.
 
-Positions take the least-norm step along the gaps' gradients. Velocities take the least step in kinetic
-energy: minimal 1/2 d^T M d with J (qd + d) = 0 is what the equations of motion say of accelerations (the
-principle of least constraint), with the slip in the place of beta and no load but its own, so `reduction`
-finds it.
+Positions take the step of least norm along the gradients of the gaps. Velocities take the step of least kinetic
+energy: minimal 1/2 d^T M d with J (qd + d) = 0 has the form of the equations of motion for accelerations (the
+principle of least constraint), with the slip in place of beta and no other load, so `reduction`
+solves it.
 """
 
 from __future__ import annotations
@@ -19,21 +19,27 @@ from .vector import add, combine, cross, dot, scale, subtract
 
 @jit_inline
 def _gap_gradient(here, normal, rho):
-    """Gradient of a gap in (yaw, lean, pitch, steer) as far as the wheel follows it; ``normal`` along (u, y, s)."""
+    """Return the gradient of a gap in (yaw, lean, pitch, steer); the rear wheel does not move with steer.
+
+    ``normal`` has components along (u, y, s).
+    """
     moment = cross(rho, normal)
     return dot(here.z, moment), dot(here.ahead, moment), moment[1], moment[2]
 
 
 @jit
-def _to_contact(y, function, parameters, c, a):
-    """Bring gaps and contact equations to round-off in place; True on success."""
+def _project_positions(y, function, parameters, c, a):
+    """Bring gaps and contact equations to round-off in place; return True on success."""
     # A gap is a difference of coordinates, rounded a few times.
     round_off = 2e-15 * (5 + abs(y[0]) + abs(y[1]) + abs(y[2]))
     for _ in range(10):
         rear, front = wheels(y, c)
-        one = contact.equations(*rear[:2], *rear[3:], y[18], y[19], y[20], function, parameters)
-        two = contact.equations(*front[:2], *front[3:], y[21], y[22], y[23], function, parameters)
-        step1, step2 = solve_three(one.jacobian, one.residual), solve_three(two.jacobian, two.residual)
+        at_rear = contact.equations(*rear[:2], *rear[3:], y[18], y[19], y[20], function, parameters)
+        at_front = contact.equations(*front[:2], *front[3:], y[21], y[22], y[23], function, parameters)
+        step1, step2 = (
+            solve_three(at_rear.jacobian, at_rear.residual),
+            solve_three(at_front.jacobian, at_front.residual),
+        )
         worst = 0.0
         for i in range(3):
             worst += abs(step1[i]) + abs(step2[i])
@@ -41,27 +47,27 @@ def _to_contact(y, function, parameters, c, a):
             y[21 + i] -= step2[i]
         if not worst < 1e300:
             return False
-        # Newton's method leaves the square of this step, and a gap at its closest approach errs by that too.
-        if worst < 1e-8 and abs(one.gap) + abs(two.gap) < round_off:
+        # Newton's method leaves an error of the square of this step, as does the gap, at its closest approach.
+        if worst < 1e-8 and abs(at_rear.gap) + abs(at_front.gap) < round_off:
             return True
         here = pose(y[3], y[4], y[5], y[6], y[20], y[23], a)
-        g1 = _gap_gradient(here, to_aligned(here, *one.normal), here.rear.rho)
-        g2 = _gap_gradient(here, to_aligned(here, *two.normal), here.front.rho)
+        g1 = _gap_gradient(here, to_aligned(here, *at_rear.normal), here.rear.rho)
+        g2 = _gap_gradient(here, to_aligned(here, *at_front.normal), here.front.rho)
         m11 = 1.0 + g1[0] * g1[0] + g1[1] * g1[1] + g1[2] * g1[2]
-        m12 = dot(one.normal, two.normal) + g1[0] * g2[0] + g1[1] * g2[1] + g1[2] * g2[2]
+        m12 = dot(at_rear.normal, at_front.normal) + g1[0] * g2[0] + g1[1] * g2[1] + g1[2] * g2[2]
         m22 = 1.0 + g2[0] * g2[0] + g2[1] * g2[1] + g2[2] * g2[2] + g2[3] * g2[3]
         det = m11 * m22 - m12 * m12
-        u, v = (one.gap * m22 - two.gap * m12) / det, (m11 * two.gap - m12 * one.gap) / det
+        u, v = (at_rear.gap * m22 - at_front.gap * m12) / det, (m11 * at_front.gap - m12 * at_rear.gap) / det
         for i in range(3):
-            y[i] -= u * one.normal[i] + v * two.normal[i]
+            y[i] -= u * at_rear.normal[i] + v * at_front.normal[i]
             y[3 + i] -= u * g1[i] + v * g2[i]
         y[6] -= v * g2[3]
     return False
 
 
 @jit
-def _to_rolling(y, a):
-    """Take the slip out of the rates in place."""
+def _project_rates(y, a):
+    """Remove the slip from the rates in place."""
     here = pose(y[3], y[4], y[5], y[6], y[20], y[23], a)
     rear, front, zero = here.rear, here.front, 0 * y[0]
     w = angular_velocity(here, y[12], y[13], y[14])
@@ -85,11 +91,11 @@ def _to_rolling(y, a):
 
 @jit
 def project(y, function, parameters, c, a):
-    """Return y = (q, qd, contact parameters), (24,), to contact and rolling in place; True on success.
+    """Move y = (q, qd, contact parameters), (24,), to contact and rolling in place; return True on success.
 
-    ``c`` and ``a`` are the `kinematics.Constants` and what `pose.aligned` makes of them.
+    ``c`` and ``a`` are the `kinematics.Constants` and the result of `pose.aligned` for them.
     """
-    if not _to_contact(y, function, parameters, c, a):
+    if not _project_positions(y, function, parameters, c, a):
         return False
-    _to_rolling(y, a)
+    _project_rates(y, a)
     return True

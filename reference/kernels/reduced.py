@@ -5,16 +5,16 @@ The state v = (x, y, lean, steer, lean_rate, steer_rate, spin), in the heading f
     X(v) = (x' + yaw_rate y, y' - yaw_rate x, lean_rate, steer_rate, lean'', steer'', spin')
 
 ``spin`` is the rate of the rear wheel, or of the front wheel where the rear one stands or nearly does: a
-pivoting motion has no rear rate that would tell its speed. Eigenvalues do not depend on the choice.
+pivoting motion has no rear rate from which its speed could be seen. Eigenvalues do not depend on the choice.
 
-Dependent are four positions w = (z, pitch, rim angles), by the rows h of `circle` that bring both rim points
-to the ground, and the speeds, by rolling. A change dv of the positions among v takes dw = -(dh/dw)^-1 dh/dv
-along; with l the line between the contacts and c the columns of `reduction`, the angular velocity and the
-other spin follow from
+The dependent quantities are four positions w = (z, pitch, rim angles), given by the rows h of `circle` that bring
+both rim points to the ground, and the speeds, given by rolling. A change dv of the positions in v changes w by
+dw = -(dh/dw)^-1 dh/dv; with l the line between the contacts and c the columns of `reduction`, the angular velocity
+and the other spin follow from
 
     w x l + steer_rate c_steer + rear_spin c_rear + front_spin c_front = 0
 
-and the velocity of D from the rear wheel, v_D = -(w x rho + rear_spin r t). Each column of dX/dv is one
+and the velocity of D from the rear wheel, v_D = -(w x rho + rear_spin r t). Each column of dX/dv takes one
 complex step of this and of `lean`.
 """
 
@@ -30,19 +30,19 @@ from .pose import angular_velocity, pose, to_inertial
 from .vector import add, combine, cross, scale, subtract
 
 VARIABLES = 7
-REAR, FRONT = 16, 17  # the spin's place in the state (q, qd, contact parameters)
+REAR, FRONT = 16, 17  # index of the spin in the state (q, qd, contact parameters)
 _POSITIONS = np.array([0, 1, 4, 6, 2, 5, 20, 23])  # x, y, lean, steer | z, pitch, rim angles
 _SPEEDS = np.array([13, 15])  # lean_rate, steer_rate
 
 
 @jit
 def telling_spin(rear, front):
-    """Place in y of the spin to take: the rear wheel's unless it stands or nearly does."""
+    """Return the index in y of the spin to use: the rear wheel's unless it stands or nearly does."""
     return REAR if abs(rear) >= 0.2 * abs(front) else FRONT
 
 
 @jit_inline
-def _touch(y, function, parameters, a):
+def _rim_points(y, function, parameters, a):
     here = pose(y[3], y[4], y[5], y[6], y[20], y[23], a)
     rear = rim_point(here, here.rear, y[0], y[1], y[2], function, parameters)
     return here, rear, rim_point(here, here.front, y[0], y[1], y[2], function, parameters)
@@ -50,14 +50,14 @@ def _touch(y, function, parameters, a):
 
 @jit
 def _ground_rows(y, function, parameters, a, out):
-    """Fill ``out`` (4,): both rim points' height and dip."""
-    _, rear, front = _touch(y, function, parameters, a)
+    """Fill ``out`` (4,) with the heights and dips of both rim points."""
+    _, rear, front = _rim_points(y, function, parameters, a)
     out[0], out[1], out[2], out[3] = rear.height, rear.dip, front.height, front.dip
 
 
 @jit
-def _carried(y, function, parameters, a, out):
-    """Fill ``out`` (4, 4): rates of z, pitch and both rim angles with x, y, lean, steer; ``y`` complex (24,)."""
+def _dependent_rates(y, function, parameters, a, out):
+    """Fill ``out`` (4, 4): derivatives of z, pitch, rim angles in x, y, lean, steer; ``y`` complex (24,)."""
     rows = np.empty(4, np.complex128)
     matrix, sides = np.empty((4, 4)), np.empty((4, 4))
     for j in range(8):
@@ -79,7 +79,7 @@ def _carried(y, function, parameters, a, out):
 @jit
 def complete(y, spin, function, parameters, a):
     """Fill the dependent speeds and the contact points of ``y`` (24,) in place; ``spin`` one of REAR, FRONT."""
-    here, rear, front = _touch(y, function, parameters, a)
+    here, rear, front = _rim_points(y, function, parameters, a)
     y[18], y[19], y[21], y[22] = rear.xi, rear.eta, front.xi, front.eta
     zero = 0 * y[0]
     line = subtract(here.front.rho, here.rear.rho)
@@ -103,12 +103,12 @@ def complete(y, spin, function, parameters, a):
 def reduced_jacobian(y, spin, function, parameters, a, field, jacobian):
     """Fill X(v) (7,) and dX/dv (7, 7) at a state that touches the ground.
 
-    Of ``y`` = (q, qd, contact parameters), (24,), at yaw 0, the dependent speeds and contact points need
+    ``y`` = (q, qd, contact parameters), (24,), at yaw 0; its dependent speeds and contact points need
     not be right. ``spin`` is one of REAR, FRONT, ``function`` the surface's for complex numbers, ``a`` the
     `Aligned` constants.
     """
     carried, z, rate = np.empty((4, 4)), y.astype(np.complex128), np.empty(24, np.complex128)
-    _carried(z, function, parameters, a, carried)
+    _dependent_rates(z, function, parameters, a, carried)
     for j in range(VARIABLES):
         for i in range(24):
             z[i] = y[i]

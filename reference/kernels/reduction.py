@@ -1,17 +1,17 @@
-"""Accelerations of a bicycle that rolls: nine unknowns and six constraints reduced to three unknowns.
+"""Accelerations of a rolling bicycle: nine unknowns and six constraints reduced to three unknowns.
 
-In the notation of `lean`, a_D goes by the rear contact, a_D = -(alpha x rho + rear spin' r t + beta). What
-is left are alpha and z = (steer'', rear spin', front spin'), and of the constraints the front one less
-the rear one; with l the line between the contacts and b the front beta less the rear one,
+In the notation of `lean`, the rear contact eliminates a_D = -(alpha x rho + rear spin' r t + beta). The
+remaining unknowns are alpha and z = (steer'', rear spin', front spin'), and the remaining constraint is the front one
+minus the rear one; with l the line between the contacts and b the front beta minus the rear one,
 
     alpha x l + sum_k z_k c_k + b = 0,    c = (s x rho_front, -r t of the rear, r t of the front)
 
-Its part along l gives the spin' whose |c . l| is the larger (a wheel's is zero where its plane is square
-to l; both are only where the wheels stand side by side, facing the same way), its part across l gives
-alpha = lambda l + (sum_k z_k c_k + b) x l / l^2. Free are lambda, steer'' and one spin'.
+Its part along l gives the spin' whose |c . l| is the larger (a wheel's is zero where its plane is orthogonal
+to l; both are zero only where the wheels stand side by side, facing the same way), its part across l gives
+alpha = lambda l + (sum_k z_k c_k + b) x l / l^2. Lambda, steer'' and one spin' remain free.
 
 Jourdain's principle: the equations of the six unknowns (alpha, z), projected onto the three free ones,
-are symmetric and positive definite. The matrix of the six, a_D put in, is made of
+are symmetric and positive definite. The matrix of the six, with a_D inserted, consists of
 
     alpha   K = I about the rear contact = I + 2 (m . rho) 1 - m rho^T - rho m^T,  m = mass rho / 2 - S
     steer   I_front s - rho x (s x S_front)
@@ -34,14 +34,14 @@ class Unknown(NamedTuple):
     """One of the scalar accelerations steer'', rear spin', front spin'."""
 
     c: Any  # its column in the constraint
-    with_alpha: Any  # its columns and diagonal of the mass matrix (the two spins have none in common)
+    with_alpha: Any  # its columns and diagonal of the mass matrix (the entry of the two spins with each other is zero)
     with_steer: Any
     inertia: Any
     load: Any  # generalised load, on the side of the inertia
 
 
 class System(NamedTuple):
-    """Equations of the six unknowns, and their constraint."""
+    """Equations of the six unknowns and their constraint."""
 
     k: Any
     load: Any
@@ -100,8 +100,8 @@ def build(here, a, force, moment, steer_load, front_load, b):
 
 
 @jit_inline
-def _pivot(system):
-    """Return whether the rear spin is the one to eliminate, the spin that is kept, the one that goes."""
+def _choose_spin(system):
+    """Return (whether the rear spin is eliminated, the spin that is kept, the spin that is eliminated)."""
     rear, front = system.rear, system.front
     if abs(dot(front.c, system.line).real) < abs(dot(rear.c, system.line).real):
         return True, front, rear
@@ -112,20 +112,20 @@ def _pivot(system):
 def solve(system):
     """Return (alpha, steer'', rear spin', front spin')."""
     k, load, steer, _, _, line, b = system
-    rear_goes, kept, gone = _pivot(system)
-    # gone's acceleration is p0 + p1 steer'' + p2 kept', alpha is lambda line + a0 + a1 steer'' + a2 kept'
+    rear_goes, kept, gone = _choose_spin(system)
+    # gone's acceleration is p0 + p1 steer'' + p2 kept'; alpha is lambda line + a0 + a1 steer'' + a2 kept'
     inverse = -1 / dot(gone.c, line)
     p0, p1, p2 = dot(b, line) * inverse, dot(steer.c, line) * inverse, dot(kept.c, line) * inverse
     short = scale(1 / dot(line, line), line)
     a0 = cross(combine(1.0, b, p0, gone.c), short)
     a1 = cross(combine(1.0, steer.c, p1, gone.c), short)
     a2 = cross(combine(1.0, kept.c, p2, gone.c), short)
-    # loads of the six where the free three are zero
+    # loads of the six unknowns where the three free ones are zero
     load = add(load, combine(1.0, times(k, a0), p0, gone.with_alpha))
     steer_load = steer.load + dot(steer.with_alpha, a0) + gone.with_steer * p0
     kept_load = kept.load + dot(kept.with_alpha, a0)
     gone_load = gone.load + dot(gone.with_alpha, a0) + gone.inertia * p0
-    # mass matrix times the unit motions of steer and of the kept spin; projected
+    # mass matrix times the unit motions of steer and of the kept spin, then projected
     k0 = times(k, line)
     k1 = add(times(k, a1), combine(1.0, steer.with_alpha, p1, gone.with_alpha))
     k2 = add(times(k, a2), combine(1.0, kept.with_alpha, p2, gone.with_alpha))
@@ -154,8 +154,8 @@ def solve(system):
 
 @jit_inline
 def front_force(system, alpha, steer, rear, front):
-    """Multiplier of the constraint, the force on the front wheel: line x F and c . F are the equations' residuals."""
-    rear_goes, _, gone = _pivot(system)
+    """Return the constraint's multiplier, the front wheel's force: line x F and c . F are the equations' residuals."""
+    rear_goes, _, gone = _choose_spin(system)
     rate = rear if rear_goes else front
     row = add(add(system.load, times(system.k, alpha)), scale(steer, system.steer.with_alpha))
     row = add(row, combine(rear, system.rear.with_alpha, front, system.front.with_alpha))

@@ -1,14 +1,15 @@
-"""Clearance of the whole rim of a wheel: whether it touches the ground anywhere but at its contact.
+"""Clearance of the whole rim of a wheel, which shows whether it touches the ground beyond its contact.
 
-The rim point w(a) = c + r e(a) stands h(a) = w_z - f(w_x, w_y) above the ground, which is below the rim if
-and only if h >= 0 all round. At the contact h and h' vanish, so with d the angle from there
+The rim point w(a) = c + r e(a) lies h(a) = w_z - f(w_x, w_y) above the ground, and the whole rim is above the ground
+if and only if h >= 0 all round. At the contact h and h' vanish, so with d the angle from there
 
     clearance   g(d) = (h(a + d) - h(a) - h'(a) sin d) / (r (1 - cos d)),   g(0) = -e . N - r t . H t
 
-is smooth, N = (-fx, -fy, 1) and the Hessian H taken at the rim point. The rim touches the ground in its
-contact alone if and only if g > 0 all round: g(0) > 0 says that the rim is more curved than the ground below
-its contact. The gap h(a) of a soft or an inexact contact, and its slope h'(a), are taken off, so that this holds to
-first order in the gap. A wheel in the air has no contact: it touches where h itself comes to zero, and h(a) stays.
+is smooth; N = (-fx, -fy, 1) and the Hessian H are taken at the rim point. The rim touches the ground only at its
+contact if and only if g > 0 all round: g(0) > 0 means that the rim is more curved than the ground below
+its contact. The gap h(a) of a soft or inexact contact, and its slope h'(a), are subtracted, so that this holds to
+first order in the gap. A wheel in the air has no contact: it touches where h itself reaches zero, and h(a) is not
+subtracted.
 
 Bound. Let no eigenvalue of H exceed K within 2 r of the contact. Then f(w) <= f(u) + grad f . (w - u) + K |w - u|^2 / 2
 horizontally, and with |w(a + d) - w(a)|^2 = 2 r^2 (1 - cos d)
@@ -17,11 +18,11 @@ horizontally, and with |w(a + d) - w(a)|^2 = 2 r^2 (1 - cos d)
 
 all round. This decides most cases from the contact alone. On a plane, K = 0, it is the cosine of the lean:
 a wheel on a plane never touches twice. On the paraboloid, K = 2 alpha, it is the least clearance itself: there
-H = K 1, so that g depends on d through the horizontal part of (w(a + d) - w(a)) only, whose square is at most
-the whole and equals it where that chord is level; some chord of a rim from a given point is.
+H = K 1, so that g depends on d only through the horizontal part of (w(a + d) - w(a)), whose square is at most
+the whole and equals it where that chord is level; from any point of a rim, some chord is level.
 
 Otherwise the rim is sampled. A height field can have a contact in every cell; the samples are a quarter of the
-ground's detail apart, and a least clearance between them is found by golden section.
+ground's detail apart, and a minimum of the clearance between them is found by golden section.
 """
 
 from __future__ import annotations
@@ -37,14 +38,14 @@ from .kinematics import rim
 from .vector import combine, cross, dot, scale
 
 _GOLDEN = (math.sqrt(5) - 1) / 2
-_SECTIONS = 40  # of an interval between samples: to some 1e-9 of it, the square root of round-off
-# Nearer to the contact the clearance is that at the contact: round-off over 1 - cos d would be more than it changes.
+_SECTIONS = 40  # of an interval between samples: to about 1e-9 of it, the square root of round-off
+# Angle within which the clearance is that at the contact: round-off over 1 - cos d would exceed its change there.
 _NEAR = 1e-5
-LIFTED = 1e-3  # of the radius: a wheel with a wider gap is in the air
+LIFTED = 1e-3  # gap, relative to the radius, above which a wheel is in the air
 
 
 class RimSearch(NamedTuple):
-    """How closely to look at rims on a ground.
+    """How finely to search rims on a ground.
 
     Attributes
     ----------
@@ -54,11 +55,11 @@ class RimSearch(NamedTuple):
         Bounds K of the ground's upward curvature, the largest eigenvalue of its Hessian, within a wheel's diameter of
         a point: entry i where the distance from the axis is i to i + 1 times ``width`` [1/m]; inf if unknown.
     width : float
-        [m]; inf with one entry for all the ground.
+        Width of the rings [m]; inf with a single entry for all the ground.
     detail : float
         Length within which the ground does not bend to and fro [m].
     samples : int
-        Of a rim.
+        Number of samples along a rim.
     """
 
     curved: bool
@@ -69,7 +70,7 @@ class RimSearch(NamedTuple):
 
 
 class Edge(NamedTuple):
-    """A rim and what the clearance along it is measured from."""
+    """A rim and the values at its contact from which the clearance along it is computed."""
 
     centre: Any
     radial: Any  # e at the contact
@@ -82,7 +83,7 @@ class Edge(NamedTuple):
 
 @jit
 def level_axes(axle):
-    """Axes (x, z) of a wheel's plane, x level; nan where the wheel lies flat."""
+    """Return axes (x, z) of a wheel's plane, x level; nan where the wheel lies flat."""
     x = (axle[1], -axle[0], 0.0)
     length = np.sqrt(x[0] * x[0] + x[1] * x[1])
     x = scale(1 / length, x)
@@ -90,21 +91,21 @@ def level_axes(axle):
 
 
 @jit
-def _edge(centre, x, z, radius, angle, held, samples, function, parameters):
-    """Edge of a rim whose contact is at ``angle``; ``held`` is False for a wheel in the air."""
+def _make_edge(centre, x, z, radius, angle, held, samples, function, parameters):
+    """Return the `Edge` of a rim whose contact is at ``angle``; ``held`` is False for a wheel in the air."""
     e, t = rim(angle, x, z)
     f, fx, fy, fxx, fxy, fyy = function(centre[0] + radius * e[0], centre[1] + radius * e[1], parameters)
     n = (-fx, -fy, 1.0)
     height = centre[2] + radius * e[2] - f
     bend = fxx * t[0] * t[0] + 2 * fxy * t[0] * t[1] + fyy * t[1] * t[1]
-    # In the air the clearance has no limit at d = 0: the sampling sees as far as its first sample.
+    # In the air the clearance has no limit at d = 0: the value at the first sample's distance is taken.
     lifted = 0.0 if held else height / (radius * (1 - math.cos(2 * math.pi / samples)))
     return Edge(centre, e, t, radius, dot(t, n), height if held else 0.0, lifted - dot(e, n) - radius * bend)
 
 
 @jit
 def _clearance(edge, c, s, function, parameters):
-    """Clearance at the angle d from the contact, ``c`` and ``s`` its cosine and sine; inf where there is no ground."""
+    """Return the clearance at the angle d from the contact, with cosine ``c`` and sine ``s``; inf without ground."""
     versine = s * s / (1 + c) if c > 0 else 1 - c
     if versine < 0.5 * _NEAR * _NEAR:
         return edge.here
@@ -117,7 +118,7 @@ def _clearance(edge, c, s, function, parameters):
 
 @jit
 def _least_between(edge, low, high, function, parameters):
-    """Return (clearance, d) at the least clearance of an interval that holds one minimum."""
+    """Return (clearance, d) at the minimum of the clearance in an interval that has one minimum."""
     a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
     at_a = _clearance(edge, math.cos(a), math.sin(a), function, parameters)
     at_b = _clearance(edge, math.cos(b), math.sin(b), function, parameters)
@@ -135,7 +136,7 @@ def _least_between(edge, low, high, function, parameters):
 
 @jit
 def bound(centre, x, z, radius, angle, ground, function, parameters):
-    """Lower bound of the least clearance, -e . N - K r; -inf where K is unknown, nan where there is no ground."""
+    """Return a lower bound of the least clearance, -e . N - K r; -inf if K is unknown, nan if there is no ground."""
     e, _ = rim(angle, x, z)
     wx, wy = centre[0] + radius * e[0], centre[1] + radius * e[1]
     _, fx, fy, _, _, _ = function(wx, wy, parameters)
@@ -147,12 +148,12 @@ def bound(centre, x, z, radius, angle, ground, function, parameters):
 
 @jit
 def least_clearance(centre, x, z, radius, angle, held, samples, function, parameters):
-    """Return (clearance, d): the least clearance of the whole rim and the angle to it from the contact at ``angle``.
+    """Return (clearance, d): the least clearance of the whole rim and its angle from the contact at ``angle``.
 
-    A clearance far above zero is not refined, and may be an eighth of itself too large: its sign is what counts.
-    ``held`` is False for a wheel in the air. (inf, 0) where the contact is off the ground, which is for others to tell.
+    A clearance far above zero is not refined, and may be an eighth of itself too large: only its sign matters.
+    ``held`` is False for a wheel in the air. Returns (inf, 0) where the contact is off the ground.
     """
-    edge = _edge(centre, x, z, radius, angle, held, samples, function, parameters)
+    edge = _make_edge(centre, x, z, radius, angle, held, samples, function, parameters)
     if not edge.here < math.inf:
         return math.inf, 0.0
     step = 2 * math.pi / samples
@@ -178,30 +179,30 @@ def least_clearance(centre, x, z, radius, angle, held, samples, function, parame
 def deepest(centre, x, z, radius, samples, function, parameters):
     """Return (distance, angle): the least signed distance of a rim from the ground, to first order h / |N|.
 
-    inf where the whole rim is off the ground.
+    The distance is inf where the whole rim is off the ground.
     """
     step = 2 * math.pi / samples
     least, where = math.inf, 0.0
     for i in range(samples):
-        distance = _distance(centre, x, z, radius, i * step, function, parameters)
+        distance = _ground_distance(centre, x, z, radius, i * step, function, parameters)
         if distance < least:
             least, where = distance, i * step
     low, high = where - step, where + step
     for _ in range(_SECTIONS):
         a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        one = _distance(centre, x, z, radius, a, function, parameters)
-        other = _distance(centre, x, z, radius, b, function, parameters)
-        if one < other:
+        at_a = _ground_distance(centre, x, z, radius, a, function, parameters)
+        at_b = _ground_distance(centre, x, z, radius, b, function, parameters)
+        if at_a < at_b:
             high = b
         else:
             low = a
-        if min(one, other) < least:
-            least, where = (one, a) if one < other else (other, b)
+        if min(at_a, at_b) < least:
+            least, where = (at_a, a) if at_a < at_b else (at_b, b)
     return least, where
 
 
 @jit
-def _distance(centre, x, z, radius, angle, function, parameters):
+def _ground_distance(centre, x, z, radius, angle, function, parameters):
     e, _ = rim(angle, x, z)
     f, fx, fy, _, _, _ = function(centre[0] + radius * e[0], centre[1] + radius * e[1], parameters)
     distance = (centre[2] + radius * e[2] - f) / np.sqrt(1 + fx * fx + fy * fy)
@@ -210,21 +211,21 @@ def _distance(centre, x, z, radius, angle, function, parameters):
 
 @jit
 def find_contact(centre, x, z, radius, ground, function, parameters):
-    """Search the contact of a wheel from its pose alone; returns (xi, eta, angle, found).
+    """Find the contact of a wheel from its pose alone; return (xi, eta, angle, found).
 
-    It is where the rim is deepest. Newton's method from `contact.first_guess` nearly always finds that; if it does
-    not, the rim is sampled.
+    It is the point where the rim is deepest. Newton's method from `contact.first_guess` nearly always finds it; if not,
+    the rim is sampled.
     """
     xi, eta, angle = contact.first_guess(centre, x, z, radius, function, parameters)
     xi, eta, angle, found = contact.search(centre, x, z, radius, xi, eta, angle, function, parameters)
     if not ground.curved or (found and bound(centre, x, z, radius, angle, ground, function, parameters) > 0):
         return xi, eta, angle, found
-    if found and _distance(centre, x, z, radius, angle, function, parameters) < LIFTED * radius:
+    if found and _ground_distance(centre, x, z, radius, angle, function, parameters) < LIFTED * radius:
         clearance, _ = least_clearance(centre, x, z, radius, angle, True, ground.samples, function, parameters)
         if clearance > 0:
             return xi, eta, angle, True
     _, turn = deepest(centre, x, z, radius, ground.samples, function, parameters)
     e, _ = rim(turn, x, z)
     wx, wy = centre[0] + radius * e[0], centre[1] + radius * e[1]
-    one, two, three, better = contact.search(centre, x, z, radius, wx, wy, turn, function, parameters)
-    return (one, two, three, True) if better else (xi, eta, angle, found)
+    xi2, eta2, angle2, better = contact.search(centre, x, z, radius, wx, wy, turn, function, parameters)
+    return (xi2, eta2, angle2, True) if better else (xi, eta, angle, found)

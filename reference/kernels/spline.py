@@ -1,7 +1,7 @@
-"""Splines of degree five as the surfaces evaluate them: four continuous derivatives, two of them exact.
+"""Splines of degree five for surfaces: four continuous derivatives, of which two are evaluated.
 
-An integrator of order 8 sees a ground through its Hessian. Where that is only continuous its steps lose
-their order; a quintic's is twice continuously differentiable.
+The ground enters an integrator of order 8 through its Hessian. Where that is only continuous, steps lose
+their order; that of a quintic spline is twice continuously differentiable.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ DEGREE = 5
 
 @jit
 def polynomial(coefficients, t):
-    """Value, first and second derivative at t of a polynomial with rising powers."""
+    """Return value, first and second derivative at t of a polynomial with rising powers."""
     value, first, second = 0 * t, 0 * t, 0 * t
     for k in range(coefficients.size - 1, -1, -1):
         second = second * t + 2 * first
@@ -26,9 +26,9 @@ def polynomial(coefficients, t):
 
 @jit
 def piecewise(parameters, t):
-    """Value, first and second derivative at t of a piecewise quintic; nan outside its pieces.
+    """Return value, first and second derivative at t of a piecewise quintic; nan outside its pieces.
 
-    ``parameters`` (7 n + 1,) are the n + 1 breaks, then six coefficients a piece in powers of the
+    ``parameters`` (7 n + 1,) are the n + 1 breaks, then six coefficients per piece in powers of the
     distance from the piece's left end.
     """
     pieces = (parameters.size - 1) // 7
@@ -50,18 +50,18 @@ def piecewise(parameters, t):
 
 @jit
 def uniform_cell(position, samples):
-    """Cell of a grid that a position (in grid spacings from the first sample) lies in; -1 outside the grid."""
+    """Return the cell of a grid at a position (in grid spacings from the first sample); -1 outside the grid."""
     if not 0 <= position.real <= samples - 1:
         return -1
     return min(int(position.real), samples - 2)
 
 
 @jit
-def _weights(u):
-    """Weights of a cell's six uniform B-splines at u = 0 to 1, their first and their second derivatives.
+def _spline_weights(u):
+    """Return the weights of a cell's six uniform B-splines at u = 0 to 1, and their first and second derivatives.
 
-    The one of degree 5 is made of those of degree 4 (de Boor 1978): with b the weights of degree n, n + 1
-    of them, those of the next degree are ((u + n - k) b[k - 1] + (k + 1 - u) b[k]) / (n + 1), and their
+    Those of degree 5 are computed from those of degree 4 (de Boor 1978): with b the n + 1 weights of degree n,
+    those of the next degree are ((u + n - k) b[k - 1] + (k + 1 - u) b[k]) / (n + 1), and their
     derivatives b[k - 1] - b[k].
     """
     v = 1 - u
@@ -82,29 +82,36 @@ def _weights(u):
 
 
 @jit
-def _sum(w, c):
+def _weigh(w, c):
     return w[0] * c[0] + w[1] * c[1] + w[2] * c[2] + w[3] * c[3] + w[4] * c[4] + w[5] * c[5]
 
 
 @jit
-def _across(weights, row, j):
-    """Value, first and second derivative of one row of coefficients in cell j."""
+def _evaluate_row(weights, row, j):
+    """Return value, first and second derivative of one row of coefficients in cell j."""
     c = (row[j], row[j + 1], row[j + 2], row[j + 3], row[j + 4], row[j + 5])
-    return _sum(weights[0], c), _sum(weights[1], c), _sum(weights[2], c)
+    return _weigh(weights[0], c), _weigh(weights[1], c), _weigh(weights[2], c)
 
 
 @jit
 def tensor(coefficients, i, j, u, v):
-    """Value and derivatives (f, fu, fv, fuu, fuv, fvv) of a uniform tensor spline in cell (i, j) at (u, v).
+    """Return value and derivatives (f, fu, fv, fuu, fuv, fvv) of a uniform tensor spline in cell (i, j) at (u, v).
 
     f = sum_ab w_a(u) c[i + a, j + b] w_b(v)
     """
-    along, across = _weights(u), _weights(v)
-    r0, r1 = _across(across, coefficients[i], j), _across(across, coefficients[i + 1], j)
-    r2, r3 = _across(across, coefficients[i + 2], j), _across(across, coefficients[i + 3], j)
-    r4, r5 = _across(across, coefficients[i + 4], j), _across(across, coefficients[i + 5], j)
+    along, across = _spline_weights(u), _spline_weights(v)
+    r0, r1 = _evaluate_row(across, coefficients[i], j), _evaluate_row(across, coefficients[i + 1], j)
+    r2, r3 = _evaluate_row(across, coefficients[i + 2], j), _evaluate_row(across, coefficients[i + 3], j)
+    r4, r5 = _evaluate_row(across, coefficients[i + 4], j), _evaluate_row(across, coefficients[i + 5], j)
     value = (r0[0], r1[0], r2[0], r3[0], r4[0], r5[0])
     slope = (r0[1], r1[1], r2[1], r3[1], r4[1], r5[1])
     bend = (r0[2], r1[2], r2[2], r3[2], r4[2], r5[2])
     w, first, second = along
-    return _sum(w, value), _sum(first, value), _sum(w, slope), _sum(second, value), _sum(first, slope), _sum(w, bend)
+    return (
+        _weigh(w, value),
+        _weigh(first, value),
+        _weigh(w, slope),
+        _weigh(second, value),
+        _weigh(first, slope),
+        _weigh(w, bend),
+    )

@@ -13,12 +13,13 @@ squares of it, so static equilibria (sigma = 0) and pivoting motions (b = 0) are
 Unknowns (22): x, y, z, lean, pitch, steer | a, b, c | sigma / 400 | contact parameters (6) | contact
 forces / weight (6). Rows (22): the 21 equations, speeds by their direction, and the normalisation.
 
-A solution holds for (a, b, c) and for (-a, -b, -c), the same circle ridden the other way. `direction` chooses: the
-rear wheel rolls forward, b > 0. Where it stands, b = 0 to round-off, the motion runs as the unknowns say. The solvers
-give a > 0, a turn to the left; where a family of curves ends in the pivoting motion, the signs stored there are those
-with which it turns as its neighbours on that curve do (`velodrome.reference.families`).
+A solution holds for (a, b, c) and for (-a, -b, -c), the same circle ridden the other way. `direction` chooses the one
+whose rear wheel rolls forward, b > 0. Where the rear wheel stands, b = 0 to round-off, the motion runs with the signs
+of the unknowns. The solvers return a > 0, a turn to the left; where a family of curves ends in the pivoting motion,
+the signs stored there are those with which it turns as its neighbours on that curve do
+(`velodrome.reference.families`).
 
-Solutions are found in the smaller form of `circle`; this one describes them and measures how well they hold.
+Solutions are found in the smaller form of `circle`; this form describes them and measures their residuals.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from .compilation import jit
 from .dynamics import energies, mass_and_bias, residual
 
 UNKNOWNS = 22
-STANDING = 1e-12  # of b, at most 1: the pivoting motion is solved for, and b there is round-off of either sign
+STANDING = 1e-12  # of b, at most 1: at the pivoting motion, which is solved for, b is round-off of either sign
 
 
 @jit
@@ -44,7 +45,7 @@ def steady_residual(u, function, parameters, c, out):
     for i in range(9):
         resting[i] = out[i]
     qd[0], qd[1], qd[3], qd[7], qd[8] = -u[6] * u[1], u[6] * u[0], u[6], u[7], u[8]
-    # The rolling rows see the direction of the speeds, the dynamics rows are replaced.
+    # The rolling rows use the direction of the speeds; the dynamics rows are replaced.
     residual(q, qd, qdd, u[10:16], u[16:22] * weight, function, parameters, c, out[:21])
     qdd[0], qdd[1] = -u[6] * u[6] * u[0], -u[6] * u[6] * u[1]
     mass_and_bias(q, qd, c, mass, moving)
@@ -73,7 +74,7 @@ def steady_jacobian(u, function, parameters, c, out):
 
 @jit
 def direction(rear):
-    """Return the sign of (a, b, c) with which the rear wheel rolls forward; 1 where it stands, ``rear`` = b."""
+    """Return the sign of (a, b, c) with which the rear wheel rolls forward, from ``rear`` = b; 1 where it stands."""
     return -1.0 if rear < -STANDING else 1.0
 
 
@@ -87,7 +88,7 @@ def running_rates(u):
 
 @jit
 def steady_energy(u, c):
-    """Kinetic plus potential energy at the unknowns ``u`` (22,) [J]."""
+    """Return kinetic plus potential energy at the unknowns ``u`` (22,) [J]."""
     q, qd = np.zeros(9, u.dtype), np.zeros(9, u.dtype)
     q[0], q[1], q[2], q[4], q[5], q[6] = u[0], u[1], u[2], u[3], u[4], u[5]
     qd[0], qd[1], qd[3], qd[7], qd[8] = -u[6] * u[1], u[6] * u[0], u[6], u[7], u[8]

@@ -1,7 +1,7 @@
-"""Looks at the rims of both wheels along a ride of any engine, see `rim`.
+"""Watch over the rims of both wheels along a ride of any engine, see `rim`.
 
-A contact is followed from look to look: the search starts where the last one, moved with the wheel's centre, would be.
-So it does not jump to another place of the rim, and a second touch shows as a clearance that falls to zero.
+A contact is followed from look to look: the search starts from the last contact, moved with the wheel's centre.
+It therefore does not jump to another place of the rim, and a second touch shows as a clearance that falls to zero.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from .compilation import jit
 from .dynamics import wheels
 from .rim import LIFTED, bound, deepest, find_contact, least_clearance, level_axes
 
-_SMALL = 1 / 32  # of the ground's detail: how far a wheel moves between two looks
-# Samples of a ride nearer than this part of the detail are joined by cubics: their error is less than 1e-3 of what the
-# ground does within its detail, (pi / 4)^4 / 384. Samples further apart are looked at as they are.
+_SMALL = 1 / 32  # of the ground's detail: distance that a wheel moves between two looks
+# Samples of a ride closer than this part of the detail are joined by cubics: their error is less than 1e-3 of the
+# ground's variation within its detail, (pi / 4)^4 / 384. Samples further apart are looked at without joining them.
 _JOINED, _BETWEEN = 1 / 2, 1 / 8
 
 
@@ -25,7 +25,7 @@ _JOINED, _BETWEEN = 1 / 2, 1 / 8
 def _look(centre, axle, radius, moved, last, held, ground, function, parameters):
     """Follow a wheel's contact to its present pose; return (contact parameters, whether it touches, clearance).
 
-    ``last`` are the contact's parameters when the wheel's centre was ``moved`` less far, and ``held`` whether it
+    ``last`` are the contact's parameters before the wheel's centre moved by ``moved``, and ``held`` whether it
     touched the ground then. The clearance is that of `least_clearance` or a positive bound of it, nan where no contact
     is found.
     """
@@ -36,7 +36,7 @@ def _look(centre, axle, radius, moved, last, held, ground, function, parameters)
         if found:
             gap = contact.equations(centre, x, z, radius, xi, eta, angle, function, parameters).gap
             clearance = _clearance(centre, x, z, radius, angle, True, ground, function, parameters)
-            # Where another place of the rim is deeper now, it may be that the wheel has left the ground meanwhile.
+            # Where another place of the rim is now deeper, the wheel may have left the ground in the meantime.
             if gap < LIFTED * radius or (
                 clearance <= 0 and _touches(centre, x, z, radius, ground, function, parameters)
             ):
@@ -65,12 +65,12 @@ def _touches(centre, x, z, radius, ground, function, parameters):
 
 @jit
 def watch(centre, axle, radii, clock, ground, function, parameters, clearance):
-    """Look at the rims of two wheels again at every `next`; yields whether nothing touches.
+    """Look at the rims of two wheels at every `next`; yield whether nothing touches.
 
-    A generator: its arguments are unpacked once. centre, axle (2, 3) are the wheels' poses, clock (2,) the time in its
-    first entry. Fills clearance (2, 2), that before and that now of each wheel, and the
-    second entry of ``clock`` with the time of the one before. The rims are not looked at again before a wheel has moved
-    by a small part of the ground's detail.
+    This is a generator so that its arguments are unpacked only once. centre, axle (2, 3) are the wheels' poses, clock
+    (2,) has the time in its first entry. Fills clearance (2, 2), the previous and the present one of each wheel, and
+    the second entry of ``clock`` with the time of the previous look. The rims are looked at again only after a wheel
+    has moved by a small part of the ground's detail.
     """
     at, seen, held = np.full((2, 3), np.inf), np.zeros((2, 3)), np.zeros(2, np.bool_)
     looked = -math.inf
@@ -107,7 +107,7 @@ def watch(centre, axle, radii, clock, ground, function, parameters, clearance):
 
 @jit
 def _pose_between(q, qd, times, n, share, out):
-    """Fill ``out`` (9,) with the coordinates at a share of the interval before sample n, by cubics."""
+    """Fill ``out`` (9,) with the coordinates at a fraction of the interval before sample n, by cubics."""
     interval, s, r = times[n] - times[n - 1], share, 1 - share
     for i in range(9):
         ends = (1 + 2 * s) * r * r * q[n - 1, i] + (1 + 2 * r) * s * s * q[n, i]
@@ -119,7 +119,7 @@ def first_touch(times, q, qd, ground, function, parameters, c):
     """Look at both rims along the samples (n, 9) of a ride.
 
     Returns ``(time, wheel)`` of the first look at which a rim touches a second place, the time by linear
-    interpolation of the clearance; (inf, 0) if none does. Where the samples are close the ride between them counts.
+    interpolation of the clearance; (inf, 0) if none does. Where samples are close, the ride between them is included.
     """
     at, seen, held = np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(2, np.bool_)
     before, pose = np.full(2, np.nan), np.empty(9)

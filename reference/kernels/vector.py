@@ -1,4 +1,4 @@
-"""Three-vectors as tuples: they live in registers, so a kernel allocates nothing for them."""
+"""Three-vectors as tuples: they stay in registers, so a kernel allocates no memory for them."""
 
 from __future__ import annotations
 
@@ -7,35 +7,35 @@ from .compilation import jit
 
 @jit
 def add(a, b):
-    """Sum a + b."""
+    """Return the sum a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @jit
 def subtract(a, b):
-    """Difference a - b."""
+    """Return the difference a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @jit
 def scale(s, a):
-    """Product s a."""
+    """Return the product s a."""
     return s * a[0], s * a[1], s * a[2]
 
 
 @jit
 def combine(s, a, t, b):
-    """Linear combination s a + t b."""
+    """Return the linear combination s a + t b."""
     return s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2]
 
 
 @jit
 def dot(a, b):
-    """Scalar product a . b."""
+    """Return the scalar product a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @jit
 def cross(a, b):
-    """Vector product a x b."""
+    """Return the vector product a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

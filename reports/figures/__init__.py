@@ -1,6 +1,7 @@
 """Figures on paper: solution families, the atlas, work-precision."""
 
 from .atlas import growth_figure, stable_figure
+from .eigenvalues import eigenvalue_figure
 from .families import family_figure, solution_figure
 from .precision import precision_figure
 from .solution_curve import make_curves
@@ -11,6 +12,7 @@ __all__ = [
     "GREY",
     "INK",
     "WIDTH",
+    "eigenvalue_figure",
     "family_figure",
     "growth_figure",
     "make_curves",

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
+from ...reference.bicycle import Bicycle
+
 _LONGEST = 80  # letters for a field with a list of numbers
 _UNITS = {
     "x": "m",
@@ -75,9 +77,11 @@ def describe_disturbance(table: Mapping[str, float]) -> str:
 
 
 def describe_bicycle(changes: Mapping[str, float]) -> str:
-    """The bicycle in words."""
+    """The bicycle in words, from parameters that may be those of the benchmark bicycle."""
     name = "benchmark bicycle (Meijaard et al. 2007)"
-    changed = ", ".join(f"{key.replace('_', ' ')} {value:g}" for key, value in changes.items())
+    benchmark = Bicycle()
+    others = {key: value for key, value in changes.items() if value != getattr(benchmark, key, None)}
+    changed = ", ".join(f"{key.replace('_', ' ')} {value:g}" for key, value in others.items())
     return f"{name} with {changed}" if changed else name
 
 

@@ -1,5 +1,6 @@
 """The commands of `velodrome`; each imports what it needs, and none of them waits for the others'."""
 
+from .bicycle import bicycle_command
 from .check import check_command
 from .motions import atlas_command, circular_command, critical_command, families_command
 from .run import list_command, run_command
@@ -11,6 +12,7 @@ from .version import print_versions
 
 __all__ = [
     "atlas_command",
+    "bicycle_command",
     "check_command",
     "circular_command",
     "critical_command",

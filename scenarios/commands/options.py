@@ -6,7 +6,7 @@ import json
 import os
 import sys
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from traceback import print_exception
@@ -40,7 +40,17 @@ JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on s
 
 def parse_changes(change: list[str] | None, duration: float | None) -> dict[str, Any]:
     """Fields that --set and --duration override."""
-    changes = dict(_assignment(text) for text in change or [])
+    changes, faults = {}, []
+    for text in change or []:
+        try:
+            key, value = _assignment(text)
+            changes[key] = value
+        except ScenarioError as error:
+            faults.append(str(error))
+    if faults:
+        from ..scenario import join_complaints
+
+        raise ScenarioError(join_complaints(faults))
     if duration is not None:
         changes["simulation.duration"] = duration
     return changes
@@ -99,9 +109,11 @@ def show_written(paths: Iterable[Path]) -> None:
         Console().print(f"written: {path}", markup=False, highlight=False, soft_wrap=True)
 
 
-def print_json(data: Any) -> None:
-    """Print one JSON document, and nothing else."""
-    print(json.dumps(data, indent=1, allow_nan=False))
+def print_json(document: Mapping[str, Any]) -> None:
+    """Print one JSON document with the version of its format, and nothing else."""
+    from ..files import versioned
+
+    print(json.dumps(versioned(document), indent=1, allow_nan=False))
 
 
 @contextmanager

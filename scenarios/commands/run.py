@@ -130,11 +130,12 @@ def _plan(source: str, changes: dict[str, Any], wanted: list[str] | None) -> Run
 
 
 def _tagged(tag: str) -> list[str]:
+    from ...engines.names import suggest_name
     from ..scenario import library_names, load_scenario
 
     tags = {name: load_scenario(name)[1].tags for name in library_names()}
     names = [name for name in tags if tag in tags[name]]
     if not names:
-        known = ", ".join(sorted({word for words in tags.values() for word in words}))
-        raise ScenarioError(f"--tag {tag}: no scenario has it; there are {known}")
+        known = sorted({word for words in tags.values() for word in words})
+        raise ScenarioError(f"--tag {tag}: no scenario has it ({suggest_name(tag, known)})")
     return names

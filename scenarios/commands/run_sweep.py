@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from ...engines.names import suggest_name
 from ..error import ScenarioError
 from ..scenario import show_value
 from ..sweep import (
@@ -73,7 +74,7 @@ def run_sweep_command(
     for status in retry:
         if status not in STATUSES:
             raise ScenarioError(
-                f"--retry {show_value(status)}: no row has such a status; there are {', '.join(STATUSES)}"
+                f"--retry {show_value(status)}: no row has such a status ({suggest_name(status, STATUSES)})"
             )
     with show_working(
         "checking every run of the sweep (the first time on a machine, kernels are compiled: half a minute)"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...engines.engine import REFERENCE, Trajectory, load_engine, why_failed
+from ...engines.names import suggest_name
 from ...reference.surface import SurfaceOfRevolution
 from ...reports.drawing import assign_colours
 from ...reports.measure import ROUND_OFF, START_ERROR, Scale, cut_at_fall, evaluate_ride
@@ -65,13 +66,13 @@ def read_pair(first: Path, second: Path, engines: Sequence[str] | None = None) -
         raise ScenarioError(f"{first} and {second} have no engine in common")
     for engine in engines or []:
         if engine not in common:
-            raise ScenarioError(f"engine {engine!r} is not in both runs; there are {', '.join(common)}")
+            raise ScenarioError(f"engine {engine!r} is not in both runs ({suggest_name(engine, common)})")
     return Pair(scenarios[1], runs[0], runs[1], _ground(scenarios[1], runs[1]))
 
 
 def _same_scenario(before: Scenario, after: Scenario, first: Path, second: Path) -> None:
     for name in (*OF_THE_MOTION, "simulation"):
-        tables = [scenario.model_dump(include={name})[name] for scenario in (before, after)]
+        tables = [_dump_table(scenario, name) for scenario in (before, after)]
         for key in dict.fromkeys(table_key for table in tables for table_key in table):
             values = [table.get(key) for table in tables]
             if values[0] != values[1]:
@@ -79,6 +80,11 @@ def _same_scenario(before: Scenario, after: Scenario, first: Path, second: Path)
                 # A height field has thousands of numbers.
                 said = " against ".join(shorten(repr(value), 60, placeholder=" ...") for value in values)
                 raise ScenarioError(f"{first} and {second}: {what}: {name}.{key} {said}")
+
+
+def _dump_table(scenario: Scenario, name: str) -> dict[str, Any]:
+    """A table of a scenario; the bicycle's with all parameters, which folders of earlier versions do not state."""
+    return asdict(scenario.make_bicycle()) if name == "bicycle" else scenario.model_dump(include={name})[name]
 
 
 def _read(folder: Path, name: str, engines: Sequence[str] | None) -> StoredRun:

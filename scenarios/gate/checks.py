@@ -12,6 +12,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ...engines.engine import Engine, Settings, UnsuitableProblem, why_failed
+from ...engines.format_version import VERSION_KEY, read_version
 from ...engines.guard import call_engine
 from ..error import ScenarioError
 from ..files import make_folder, write_json
@@ -26,6 +27,7 @@ from ..scenario import (
     load_scenario,
     make_start,
     read_toml,
+    refuse_engine,
     show_value,
 )
 from .exact import find_exact
@@ -34,6 +36,7 @@ from .verdict import ABSOLUTE, CHANGES, Verdict, judge_sample, missing_verdict
 
 BASELINES = Path(__file__).parent / "baselines"
 GATED_TAG = "gated"
+BASELINE_VERSION = 1
 _SETTINGS = Path(__file__).parent / "gate.toml"
 
 
@@ -128,6 +131,7 @@ def check_gate(
         held = _hold(name, scenario, judged, known[name], watch, chosen, trace, bool(engines), hold_cpu)
         verdicts += [(name, verdict) for verdict in [*held.verdicts, *_without_verdict(judged, held)]]
         fresh[name] = {
+            VERSION_KEY: BASELINE_VERSION,
             "scenario": name,
             **_ride(scenario),
             "content": gated_content(scenario),
@@ -164,7 +168,7 @@ def _to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[str, Any
     names = [*there, *sorted({name for entries in known.values() for name in entries} - set(there))]
     for engine in wanted or []:
         if engine not in names:
-            raise ScenarioError(f"engine {engine!r} is not installed; there are {', '.join(there)}")
+            raise ScenarioError(refuse_engine(engine, there))
     return [name for name in names if not wanted or name in wanted]
 
 
@@ -285,6 +289,8 @@ def read_baseline(name: str, folder: Path | None = None, scenario: Scenario | No
         return {}
     try:
         data = read_json(path)
+        if isinstance(data, dict):
+            read_version(data, BASELINE_VERSION)
         found = _Baseline.model_validate(data)
     except OSError as error:
         raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from error

@@ -80,13 +80,13 @@ def make_atlas(
 
 def atlas_columns(found: Atlas) -> dict[str, np.ndarray]:
     """All motions as columns of one length, by rising alpha, then family, then along the curve."""
-    counts = [len(curve.seen.lean) for curve in found.curves]
+    counts = [len(curve.samples.lean) for curve in found.curves]
     columns = {
         "alpha": np.repeat([curve.alpha for curve in found.curves], counts),
         "family": np.repeat(np.array([curve.family for curve in found.curves], np.int8), counts),
         "index": np.concatenate([np.arange(count, dtype=np.int32) for count in counts]),
     }
-    seen = [curve.seen for curve in found.curves]
+    seen = [curve.samples for curve in found.curves]
     columns |= {name: np.concatenate([getattr(one, name) for one in seen]) for name in _SEEN}
     normal = np.concatenate([one.normal_force for one in seen])
     columns |= {"normal_force_rear": normal[:, 0], "normal_force_front": normal[:, 1]}

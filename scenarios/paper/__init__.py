@@ -1,4 +1,4 @@
-"""Every claim and printed figure of Xiong, Wang and Liu (2020), computed and held against the print."""
+"""The ledger of Xiong, Wang and Liu (2020): every claim and printed figure, computed and compared with the print."""
 
 from .claims import make_ledger
 from .figures.folder import write_paper

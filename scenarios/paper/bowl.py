@@ -16,9 +16,9 @@ from .profile import abscissa, curve_distance, figure_coordinates, nearest_point
 from .search import search_motions
 
 _PLANE, _SMALL, _AFTER, _DEEP = 0.0, 0.005, 0.05, 0.2
-_ALIKE = 0.2  # rad: curves of the paper's figures, pi/2 wide and pi high, that one would call alike
-_LITTLE = 0.02  # rad: a hundredth of them
-_NEAR = (1e-2, 1e-3)  # of alpha, before the touching point
+_ALIKE = 0.2  # [rad] distance of curves that count as alike in the paper's figures, which are pi/2 wide and pi high
+_LITTLE = 0.02  # [rad] a hundredth of the figures' size: a small change
+_NEAR = (1e-2, 1e-3)  # distances before the touching point, relative to its alpha
 _TOUCHING = source(
     "where two families exchange parts: a regular root of 18 equations", reconnections, command="velodrome critical"
 )
@@ -26,31 +26,31 @@ _FINE = 0.02  # step of the arc where two curves are near
 
 
 def bowl_lines(evidence: Evidence) -> Iterator[LedgerLine]:
-    """Lines on section 3.3."""
-    yield from _small_curvature(evidence)
-    yield from _collision(evidence)
-    yield from _split(evidence)
-    yield _role(evidence)
+    """Yield the lines on section 3.3."""
+    yield from _small_curvature_lines(evidence)
+    yield from _collision_lines(evidence)
+    yield from _split_lines(evidence)
+    yield _role_line(evidence)
 
 
-def profiles(evidence: Evidence, one: float, other: float, numbers: tuple[int, ...]) -> list[float]:
-    """Largest distance between the curves of each family at two alphas, in the figures' coordinates [rad]."""
+def profiles(evidence: Evidence, first: float, second: float, numbers: tuple[int, ...]) -> list[float]:
+    """Compute the largest distance of each family's curves at two alphas, in the figures' coordinates [rad]."""
 
     def compute(number: int) -> float:
-        curves = (figure_coordinates(evidence.bicycle, evidence.samples(alpha, number)) for alpha in (one, other))
+        curves = (figure_coordinates(evidence.bicycle, evidence.samples(alpha, number)) for alpha in (first, second))
         return curve_distance(*curves)
 
-    return [evidence.once(("profiles", number, one, other), lambda n=number: compute(n)) for number in numbers]
+    return [evidence.once(("profiles", number, first, second), lambda n=number: compute(n)) for number in numbers]
 
 
-def _numbers(values: list[float]) -> str:
+def _join(values: list[float]) -> str:
     return ", ".join(f"{value:.3f}" for value in values)
 
 
-def _alike(evidence: Evidence, claim: str, one: float, other: float, numbers: tuple[int, ...]) -> LedgerLine:
-    """Curves are alike if they end alike and lie near each other in the paper's figures."""
-    apart_by = profiles(evidence, one, other, numbers)
-    alike = sum(evidence.family(one, n).ends == evidence.family(other, n).ends for n in numbers)
+def _alike_line(evidence: Evidence, claim: str, first: float, second: float, numbers: tuple[int, ...]) -> LedgerLine:
+    """Make a line on curves that are alike: they have the same ends and lie near each other in the figures."""
+    apart_by = profiles(evidence, first, second, numbers)
+    alike = sum(evidence.family(first, n).ends == evidence.family(second, n).ends for n in numbers)
     what = f"families {', '.join(map(str, numbers))}"
     return claim_line(
         section="3.3",
@@ -59,17 +59,17 @@ def _alike(evidence: Evidence, claim: str, one: float, other: float, numbers: tu
             equals("families that end alike", alike, len(numbers)),
             below("largest distance of two curves in the figures' coordinates", max(apart_by), _ALIKE, "rad"),
         ],
-        measured=f"{what}: the curves are nowhere further apart than {_numbers(apart_by)} rad in the figures' "
+        measured=f"{what}: the curves are nowhere further apart than {_join(apart_by)} rad in the figures' "
         f"coordinates and end {'alike' if alike == len(numbers) else 'differently'}; a fifth of a radian counts as "
         "alike",
         source=source(
-            "the families' curves and their largest distance", profiles, command=families_command_line(one, other)
+            "the families' curves and their largest distance", profiles, command=families_command_line(first, second)
         ),
-        checks=[evidence.residual((one, other))],
+        checks=[evidence.residual((first, second))],
     )
 
 
-def _small_curvature(evidence: Evidence) -> Iterator[LedgerLine]:
+def _small_curvature_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     found = evidence.found(_SMALL)
     static, pivoting = len(found.static), len(found.pivoting)
     whole = [evidence.residual((_PLANE, _SMALL)), evidence.searched_again(_SMALL)]
@@ -89,12 +89,12 @@ def _small_curvature(evidence: Evidence) -> Iterator[LedgerLine]:
         thresholds=[below("largest difference of their constants", off, 1e-12)],
         measured=f"their constants differ by {off:.0e}",
         source=source("the ends of families 3 and 4", trace, command=families_command_line(_SMALL)),
-        checks=[_pivots(ends)],
+        checks=[_check_pivots(ends)],
     )
     before = evidence.found(_PLANE)
     changes = [abs(float(found.static[0][STEER] - before.static[0][STEER]))]
     changes += [abs(float(found.pivoting[0][k] - before.pivoting[0][k])) for k in (3, STEER)]
-    rates = [abs(one.equations.motion(one.pivoting[0]).front_rate) for one in (before, found)]
+    rates = [abs(search.equations.motion(search.pivoting[0]).front_rate) for search in (before, found)]
     changes.append(float(np.ptp(abscissa(evidence.bicycle, np.array(rates)))))
     yield claim_line(
         section="3.3",
@@ -105,29 +105,29 @@ def _small_curvature(evidence: Evidence) -> Iterator[LedgerLine]:
         source=source("the static equilibria and pivoting motions of both", search_motions, search=found.described),
         checks=whole,
     )
-    yield _alike(evidence, "at alpha = 1/200 the curves are very similar to the plane's", _PLANE, _SMALL, FAMILIES)
+    yield _alike_line(evidence, "at alpha = 1/200 the curves are very similar to the plane's", _PLANE, _SMALL, FAMILIES)
 
 
-def _pivots(ends: list[np.ndarray]) -> Check:
+def _check_pivots(ends: list[np.ndarray]) -> Check:
     spin = max(abs(float(u[REAR_SPEED])) for u in ends)
     return Check("largest rear speed of G and H", spin, 1e-12)
 
 
-def _cusps(evidence: Evidence, alpha: float) -> tuple[SpecialPoint, SpecialPoint] | None:
+def _find_cusps(evidence: Evidence, alpha: float) -> tuple[SpecialPoint, SpecialPoint] | None:
     both = evidence.special(alpha, 2, "D", _FINE), evidence.special(alpha, 4, "I", _FINE)
     return both if both[0] is not None and both[1] is not None else None  # type: ignore[return-value]
 
 
-def _between(evidence: Evidence, alpha: float) -> np.ndarray:
-    """From I to D in the figures' coordinates [rad]."""
-    both = _cusps(evidence, alpha)
+def _cusp_distance(evidence: Evidence, alpha: float) -> np.ndarray:
+    """Return the vector from I to D in the figures' coordinates [rad]."""
+    both = _find_cusps(evidence, alpha)
     if both is None:
         return np.full(3, np.nan)
     rows = [[abscissa(evidence.bicycle, point.front_rate), point.lean, point.steer] for point in both]
     return np.subtract(*np.array(rows, float))
 
 
-def _collision(evidence: Evidence) -> Iterator[LedgerLine]:
+def _collision_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     touch, claim = (
         evidence.touching((2, 4)),
         "at a right value of alpha cusp D of family 2 and cusp I of family 4 merge",
@@ -135,10 +135,10 @@ def _collision(evidence: Evidence) -> Iterator[LedgerLine]:
     if touch is None:
         yield claim_line("3.3", claim, [equals("touching points", 0, 1)], "no touching point is found", _TOUCHING, [])
         return
-    near = [float(np.linalg.norm(_between(evidence, touch.alpha * (1 - share)))) for share in _NEAR]
-    # The distance of two turning points that merge falls like the root of what alpha is short of it.
+    near = [float(np.linalg.norm(_cusp_distance(evidence, touch.alpha * (1 - share)))) for share in _NEAR]
+    # The distance of two turning points that merge is proportional to the square root of alpha's distance from there.
     order = float(np.log(near[0] / near[1]) / np.log(_NEAR[0] / _NEAR[1]))
-    after = _cusps(evidence, touch.alpha * (1 + _NEAR[0]))
+    after = _find_cusps(evidence, touch.alpha * (1 + _NEAR[0]))
     touching = [Check("residual of the touching point's equations", touch.residual, 1e-12)]
     yield claim_line(
         section="3.3",
@@ -153,29 +153,29 @@ def _collision(evidence: Evidence) -> Iterator[LedgerLine]:
         checks=touching,
     )
     alphas = [_PLANE, _SMALL, 0.01, 0.015]
-    distances = [float(np.linalg.norm(_between(evidence, alpha))) for alpha in alphas]
+    distances = [float(np.linalg.norm(_cusp_distance(evidence, alpha))) for alpha in alphas]
     yield claim_line(
         section="3.3",
         claim="before that alpha families 2 and 4 approach each other as alpha grows",
         thresholds=[below("largest change of the distance from D to I", np.diff(distances).max(), 0.0, "rad")],
-        measured=f"D and I are {_numbers(distances)} rad apart at alpha = 0, 0.005, 0.01, 0.015",
+        measured=f"D and I are {_join(distances)} rad apart at alpha = 0, 0.005, 0.01, 0.015",
         source=source(
             "cusps D and I in the figures' coordinates", special_points, command=families_command_line(*alphas)
         ),
         checks=touching,
     )
-    yield _separation(evidence, touching)
+    yield _separation_line(evidence, touching)
 
 
-def _separation(evidence: Evidence, touching: list[Check]) -> LedgerLine:
+def _separation_line(evidence: Evidence, touching: list[Check]) -> LedgerLine:
     gaps, direction = [], np.zeros(3)
     for alpha in (_AFTER, 0.03, 0.02):
-        one, other = (figure_coordinates(evidence.bicycle, evidence.samples(alpha, number)) for number in (2, 4))
-        distances, feet = nearest_point(one, other)
+        second, fourth = (figure_coordinates(evidence.bicycle, evidence.samples(alpha, number)) for number in (2, 4))
+        distances, feet = nearest_point(second, fourth)
         i = int(distances.argmin())
         gaps.append(float(distances[i]))
-        direction = one[i] - feet[i]
-    before = _between(evidence, 0.015)
+        direction = second[i] - feet[i]
+    before = _cusp_distance(evidence, 0.015)
     angle = float(np.degrees(np.arccos(abs(direction @ before) / np.linalg.norm(direction) / np.linalg.norm(before))))
     return claim_line(
         section="3.3",
@@ -184,7 +184,7 @@ def _separation(evidence: Evidence, touching: list[Check]) -> LedgerLine:
             above("least growth of the curves' least distance", -np.diff(gaps).max(), 0.0, "rad"),
             above("angle to the line from D to I before", angle, 45.0, "degrees"),
         ],
-        measured=f"their least distance is {_numbers(gaps[::-1])} rad at alpha = 0.02, 0.03, 0.05; at 0.02 across the "
+        measured=f"their least distance is {_join(gaps[::-1])} rad at alpha = 0.02, 0.03, 0.05; at 0.02 across the "
         f"line from D to I before, at {angle:.0f} degrees to it",
         source=source(
             "least distance of families 2 and 4",
@@ -196,7 +196,7 @@ def _separation(evidence: Evidence, touching: list[Check]) -> LedgerLine:
     )
 
 
-def _split(evidence: Evidence) -> Iterator[LedgerLine]:
+def _split_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     ends = {alpha: {n: evidence.family(alpha, n).ends for n in (2, 4)} for alpha in (_SMALL, _AFTER)}
     old, new = ends[_SMALL], ends[_AFTER]
     exchanged = [old[2][0] == new[4][1] != new[2][0], old[4][1] == new[2][0] != new[4][1]]
@@ -211,7 +211,7 @@ def _split(evidence: Evidence) -> Iterator[LedgerLine]:
         checks=whole,
     )
     claim = "at alpha = 1/20 the profiles of families 1 and 3 have changed little from the plane"
-    yield _alike(evidence, claim, _PLANE, _AFTER, (1, 3))
+    yield _alike_line(evidence, claim, _PLANE, _AFTER, (1, 3))
     there = {a: [evidence.special(a, 2, "D"), evidence.special(a, 4, "I")] for a in (_SMALL, _AFTER)}
     left = {alpha: sum(point is not None for point in points) for alpha, points in there.items()}
     yield claim_line(
@@ -223,10 +223,10 @@ def _split(evidence: Evidence) -> Iterator[LedgerLine]:
         checks=whole,
     )
     claim = "at alpha = 1/5 the curves are very similar to those at 1/20"
-    yield _alike(evidence, claim, _AFTER, _DEEP, FAMILIES)
+    yield _alike_line(evidence, claim, _AFTER, _DEEP, FAMILIES)
 
 
-def _role(evidence: Evidence) -> LedgerLine:
+def _role_line(evidence: Evidence) -> LedgerLine:
     touches = [touch for pair in ((2, 4), (1, 3)) if (touch := evidence.touching(pair)) is not None]
     residual = max((t.residual for t in touches), default=np.inf)
     return claim_line(

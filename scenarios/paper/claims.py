@@ -1,8 +1,8 @@
-"""Every claim and every printed figure of Xiong et al. (2020), computed and held against the print.
+"""All lines of the ledger: every claim and printed figure of Xiong et al. (2020), compared with the print.
 
-Claims on results, on counts and on what was simulated are lines of the ledger; what the paper tells of the
-history of bicycle dynamics is not. A line that does not hold is the paper's only if the measurement passes
-its own tests: residuals, a second way to the same figure, a ride by the equations of motion.
+The ledger has lines on results, on counts and on simulations, not on what the paper says about the history of bicycle
+dynamics. A line that does not hold is the paper's fault only if the measurement passes its own tests: residuals, a
+second way to the same figure, a ride by the equations of motion.
 """
 
 from __future__ import annotations
@@ -49,20 +49,20 @@ def make_ledger(
     figures: Mapping[str, Any] | None = None,
     bicycle: Bicycle | None = None,
 ) -> list[LedgerLine]:
-    """Compute the ledger, in the order of the paper's sections (a minute).
+    """Compute the ledger, in the order of the paper's sections. This takes about a minute.
 
     Parameters
     ----------
     progress : callable
-        Called with the part under way, the parts done and their number.
+        Called with the part being computed, the number of parts done and the number of parts.
     figures : mapping, optional
-        Printed figures, by default the paper's (`velodrome.scenarios.paper.printed.read_printed`).
+        Printed figures; the paper's by default (`velodrome.scenarios.paper.printed.read_printed`).
     bicycle : Bicycle, optional
-        By default the benchmark's.
+        The benchmark's by default.
 
     Returns
     -------
-    list of Line
+    list of LedgerLine
     """
     evidence = Evidence(figures or read_printed(), bicycle or Bicycle())
     lines: list[LedgerLine] = []
@@ -70,6 +70,6 @@ def make_ledger(
         progress(part, float(done), float(len(PARTS)))
         lines += lines_of(evidence)
     progress("done", float(len(PARTS)), float(len(PARTS)))
-    # Whatever is measured, it is of the bicycle that the check finds to be the right one.
+    # All measurements depend on the bicycle, so every line is tested by the check of the bicycle.
     model = model_check(evidence.bicycle, evidence.figures)
     return sorted((tested(line, model) for line in lines), key=lambda line: line.section)

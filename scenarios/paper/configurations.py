@@ -13,11 +13,11 @@ from .ledger import Check, LedgerLine, Source, Threshold, above, below, claim_li
 
 NAMES = ("P1", "P2", "P3", "P4")
 _ROUND_OFF = 1e-14  # of numbers of order ten
-_LARGE = 1.5  # times another lean: what one would call large beside small
+_LARGE = 1.5  # ratio of two leans from which the larger counts as large and the smaller as small
 
 
 def configuration_lines(evidence: Evidence) -> Iterator[LedgerLine]:
-    """Lines on Figure 6."""
+    """Yield the lines on Figure 6."""
     for name in NAMES:
         point, motion = evidence.figures[name], named_motion(evidence, name)
         errors = own_errors(evidence, name, motion)
@@ -25,7 +25,7 @@ def configuration_lines(evidence: Evidence) -> Iterator[LedgerLine]:
             claim = f"{name} of family {point['family']}: {what}"
             solved = solved_point(evidence, name)
             yield figure_line("3.3", claim, point[field], getattr(motion, field), errors[field], solved)
-    yield from _descriptions(evidence)
+    yield from _description_lines(evidence)
 
 
 def solved_point(evidence: Evidence, name: str) -> Source:
@@ -46,7 +46,7 @@ def circular_command_line(evidence: Evidence, name: str) -> str:
 
 
 def named_motion(evidence: Evidence, name: str) -> CircularMotion:
-    """The motion of a printed point: of its family at its rear rate, the one nearest to the printed angles."""
+    """Return the motion of a printed point: of its family at its rear rate, the one nearest to the printed angles."""
     point = evidence.figures[name]
     rate = point["rear_rate"] if "rear_rate" in point else float(point["v"][-1])
     angles = (
@@ -57,7 +57,7 @@ def named_motion(evidence: Evidence, name: str) -> CircularMotion:
 
 
 def own_errors(evidence: Evidence, name: str, motion: CircularMotion) -> dict[str, float]:
-    """How far the motion is from the same found without families: on the curves of a grid of starts."""
+    """Return the distances of a motion from the same motion found without families, on curves of a grid of starts."""
     point = evidence.figures[name]
     found = evidence.found(point["alpha"])
     points = np.concatenate(found.curves)
@@ -73,11 +73,11 @@ def own_errors(evidence: Evidence, name: str, motion: CircularMotion) -> dict[st
     return {field: abs(float(value)) + _ROUND_OFF for field, value in off.items()}
 
 
-def _descriptions(evidence: Evidence) -> Iterator[LedgerLine]:
+def _description_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     one, two, three, four = (named_motion(evidence, name) for name in NAMES)
     solved = [Check("largest residual", max(m.residual for m in (one, two, three, four)), 1e-12)]
     command = " && ".join(circular_command_line(evidence, name) for name in NAMES)
-    told = source("the motions P1 to P4", find_motions, command=command)
+    solved_motions = source("the motions P1 to P4", find_motions, command=command)
 
     def turns(motion: CircularMotion, left: bool) -> list[Threshold]:
         half = np.pi / 2
@@ -86,7 +86,7 @@ def _descriptions(evidence: Evidence) -> Iterator[LedgerLine]:
         return [below("yaw rate", motion.yaw_rate, 0.0, "rad/s"), above("steer", motion.steer, half, "rad")]
 
     def line(claim: str, thresholds: list[Threshold], measured: str) -> LedgerLine:
-        return claim_line("3.3", claim, thresholds, measured, told, solved)
+        return claim_line("3.3", claim, thresholds, measured, solved_motions, solved)
 
     leans = [abs(m.lean) for m in (one, two, three, four)]
     yield line(

@@ -10,12 +10,12 @@ from ...reference.sections import sample_family
 
 
 def motion_of_energy(family: Family, energy: float, near: CircularMotion) -> CircularMotion:
-    """Solve for the motion of a family with an energy [J], of several the nearest in lean to another.
+    """Solve for the motion of a family with an energy [J]; of several, the one nearest in lean to another motion.
 
     Raises
     ------
     ValueError
-        If the family has none.
+        If the family has no such motion.
     """
 
     def excess(point: Point) -> float:

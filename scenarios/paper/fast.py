@@ -1,12 +1,13 @@
-"""Circular motions up to infinite speed, where weight no longer counts.
+"""Circular motions up to infinite speed, where weight has no effect.
 
-Of the eight rows of `velodrome.reference.kernels.circle` two hold accelerations. They are affine in sigma, A + sigma B,
-with A from the weight and B from the motion; the others do not depend on it. With sigma = tan(angle) they are
+Two of the eight rows of `velodrome.reference.kernels.circle` contain accelerations. They are affine in sigma,
+A + sigma B, with A from the weight and B from the motion; the other rows do not depend on it. With
+sigma = tan(angle) they are
 
     cos(angle) A + sin(angle) B = 0,
 
 of which rest (angle 0) and infinite speed (angle pi/2) are regular points. Beyond pi/2, as below 0, sigma is
-negative: no motion.
+negative and there is no motion.
 """
 
 from __future__ import annotations
@@ -23,19 +24,19 @@ from ...reference.kernels.curve import CHOSEN
 from ...reference.kernels.steady import SIGMA_UNIT
 from ...reference.surface import Paraboloid
 
-_ANGLE = 6  # where sigma stands among the nine unknowns
-_MOST = 40  # Newton steps
-_ITERATIONS = 40  # of the secant method
-_SETTLED = 1e-13  # a step of Newton's method, relative: what is left is round-off
-# Round-off of rows of order one is 1e-14; near a flat bicycle the equations' condition grows like 1 over the lean's
-# distance from pi/2 and multiplies what is left of the steps, not of the rows.
+_ANGLE = 6  # index of sigma, or its angle, among the nine unknowns
+_MOST = 40  # largest number of Newton steps
+_ITERATIONS = 40  # largest number of steps of the secant method
+_SETTLED = 1e-13  # relative step of Newton's method below which only round-off remains
+# Round-off of rows of order one is 1e-14. Near a flat bicycle the equations' condition number grows like 1 over the
+# lean's distance from pi/2; it amplifies the error of the steps, not that of the rows.
 LARGEST_FLAT_RESIDUAL = 1e-11
 
 
 class FlatExpansion(NamedTuple):
-    """The equations at geometry and angle, shape (9,), to first order: rows (8,), their Jacobian (8, 9) in them.
+    """The equations at geometry and angle, shape (9,), to first order: rows (8,) and their Jacobian (8, 9).
 
-    The rear wheel's share of the speeds and its gradient (9,) come with them.
+    The rear wheel's share of the speeds and its gradient (9,) are included.
     """
 
     rows: np.ndarray
@@ -48,14 +49,14 @@ FlatCondition = Callable[[np.ndarray, FlatExpansion], tuple[float, np.ndarray]]
 
 
 def with_angle(unknowns: np.ndarray) -> np.ndarray:
-    """Geometry and angle (9,) of a solution (22,)."""
+    """Return geometry and angle (9,) of a solution (22,)."""
     chosen = unknowns[CHOSEN].copy()
     chosen[_ANGLE] = np.arctan(chosen[_ANGLE])
     return chosen
 
 
 def squared_rates(chosen: np.ndarray) -> float:
-    """Sum of the squared yaw and wheel rates [rad^2/s^2]; negative where there is no motion."""
+    """Return the sum of the squared yaw and wheel rates [rad^2/s^2]; negative where there is no motion."""
     return float(SIGMA_UNIT * np.tan(chosen[_ANGLE]))
 
 
@@ -79,17 +80,17 @@ def expand_flat(equations: Steady, chosen: np.ndarray) -> FlatExpansion:
 
 
 def pivoting(chosen: np.ndarray, here: FlatExpansion) -> tuple[float, np.ndarray]:
-    """Condition that the rear wheel stands."""
+    """Evaluate the condition that the rear wheel stands."""
     return here.rear_speed, here.gradient
 
 
 def at_lean(lean: float) -> FlatCondition:
-    """Condition of a given lean [rad]."""
+    """Make the condition of a given lean [rad]."""
     return lambda chosen, here: (float(chosen[LEAN]) - lean, np.eye(len(chosen))[LEAN])
 
 
 def at_angle(angle: float) -> FlatCondition:
-    """Condition of a given speed's angle [rad]."""
+    """Make the condition of a given angle of the speed [rad]."""
     return lambda chosen, here: (float(chosen[_ANGLE]) - angle, np.eye(len(chosen))[_ANGLE])
 
 
@@ -121,20 +122,20 @@ def solve_flat(equations: Steady, guess: np.ndarray, condition: FlatCondition) -
 
 @dataclass(frozen=True)
 class FlatEnd:
-    """The end of a curve whose lean tends to +-pi/2, followed to a distance of it.
+    """The end of a curve whose lean tends to +-pi/2, followed to a small distance from it.
 
     Attributes
     ----------
     distance : float
-        Of the lean from its limit [rad].
+        Distance of the lean from its limit [rad].
     rear_rate : float
-        There [rad/s].
+        Rear rate at this distance [rad/s].
     radius : float
-        Of D's circle there [m].
+        Radius of D's circle at this distance [m].
     constant : float
-        Squared rear rate times the distance: constant where the rate grows like one over the distance's root.
+        Squared rear rate times the distance: constant where the rate grows like one over the distance's square root.
     change : float
-        Of the constant over the last quartering of the distance, relative.
+        Relative change of the constant over the last division of the distance by four.
     """
 
     distance: float
@@ -150,7 +151,7 @@ def follow_flat_end(equations: Steady, unknowns: np.ndarray, nearest: float) -> 
     Raises
     ------
     ValueError
-        If it is lost on the way.
+        If the motion is lost on the way.
     """
     chosen, side = with_angle(unknowns), float(np.sign(unknowns[LEAN]))
     distance, rate = float(np.pi / 2 - side * chosen[LEAN]), 0.0
@@ -167,7 +168,7 @@ def follow_flat_end(equations: Steady, unknowns: np.ndarray, nearest: float) -> 
 def pivot_at(
     bicycle: Bicycle, start: np.ndarray, alpha: float, towards: float, angle: float
 ) -> tuple[float, np.ndarray]:
-    """Alpha at which a pivoting motion has a speed's angle, and the motion there (9,), by the secant method.
+    """Find alpha and motion (9,) where a pivoting motion has a given angle of the speed, by the secant method.
 
     Parameters
     ----------
@@ -175,9 +176,9 @@ def pivot_at(
     start : ndarray, shape (9,)
         The pivoting motion at ``alpha``.
     alpha, towards : float
-        It is carried from one to the other, which is near the alpha looked for [1/m].
+        The motion is carried from one to the other, which should be near the solution [1/m].
     angle : float
-        0 for rest, pi/2 for infinite speed [rad].
+        Wanted angle: 0 for rest, pi/2 for infinite speed [rad].
 
     Raises
     ------
@@ -196,7 +197,7 @@ def pivot_at(
 
 
 def carry_pivot(bicycle: Bicycle, start: np.ndarray, alpha: float, towards: float) -> list[tuple[float, np.ndarray]]:
-    """Carry a pivoting motion (9,) from an alpha to another in steps of a hundredth at the most: alphas and motions."""
+    """Carry a pivoting motion (9,) from one alpha to another in steps of at most 0.01; return alphas and motions."""
     many = max(2, int(np.ceil(abs(towards - alpha) / 0.01)) + 1)
     motions, chosen = [], start
     for shape in np.linspace(alpha, towards, many):

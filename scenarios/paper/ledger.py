@@ -1,4 +1,4 @@
-"""Lines of the ledger: a claim, what was measured and how, the verdict and the threshold that it rests on."""
+"""Lines of the ledger: a claim, what was measured and how, the verdict and the thresholds behind it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ KINDS = ("structure", "number", "stability", "simulation")
 REPRODUCED, ROUNDS, TRUNCATED, DEPENDS = "reproduced", "rounds to the print", "truncated", "depends on the cut"
 FAILS, UNTESTABLE = "does not hold", "not testable"
 VERDICTS = (REPRODUCED, ROUNDS, TRUNCATED, DEPENDS, FAILS, UNTESTABLE)
-COMMAND = "velodrome paper"  # which computes every line again
+COMMAND = "velodrome paper"  # command that computes every line again
 
 _RELATIONS: dict[str, Callable[[float, float], bool]] = {
     "<": lambda value, limit: value < limit,
@@ -25,7 +25,7 @@ _RELATIONS: dict[str, Callable[[float, float], bool]] = {
 
 @dataclass(frozen=True)
 class Check:
-    """A test of the measurement itself: it may be trusted where the value is within the limit.
+    """A test of the measurement itself, passed if the value is within the limit.
 
     Attributes
     ----------
@@ -39,13 +39,13 @@ class Check:
 
     @property
     def passes(self) -> bool:
-        """Whether the value is within the limit; a value that is no number is not."""
+        """Whether the value is within the limit; nan is not."""
         return bool(self.value <= self.limit)
 
 
 @dataclass(frozen=True)
 class Threshold:
-    """A condition on a measured number that a verdict rests on.
+    """A condition on a measured number, on which a verdict depends.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Threshold:
         The measured number.
     value : float
     relation : str
-        ``<``, ``<=``, ``>``, ``>=`` or ``=``, for counts.
+        ``<``, ``<=``, ``>`` or ``>=``; ``=`` for counts.
     limit : float
     unit : str
     """
@@ -66,17 +66,21 @@ class Threshold:
 
     @property
     def met(self) -> bool:
-        """Whether the number is as the claim wants it; a value that is no number is not."""
+        """Whether the number meets the condition; nan does not."""
         return bool(_RELATIONS[self.relation](self.value, self.limit))
 
     @property
     def text(self) -> str:
-        """The condition in words."""
+        """The condition as text."""
         return f"{self.what} {self.relation} {self.limit:.6g} {self.unit}".rstrip()
 
     def as_json(self) -> dict[str, Any]:
-        """The condition as a JSON object."""
-        numbers = {"value": _finite(self.value), "relation": self.relation, "limit": _finite(self.limit)}
+        """Return the condition as a JSON object."""
+        numbers = {
+            "value": _finite_or_none(self.value),
+            "relation": self.relation,
+            "limit": _finite_or_none(self.limit),
+        }
         return {"what": self.what, **numbers, "unit": self.unit, "met": self.met}
 
 
@@ -91,13 +95,13 @@ def above(what: str, value: float, limit: float, unit: str = "") -> Threshold:
 
 
 def equals(what: str, value: int, wanted: int) -> Threshold:
-    """Return the condition that a count is a given one."""
+    """Return the condition that a count has a given value."""
     return Threshold(what, float(value), "=", float(wanted))
 
 
 @dataclass(frozen=True)
 class Source:
-    """Where a measurement comes from.
+    """Origin of a measurement.
 
     Attributes
     ----------
@@ -108,8 +112,8 @@ class Source:
     command : str or None
         Command that computes it again.
     search : str or None
-        How motions were looked for, where the claim rests on how many there are: a search that is not exhaustive
-        can only say what it has found.
+        How motions were searched for, where the claim is about their number: a search that is not exhaustive
+        only shows what it has found.
     """
 
     computed: str
@@ -123,8 +127,8 @@ def source(computed: str, *functions: Callable, command: str = COMMAND, search: 
     return Source(computed, tuple(f"{f.__module__}.{f.__qualname__}" for f in functions), command, search)
 
 
-def _finite(value: float) -> float | None:
-    # JSON knows no infinity: a measurement that came to nothing has no value.
+def _finite_or_none(value: float) -> float | None:
+    # JSON has no infinity and no nan: a measurement without a result has no value.
     return float(value) if math.isfinite(value) else None
 
 
@@ -135,23 +139,23 @@ class LedgerLine:
     Attributes
     ----------
     section : str
-        Of the paper.
+        Section of the paper.
     claim : str
-        In our own words.
+        The claim in our words.
     kind : str
         One of `KINDS`.
     measured : str
-        What was found, with its figures.
+        What was measured, with numbers.
     verdict : str
         One of `VERDICTS`.
     printed : str or None
         The printed figure.
     value : float or None
-        The measured one.
+        The measured figure.
     source : Source
         What was computed, by which functions and command.
     thresholds : tuple of Threshold
-        Conditions that the verdict rests on. The verdict on a printed figure rests on the first that is met.
+        Conditions behind the verdict. The verdict on a printed figure depends on the first one that is met.
     checks : tuple of Check
         Tests of the measurement: residuals, an independent way to the same figure.
     """
@@ -169,14 +173,14 @@ class LedgerLine:
 
     @property
     def holds(self) -> bool:
-        """Whether the line does not speak against the paper or the measurement."""
+        """Whether the line speaks neither against the paper nor against the measurement."""
         return self.verdict != FAILS
 
     @property
     def fault(self) -> str | None:
-        """Whose a line that does not hold is.
+        """Whose fault a line that does not hold is; None for a line that holds.
 
-        ``paper`` where the measurement was tested and passed all its tests, else ``ours``.
+        ``paper`` if the measurement was tested and passed all its tests, otherwise ``ours``.
         """
         if self.holds:
             return None
@@ -184,16 +188,16 @@ class LedgerLine:
 
     @property
     def threshold(self) -> str:
-        """The conditions in words; empty where there is nothing to test."""
+        """The conditions as text; empty where there is nothing to test."""
         return "; ".join(threshold.text for threshold in self.thresholds)
 
     def as_json(self) -> dict[str, Any]:
-        """The line as a JSON object."""
+        """Return the line as a JSON object."""
         names = ("section", "claim", "kind", "printed", "measured", "value", "verdict", "holds", "fault", "threshold")
         checks = [
             {
                 "what": check.what,
-                "value": _finite(check.value),
+                "value": _finite_or_none(check.value),
                 "limit": float(check.limit),
                 "passes": check.passes,
             }
@@ -208,19 +212,19 @@ class LedgerLine:
 
 
 def unit_of(printed: str) -> Decimal:
-    """A unit of the last printed digit."""
+    """Return one unit of the last printed digit."""
     return Decimal((0, (1,), int(Decimal(printed).as_tuple().exponent)))
 
 
 def figure_thresholds(value: float, printed: str) -> tuple[Threshold, ...]:
-    """Conditions behind the verdict on a measured figure: rounding, then, where it does not round, cutting off."""
+    """Return the conditions on a measured figure: it rounds to the print or else the print truncates it."""
     exact, shown, last = Decimal(value), Decimal(printed), unit_of(printed)
     digits = f"last digit of {printed}"
     distance = float(abs(exact - shown))
     rounds = Threshold(f"distance from the print, to half a unit of the {digits},", distance, "<=", float(last / 2))
     if rounds.met:
         return (rounds,)
-    # What is cut off is further from zero than the print, by less than a unit.
+    # A truncated figure is further from zero than the print, by less than a unit.
     beyond = float((exact - shown) * (-1 if printed.startswith("-") else 1))
     past = f"distance beyond the print, to a unit of the {digits},"
     return (
@@ -231,7 +235,7 @@ def figure_thresholds(value: float, printed: str) -> tuple[Threshold, ...]:
 
 
 def figure_verdict(thresholds: Sequence[Threshold]) -> str:
-    """Verdict on a measured figure: it rounds to the print, the print cuts it off, or neither."""
+    """Return the verdict on a measured figure: it rounds to the print, the print truncates it, or neither."""
     rounds, *cut = thresholds
     if rounds.met:
         return ROUNDS
@@ -248,17 +252,17 @@ def figure_line(
     checks: Iterable[Check] = (),
     kind: str = "number",
 ) -> LedgerLine:
-    """Line on a printed figure.
+    """Make a line on a printed figure.
 
     Parameters
     ----------
     section, claim : str
     printed : str
-        As printed: its digits count.
+        The figure as printed, since its number of digits matters.
     value : float
-        Measured.
+        Measured figure.
     error : float
-        Its own error; it must be too small to change the verdict.
+        Error of the measurement; it must be too small to change the verdict.
     source : Source
     checks : iterable of Check
         Further tests of the measurement.
@@ -266,7 +270,7 @@ def figure_line(
 
     Returns
     -------
-    Line
+    LedgerLine
     """
     margin = abs(abs(Decimal(value) - Decimal(printed)) - unit_of(printed) / 2)
     tests = (Check("own error, against the distance from the limit of rounding", error, float(margin)), *checks)
@@ -297,7 +301,7 @@ def claim_line(
     kind: str = "structure",
     printed: str | None = None,
 ) -> LedgerLine:
-    """Line on a claim in words, which holds if every threshold is met; the checks test the measurement."""
+    """Make a line on a claim in words, which holds if every threshold is met; the checks test the measurement."""
     conditions = tuple(thresholds)
     line = LedgerLine(
         section=section,
@@ -316,7 +320,7 @@ def claim_line(
 def count_line(
     section: str, claim: str, printed: int, value: int, measured: str, source: Source, checks: Iterable[Check] = ()
 ) -> LedgerLine:
-    """Line on a printed count."""
+    """Make a line on a printed count."""
     condition = equals("count", value, printed)
     line = LedgerLine(
         section=section,
@@ -342,7 +346,7 @@ def count_by_cut(
     source: Source,
     checks: Iterable[Check] = (),
 ) -> LedgerLine:
-    """Line on a printed count of what can be cut into pieces in several ways: the count under each way."""
+    """Make a line on a printed count of pieces that can be counted in several ways, with the count under each way."""
     conditions = tuple(equals(cut, value, printed) for cut, value in counts.items())
     met = [condition.met for condition in conditions]
     line = LedgerLine(
@@ -360,27 +364,27 @@ def count_by_cut(
 
 
 def untestable_line(section: str, claim: str, why: str, kind: str = "structure") -> LedgerLine:
-    """Line on a claim that nothing here can test."""
+    """Make a line on a claim that cannot be tested here."""
     nothing = Source("nothing", command=None)
     return LedgerLine(section=section, claim=claim, kind=kind, measured=why, verdict=UNTESTABLE, source=nothing)
 
 
 def tested(line: LedgerLine, *more: Check) -> LedgerLine:
-    """The line with more tests: one whose measurement fails a test does not hold, whatever the figures say."""
+    """Add tests to a line; a line whose measurement fails a test does not hold, whatever the figures are."""
     checks = (*line.checks, *more)
     passes = line.verdict == UNTESTABLE or all(check.passes for check in checks)
     return replace(line, checks=checks, verdict=line.verdict if passes else FAILS)
 
 
 def counts(lines: Sequence[LedgerLine]) -> dict[str, int]:
-    """Number of lines by verdict."""
+    """Count the lines by verdict."""
     return {verdict: sum(line.verdict == verdict for line in lines) for verdict in VERDICTS}
 
 
 def ledger_document(lines: Sequence[LedgerLine]) -> dict[str, Any]:
-    """The ledger as a JSON document.
+    """Return the ledger as a JSON document.
 
-    ``holds``: every line does; ``faults``: lines that do not, by whose they are.
+    ``holds``: whether every line holds; ``faults``: numbers of lines that do not, by whose fault they are.
     """
     faults = {whose: sum(line.fault == whose for line in lines) for whose in ("paper", "ours")}
     return {

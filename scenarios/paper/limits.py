@@ -1,4 +1,4 @@
-"""Limits of flat bicycles: families followed on towards a lean of +-pi/2, at fixed leans."""
+"""Limits of flat bicycles: families followed towards a lean of +-pi/2, at fixed leans."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ import numpy as np
 
 from ...reference.circular import LEAN, STEER, Steady, newton, unknown_condition
 
-_NEAREST = 2e-3  # rad from +-pi/2: nearer, forces are so large that their round-off reaches the other rows
+_NEAREST = 2e-3  # [rad] from +-pi/2: nearer, forces are so large that their round-off affects the other rows
 _MOST = 40
 
 
 @dataclass(frozen=True)
 class FlatLimit:
-    """The last of a sequence of motions whose leans' distances from +-pi/2 halve.
+    """The last motion of a sequence in which the lean's distance from +-pi/2 is halved in each step.
 
     Attributes
     ----------
     distance : float
-        Of the lean from its limit [rad].
+        Distance of the lean from its limit [rad].
     front_rate : float
         [rad/s].
     rate_exponent, steer_exponent : float
-        Of the powers of the distance that the front rate and the steer's distance from its limit follow.
+        Exponents of the powers of the distance by which the front rate and the steer's distance from its limit change.
     steer : float
-        Its limit, extrapolated from the last three [rad].
+        Limit of the steer, extrapolated from the last three motions [rad].
     radius : float
-        Of D's circle [m].
+        Radius of D's circle [m].
     residual : float
-        Largest of the equations on the way, relative to the largest force.
+        Largest residual of the equations on the way, relative to the largest force.
     """
 
     distance: float
@@ -43,7 +43,7 @@ class FlatLimit:
 
 
 def find_limit(equations: Steady, ends: Sequence[np.ndarray], side: int) -> FlatLimit:
-    """Follow the flat one of a curve's two ends (22,) towards a lean of pi/2 (side 1) or -pi/2 (side -1).
+    """Follow the flat end among a curve's two ends (22,) towards a lean of pi/2 (side 1) or -pi/2 (side -1).
 
     Raises
     ------
@@ -65,7 +65,7 @@ def find_limit(equations: Steady, ends: Sequence[np.ndarray], side: int) -> Flat
         rate = equations.motion(unknowns).front_rate
         rows.append((distance, rate, float(unknowns[STEER]), float(np.hypot(*unknowns[:2]))))
     (_, _, s0, _), (_, r1, s1, _), (d2, r2, s2, radius) = rows[-3:]
-    # Halving: an error of the first order leaves half of itself.
+    # The distance is halved, so an error of first order is halved too.
     steer = 2 * s2 - s1
     return FlatLimit(
         distance=d2,

@@ -1,4 +1,4 @@
-"""Whether the bicycle is the published one: accelerations of a state that is no special one."""
+"""Check that the bicycle is the published one, by the accelerations of a generic state."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from ...reference.surface import Plane
 from .ledger import Check
 
 _SIGNS = {"theta": 1, "psi": -1, "phi": 1, "psif": 1, "betar": 1, "betaf": 1}
-# Published with thirteen decimals, the state too: half a unit of the last, times slopes of some 100.
+# Published with thirteen decimals, as is the state: half a unit of the last one, times slopes of about 100.
 _PUBLISHED = 1e-10
 
 
 def model_check(bicycle: Bicycle, figures: Mapping[str, Any]) -> Check:
-    """Largest difference of the accelerations from Basu-Mandal et al. (2007), Table 1.
+    """Check the largest difference of the accelerations from Basu-Mandal et al. (2007), Table 1.
 
-    What does not agree with the paper is the paper's only if the bicycle is the right one.
+    A disagreement with the paper is the paper's fault only if the bicycle is the right one.
     """
     table = figures["basu_mandal"]
     q, qd = table["q"], table["qd"]

@@ -16,7 +16,7 @@ from .limits import find_limit
 from .model import model_check
 from .search import search_motions
 
-_SLOPE = 0.002  # of what a power law's exponent may be off by at the last lean: its correction is of the lean's size
+_SLOPE = 0.002  # error of a power law's exponent at the last lean: the correction is of the size of that lean
 _LEVEL = 0.0
 _ROUND_OFF = 1e-14  # of numbers of order ten
 _COMMAND = families_command_line(_LEVEL)
@@ -24,37 +24,38 @@ _FOLLOWED = source("the families on the plane, followed from end to end", trace,
 _SPECIAL = source(
     "a special point, solved on the followed family and in a second way", special_points, command=_COMMAND
 )
-_BEYOND_CUSP = 0.1  # rad/s beyond the cusp D: where a front rate has several motions
+_BEYOND_CUSP = 0.1  # [rad/s] beyond the cusp D, at a front rate with several motions
 
 
 def plane_lines(evidence: Evidence) -> Iterator[LedgerLine]:
-    """Lines on section 3.2."""
-    yield from _four_families(evidence)
-    yield _ranges(evidence)
-    yield from _first(evidence)
-    yield from _second(evidence)
-    yield from _third(evidence)
+    """Yield the lines on section 3.2."""
+    yield from _four_families_lines(evidence)
+    yield _ranges_line(evidence)
+    yield from _first_family_lines(evidence)
+    yield from _second_family_lines(evidence)
+    yield from _third_family_lines(evidence)
 
 
 def named_point(evidence: Evidence, family: int, name: str) -> tuple[SpecialPoint, dict[str, float]]:
-    """A special point on the plane and its error: how far it is from the same found in another way.
+    """Return a special point on the plane and its errors: distances from the same point found in another way.
 
-    The other way is a second tracing; A and G, which end a curve, are solved from a grid of starts too.
+    The other way is a second tracing; A and G, which end a curve, are solved from a grid of starts as well.
     """
-    one, other = (evidence.special(_LEVEL, family, name, step) for step in (LONGEST_PAPER_STEP, OTHER_STEP))
-    if one is None or other is None:
+    point, again = (evidence.special(_LEVEL, family, name, step) for step in (LONGEST_PAPER_STEP, OTHER_STEP))
+    if point is None or again is None:
         raise ValueError(f"point {name} is not found on family {family}")
     names = ("lean", "steer", "front_rate", "rear_rate")
-    error = {field: abs(getattr(one, field) - getattr(other, field)) for field in names}
+    error = {field: abs(getattr(point, field) - getattr(again, field)) for field in names}
     found = evidence.found(_LEVEL)
-    for alone in {"A": found.static, "G": found.pivoting}.get(name, []):
-        rate = abs(found.equations.motion(alone).front_rate) - abs(one.front_rate)
-        for field, off in (("lean", alone[LEAN] - one.lean), ("steer", alone[STEER] - one.steer), ("front_rate", rate)):
+    for unknowns in {"A": found.static, "G": found.pivoting}.get(name, []):
+        rate = abs(found.equations.motion(unknowns).front_rate) - abs(point.front_rate)
+        offsets = {"lean": unknowns[LEAN] - point.lean, "steer": unknowns[STEER] - point.steer, "front_rate": rate}
+        for field, off in offsets.items():
             error[field] = max(error[field], abs(float(off)))
-    return one, {field: off + _ROUND_OFF for field, off in error.items()}
+    return point, {field: off + _ROUND_OFF for field, off in error.items()}
 
 
-def _four_families(evidence: Evidence) -> Iterator[LedgerLine]:
+def _four_families_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     found, printed = evidence.found(_LEVEL), evidence.figures["counts"]["families"]
     whole = [evidence.residual((_LEVEL,)), evidence.searched_again(_LEVEL)]
     curves = source("all curves of circular motions, from a grid of starts", search_motions, search=found.described)
@@ -82,7 +83,7 @@ def _four_families(evidence: Evidence) -> Iterator[LedgerLine]:
     )
 
 
-def _ranges(evidence: Evidence) -> LedgerLine:
+def _ranges_line(evidence: Evidence) -> LedgerLine:
     steers = np.concatenate([evidence.samples(_LEVEL, number).steer for number in FAMILIES])
     rates = np.concatenate([evidence.samples(_LEVEL, number).rear_rate for number in FAMILIES])
     return claim_line(
@@ -100,7 +101,7 @@ def _ranges(evidence: Evidence) -> LedgerLine:
     )
 
 
-def _first(evidence: Evidence) -> Iterator[LedgerLine]:
+def _first_family_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     printed, samples = evidence.figures, evidence.samples(_LEVEL, 1)
     steer = float(samples.steer.max())
     yield claim_line(
@@ -117,13 +118,13 @@ def _first(evidence: Evidence) -> Iterator[LedgerLine]:
     yield claim_line(
         section="3.2",
         claim="A is a static equilibrium",
-        # The squared speed is zero to round-off: the speed to its root.
+        # The squared speed is zero to round-off, the speed to its square root.
         thresholds=[below("larger wheel rate", rest, 1e-6, "rad/s")],
         measured=f"wheel rates {rest:.0e}, lean {static.lean:.0e}",
         source=_SPECIAL,
         checks=[evidence.residual()],
     )
-    yield from _straight(evidence, 1, "B")
+    yield from _straight_motion_lines(evidence, 1, "B")
     speed = named_point(evidence, 1, "B")[0].rear_rate * evidence.bicycle.rear_wheel_radius
     off = abs(speed - float(printed["meijaard"]["capsize_speed"]))
     yield claim_line(
@@ -136,8 +137,8 @@ def _first(evidence: Evidence) -> Iterator[LedgerLine]:
     )
 
 
-def _straight(evidence: Evidence, number: int, name: str) -> Iterator[LedgerLine]:
-    """The straight motion that large circles tend to: their front rate is off by a constant over R^2."""
+def _straight_motion_lines(evidence: Evidence, number: int, name: str) -> Iterator[LedgerLine]:
+    """Yield lines on the straight motion that large circles tend to; their front rate differs by a term in 1/R^2."""
     straight, error = named_point(evidence, number, name)
     samples = evidence.samples(_LEVEL, number)
     far = np.argsort(samples.radius)[[-1, -5]]
@@ -155,7 +156,7 @@ def _straight(evidence: Evidence, number: int, name: str) -> Iterator[LedgerLine
     yield figure_line("3.2", claim, printed, straight.front_rate, error["front_rate"] + 1e-12, solved, [independent])
     turned = "reversed, steer pi" if number == 2 else "straight ahead"
     angles = np.stack([samples.lean, samples.steer - straight.steer])[:, far] * samples.radius[far]
-    # Lean and steer are odd in the curvature 1/R: what they miss of their first order falls like 1/R^3.
+    # Lean and steer are odd in the curvature 1/R: the error of their first order decreases like 1/R^3.
     kept = float(np.abs(angles[:, 0] / angles[:, 1] - 1).max())
     yield claim_line(
         section="3.2",
@@ -169,7 +170,7 @@ def _straight(evidence: Evidence, number: int, name: str) -> Iterator[LedgerLine
     )
 
 
-def _second(evidence: Evidence) -> Iterator[LedgerLine]:
+def _second_family_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     printed, samples = evidence.figures["D"], evidence.samples(_LEVEL, 2)
     least, fastest = float(samples.steer.min()), float(samples.front_rate.max())
     whole = [evidence.residual()]
@@ -189,7 +190,7 @@ def _second(evidence: Evidence) -> Iterator[LedgerLine]:
         source=_FOLLOWED,
         checks=whole,
     )
-    yield from _straight(evidence, 2, "C")
+    yield from _straight_motion_lines(evidence, 2, "C")
     cusp, error = named_point(evidence, 2, "D")
     for name, what in (("lean", "lean"), ("steer", "steer"), ("front_rate", "front rate")):
         yield figure_line("3.2", f"D: {what}", printed[name], getattr(cusp, name), error[name], _SPECIAL)
@@ -206,7 +207,7 @@ def _second(evidence: Evidence) -> Iterator[LedgerLine]:
     yield _limit_line(evidence.family(_LEVEL, 2), "E", 1, np.pi, -1)
 
 
-def _third(evidence: Evidence) -> Iterator[LedgerLine]:
+def _third_family_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     printed, family = evidence.figures["G"], evidence.family(_LEVEL, 3)
     pivot, error = named_point(evidence, 3, "G")
     for name, what in (("lean", "lean"), ("steer", "steer")):
@@ -236,14 +237,14 @@ def _third(evidence: Evidence) -> Iterator[LedgerLine]:
         checks=[evidence.residual()],
     )
     yield _limit_line(family, "F", -1, 0.0, 1)
-    yield _monotone(evidence, family)
-    yield _agreement(evidence)
+    yield _monotone_line(evidence, family)
+    yield _agreement_line(evidence)
 
 
-def _monotone(evidence: Evidence, family: Family) -> LedgerLine:
-    """The tangents tell: no point where the front rate, the lean or the steer turns back."""
+def _monotone_line(evidence: Evidence, family: Family) -> LedgerLine:
+    """Make the line on monotony from the tangents: the front rate, the lean and the steer nowhere turn back."""
     slopes = np.array([[front_rate_slope(p), p.tangent[LEAN], p.tangent[STEER]] for p in family.points])
-    # At the pivot itself a sign of the direction that is followed; all three must keep theirs.
+    # At the pivot the sign depends on the direction that is followed; all three must keep their signs.
     by_lean, by_steer = (slopes[:, [k]] * slopes[:, [0]] for k in (1, 2))
     return claim_line(
         section="3.2",
@@ -260,7 +261,7 @@ def _monotone(evidence: Evidence, family: Family) -> LedgerLine:
 
 
 def _limit_line(family: Family, name: str, side: int, steer: float, sign: int) -> LedgerLine:
-    """E and F: the curve followed on at fixed leans, whose distances from +-pi/2 halve."""
+    """Make the line on E or F: the curve followed at fixed leans, whose distance from +-pi/2 is halved in each step."""
     far = find_limit(family.equations, [family.points[k].unknowns for k in (0, -1)], side)
     infinity = "-infinity" if sign < 0 else "infinity"
     corner = f"({'pi/2' if side > 0 else '-pi/2'}, {'pi' if steer else '0'}, {infinity})"
@@ -281,7 +282,7 @@ def _limit_line(family: Family, name: str, side: int, steer: float, sign: int) -
     )
 
 
-def _agreement(evidence: Evidence) -> LedgerLine:
+def _agreement_line(evidence: Evidence) -> LedgerLine:
     model = model_check(evidence.bicycle, evidence.figures)
     return claim_line(
         section="3.2",

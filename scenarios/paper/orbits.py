@@ -1,4 +1,4 @@
-"""Section 3.1: what is constant, what periodic on a circular motion; the mirrored one; contact circles."""
+"""Section 3.1: constant and periodic quantities of a circular motion, mirrored motions, contact circles."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from .search import mirrored
 
 _STEADY = (LEAN, PITCH, STEER)
 _TURNS = 1.0
-# The precise integrator leaves some 1e-12 a turn, which the unstable Q1 multiplies by exp(0.38 x 8) = 22.
+# The precise integrator's error is about 1e-12 a turn; the unstable Q1 multiplies it by exp(0.38 x 8) = 22.
 _KEPT = 1e-9
-_KEPT_FORCE = 1e-7  # N: the same of forces of some 500 N
+_KEPT_FORCE = 1e-7  # [N] the same for forces of about 500 N
 
 
 def orbit_lines(evidence: Evidence) -> Iterator[LedgerLine]:
-    """Lines on Eqs. 9-11 and the symmetry of left and right."""
+    """Yield the lines on Eqs. 9-11 and on the symmetry of left and right."""
     constant, sinus, normal, turning = 0.0, 0.0, 0.0, np.inf
     for name in ("Q1", "Q2"):
-        one = _one_turn(evidence, name)
-        constant, sinus = max(constant, one[0]), max(sinus, one[1])
-        normal, turning = max(normal, one[2]), min(turning, one[3])
+        change = _measure_turn(evidence, name)
+        constant, sinus = max(constant, change[0]), max(sinus, change[1])
+        normal, turning = max(normal, change[2]), min(turning, change[3])
     integrated = Check("largest departure of what is constant", constant, _KEPT)
     turned = source(
         "one turn of Q1 and of Q2, integrated from the solved motion", simulate, command="velodrome run q1 q2"
@@ -62,12 +62,12 @@ def orbit_lines(evidence: Evidence) -> Iterator[LedgerLine]:
         source=turned,
         checks=[integrated],
     )
-    yield _circles(evidence)
-    yield _mirror(evidence)
+    yield _circles_line(evidence)
+    yield _mirror_line(evidence)
 
 
-def _one_turn(evidence: Evidence, name: str) -> tuple[float, float, float, float]:
-    """Change of constants, departure from the sinusoid [m, rad], change of normal forces, of others [N]."""
+def _measure_turn(evidence: Evidence, name: str) -> tuple[float, float, float, float]:
+    """Return change of constants, departure from the sinusoid [m, rad], change of normal and of other forces [N]."""
     point = evidence.figures[name]
     surface = Paraboloid(point["alpha"])
     motion = evidence.motions(point["alpha"], point["family"], float(point["v"][-1]))[0]
@@ -87,7 +87,7 @@ def _one_turn(evidence: Evidence, name: str) -> tuple[float, float, float, float
     )
 
 
-def _circles(evidence: Evidence) -> LedgerLine:
+def _circles_line(evidence: Evidence) -> LedgerLine:
     least = np.inf
     for alpha in evidence.cases:
         for number in FAMILIES:
@@ -108,7 +108,7 @@ def _circles(evidence: Evidence) -> LedgerLine:
     )
 
 
-def _mirror(evidence: Evidence) -> LedgerLine:
+def _mirror_line(evidence: Evidence) -> LedgerLine:
     worst = 0.0
     for alpha in evidence.cases:
         for number in FAMILIES:

@@ -1,12 +1,12 @@
-"""The linearised DAE as it stands (Xiong et al. 2020, Eqs. 14 and 15), and its generalised eigenvalues.
+"""The linearised DAE without reduction (Xiong et al. 2020, Eqs. 14 and 15), and its generalised eigenvalues.
 
 In the heading frame, with coordinates u = (x, y, z, lean, pitch, steer), rates w of all nine coordinates,
 contact parameters p and forces f, the equations about a circular motion are
 
     u' = w_u,    R(u, w, w', p, f) = 0,
 
-27 in the 27 unknowns y = (u, w, p, f), and their first order E y' = H y. The three cyclic coordinates do not
-appear. E has the rank 15, and of the 27 eigenvalues of lambda E - H seven are finite: those of the reduced system.
+27 in the 27 unknowns y = (u, w, p, f), and to first order E y' = H y. The three cyclic coordinates do not
+appear. E has rank 15, and of the 27 eigenvalues of lambda E - H seven are finite: those of the reduced system.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from ...reference.surface import SurfaceOfRevolution
 
 _CYCLIC = (YAW, 7, 8)
 _STILL = [k for k in range(len(COORDINATES)) if k not in _CYCLIC]
-_SHIFT = 1.7  # 1/s: no eigenvalue of the motions looked at, and of their size
+_SHIFT = 1.7  # [1/s] of the size of the eigenvalues, but not one of them
 _INDEX = 3  # of the DAE: gaps at the level of positions
-# Of the largest singular value: what counts stands above 1e-6 of it, round-off below 1e-15.
+# Relative to the largest singular value: those that count are above 1e-6, round-off is below 1e-15.
 _COUNTS = 1e-10
 
 
 def linearised_dae(
     bicycle: Bicycle, surface: SurfaceOfRevolution, motion: CircularMotion
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return E and H, shapes (27, 27), at a circular motion: derivatives by the complex step."""
+    """Compute E and H, shapes (27, 27), at a circular motion; derivatives are taken by the complex step."""
     q, qd = motion.state()
     now, rates = dynamics(bicycle, surface, q, qd), np.zeros(len(q))
     rates[list(_CYCLIC)] = qd[list(_CYCLIC)]
     weight = bicycle.mass * bicycle.gravity
     arguments = (q, rates, np.zeros(len(q)), now.contact.ravel(), now.force.ravel() / weight)
-    slopes = [_slopes(bicycle, surface, arguments, k) for k in range(len(arguments))]
+    slopes = [_argument_jacobian(bicycle, surface, arguments, k) for k in range(len(arguments))]
     still = len(_STILL)
     size = still + sum(len(arguments[k]) for k in (1, 3, 4))
     e, h = np.zeros((2, size, size))
@@ -51,7 +51,7 @@ def linearised_dae(
     return e, h
 
 
-def _slopes(
+def _argument_jacobian(
     bicycle: Bicycle, surface: SurfaceOfRevolution, arguments: tuple[np.ndarray, ...], which: int
 ) -> np.ndarray:
     columns = []
@@ -71,7 +71,7 @@ def _turning_residual(
     p: np.ndarray,
     force: np.ndarray,
 ) -> np.ndarray:
-    """The 21 equations with x and y and their derivatives in the heading frame, forces over the weight."""
+    """Evaluate the 21 equations with x, y and their derivatives in the heading frame and forces over the weight."""
     qd, qdd, w, (x, y) = rates.copy(), accelerations.copy(), rates[YAW], q[:2]
     qd[:2] += (-w * y, w * x)
     turning = accelerations[YAW]
@@ -81,7 +81,7 @@ def _turning_residual(
 
 
 def generalised_eigenvalues(e: np.ndarray, h: np.ndarray) -> np.ndarray:
-    """All eigenvalues of lambda E - H by the QZ method, as it returns them: finite or not [1/s]."""
+    """Compute all eigenvalues of lambda E - H by the QZ method, as it returns them, finite or not [1/s]."""
     pairs: Any = eigvals(h, e, homogeneous_eigvals=True)
     alpha, beta = pairs
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -90,10 +90,10 @@ def generalised_eigenvalues(e: np.ndarray, h: np.ndarray) -> np.ndarray:
 
 
 def number_of_finite(e: np.ndarray, h: np.ndarray) -> int:
-    """Number of finite eigenvalues that lambda E - H has.
+    """Count the finite eigenvalues of lambda E - H.
 
-    Of (H - s E)^-1 E they are 1 / (lambda - s), the infinite ones a nilpotent part, which the power of the index
-    takes away.
+    They are the eigenvalues 1 / (lambda - s) of (H - s E)^-1 E; the infinite ones are a nilpotent part, which vanishes
+    in the power of the index.
     """
     power = np.linalg.matrix_power(np.linalg.solve(h - _SHIFT * e, e), _INDEX)
     values = np.linalg.svd(power, compute_uv=False)
@@ -101,7 +101,7 @@ def number_of_finite(e: np.ndarray, h: np.ndarray) -> int:
 
 
 def spurious(found: np.ndarray, reduced: np.ndarray) -> tuple[float, np.ndarray]:
-    """Largest distance of the reduced system's eigenvalues from those found, each from one of its own, and the rest."""
+    """Return the largest distance of the reduced eigenvalues from distinct ones of those found, and the others."""
     rest, off = found.astype(complex), 0.0
     for value in reduced:
         nearest = int(np.abs(rest - value).argmin())

@@ -1,4 +1,4 @@
-"""Section 4.2: the points Q1 and Q2, their spectra, and what they say of D."""
+"""Section 4.2: the points Q1 and Q2, their spectra, and what they show about D."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _STATES = (("x", "D's x in the heading frame"), ("y", "D's y"), ("lean", "lean")
 
 
 def point_lines(evidence: Evidence) -> Iterator[LedgerLine]:
-    """Lines on Q1 and Q2."""
+    """Yield the lines on Q1 and Q2."""
     for name in ("Q1", "Q2"):
         motion, printed = named_motion(evidence, name), evidence.figures[name]
         errors = own_errors(evidence, name, motion)
@@ -27,17 +27,17 @@ def point_lines(evidence: Evidence) -> Iterator[LedgerLine]:
             yield figure_line(
                 "4.2", f"{name}: {what}", text, float(values[field]), errors[field], solved_point(evidence, name)
             )
-        yield from _spectrum(evidence, name, motion)
-        why = "the text lacks the matrix; its eigenvalues are held above"
+        yield from _spectrum_lines(evidence, name, motion)
+        why = "the text lacks the matrix; its eigenvalues are tested above"
         yield untestable_line("4.2", f"{name}: the 7 x 7 Jacobian as printed", why, "number")
-    yield from _meaning(evidence)
+    yield from _stability_lines(evidence)
 
 
-def _spectrum(evidence: Evidence, name: str, motion: CircularMotion) -> Iterator[LedgerLine]:
+def _spectrum_lines(evidence: Evidence, name: str, motion: CircularMotion) -> Iterator[LedgerLine]:
     surface = Paraboloid(evidence.figures[name]["alpha"])
     reduced = linearise(evidence.bicycle, surface, *motion.state())
     error = eigenvalue_errors(reduced)
-    told = source(
+    computed = source(
         "eigenvalues of the reduced Jacobian at the motion",
         linearise,
         eigenvalue_errors,
@@ -53,24 +53,24 @@ def _spectrum(evidence: Evidence, name: str, motion: CircularMotion) -> Iterator
                 claim=f"{name}: an eigenvalue is zero",
                 thresholds=[below("smallest size of an eigenvalue", abs(value), 1e-9, "1/s")],
                 measured=f"smallest {abs(value):.0e}",
-                source=told,
+                source=computed,
                 checks=[Check("its own error", float(error[i]), 1e-9)],
                 kind="number",
                 printed="0",
             )
             continue
-        claim = f"{name}: eigenvalue {_complex(real, imaginary)}"
-        yield figure_line("4.2", f"{claim}, real part", real, value.real, float(error[i]), told)
+        claim = f"{name}: eigenvalue {_format_complex(real, imaginary)}"
+        yield figure_line("4.2", f"{claim}, real part", real, value.real, float(error[i]), computed)
         if target.imag:
-            yield figure_line("4.2", f"{claim}, imaginary part", imaginary, abs(value.imag), float(error[i]), told)
+            yield figure_line("4.2", f"{claim}, imaginary part", imaginary, abs(value.imag), float(error[i]), computed)
 
 
-def _complex(real: str, imaginary: str) -> str:
+def _format_complex(real: str, imaginary: str) -> str:
     return real if float(imaginary) == 0 else f"{real} +- {imaginary} i"
 
 
 def eigenvalue_errors(reduced: Linearisation) -> np.ndarray:
-    """What round-off of the Jacobian leaves of each eigenvalue: 1e-14 of its norm times the condition, shape (7,)."""
+    """Estimate the error of each eigenvalue, shape (7,): 1e-14 of the Jacobian's norm times the condition number."""
     values, right = np.linalg.eig(reduced.jacobian)
     left = np.linalg.inv(right)
     condition = np.linalg.norm(right, axis=0) * np.linalg.norm(left, axis=1)
@@ -78,7 +78,7 @@ def eigenvalue_errors(reduced: Linearisation) -> np.ndarray:
     return 1e-14 * np.linalg.norm(reduced.jacobian) * condition[order]
 
 
-def _meaning(evidence: Evidence) -> Iterator[LedgerLine]:
+def _stability_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     for name, stable, forward in (("Q1", False, True), ("Q2", True, False)):
         motion, point = named_motion(evidence, name), evidence.figures[name]
         surface = Paraboloid(point["alpha"])
@@ -113,17 +113,17 @@ def _meaning(evidence: Evidence) -> Iterator[LedgerLine]:
             ],
             kind="stability",
         )
-    yield _reference_point(evidence)
+    yield _reference_point_line(evidence)
 
 
-def _reference_point(evidence: Evidence) -> LedgerLine:
-    """D at another height of the steering axis would give other x and y: how the printed ones tell."""
+def _reference_point_line(evidence: Evidence) -> LedgerLine:
+    """Make the line on D: at another height of the steering axis D would have other x and y than the printed ones."""
     worst, other = 0.0, np.inf
     for name in ("Q1", "Q2"):
         motion, printed = named_motion(evidence, name), evidence.figures[name]["v"][:2]
         off = np.abs(motion.position[:2] - [float(text) for text in printed])
         worst = max(worst, float(off.max()))
-        # Up the steering axis to the height of the rear axle, in the heading frame.
+        # D moved along the steering axis to the height of the rear axle, in the heading frame.
         q, _ = motion.state()
         bicycle = evidence.bicycle
         rise = (bicycle.rear_wheel_radius - bicycle.front_wheel_radius) / bicycle.steer_axis[2]

@@ -1,4 +1,4 @@
-"""The paper's printed figures and the ledger that holds them against what is measured."""
+"""The printed figures of the paper and of the papers it is validated against."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ from typing import Any
 
 @cache
 def read_printed() -> dict[str, Any]:
-    """Figures as printed by Xiong et al. (2020) and by the papers it is validated against."""
+    """Read the figures as printed by Xiong et al. (2020) and by the papers it is validated against."""
     return tomllib.loads(Path(__file__).with_name("printed.toml").read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""Section 3.2: how far the families' rear rates go, to infinity where they do."""
+"""Section 3.2: the range of the families' rear rates, and which of them are unbounded."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from .evidence import Evidence
 from .fast import FlatEnd, at_angle, expand_flat, follow_flat_end, solve_flat, with_angle
 from .ledger import Check, LedgerLine, above, below, claim_line, source
 
-_NEAREST = 1e-7  # rad from a lean of pi/2: nearer, round-off over the distance is no longer small
-_FAR = 1e4  # rad/s: a hundred times where the families' curves are cut off
-# Of the squared rear rate times the lean's distance d from pi/2, over its last quartering: what it misses is of
-# order d, times 1 over the angle's slope in d, some 10 to 100.
+_NEAREST = 1e-7  # [rad] from a lean of pi/2: nearer, round-off over the distance is no longer small
+_FAR = 1e4  # [rad/s] a hundred times the rates at which the families' curves are cut off
+# Change of the squared rear rate times the lean's distance d from pi/2, over the last division of d by four: the error
+# is of order d, times 1 over the angle's slope in d, about 10 to 100.
 _LAW = 1e-4
 
 
 def rate_lines(evidence: Evidence) -> Iterator[LedgerLine]:
-    """Lines on the range of rear rates."""
+    """Yield the line on the range of rear rates."""
     flat: list[FlatEnd] = []
     infinite: list[float] = []
     finite = []
@@ -31,11 +31,11 @@ def rate_lines(evidence: Evidence) -> Iterator[LedgerLine]:
                 if end == "flat":
                     flat.append(follow_flat_end(family.equations, point.unknowns, _NEAREST))
                 elif end == "fast front wheel":
-                    infinite.append(_infinitely_fast(family.equations, point.unknowns))
+                    infinite.append(_rear_share_at_infinity(family.equations, point.unknowns))
                 elif end == "large circle":
                     rate = family.equations.motion(point.unknowns).rear_rate
                     finite.append(f"{rate:.2f} (alpha = {alpha:g}, family {number})")
-    rising = min(_rising(evidence, alpha) for alpha in evidence.cases)
+    rising = min(_least_rate_slope(evidence, alpha) for alpha in evidence.cases)
     starts = max(float(evidence.samples(alpha, 3).rear_rate.min()) for alpha in evidence.cases)
     slowest = min((end.rear_rate for end in flat), default=np.nan)
     worst = max((end.change for end in flat), default=np.nan)
@@ -70,14 +70,14 @@ def rate_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     )
 
 
-def _infinitely_fast(equations: Steady, unknowns: np.ndarray) -> float:
-    """Size of the rear wheel's share in the speeds at the infinitely fast motion in which a curve ends."""
+def _rear_share_at_infinity(equations: Steady, unknowns: np.ndarray) -> float:
+    """Return the magnitude of the rear wheel's share in the speeds at the infinitely fast motion that ends a curve."""
     chosen = with_angle(unknowns)
     chosen = solve_flat(equations, chosen, at_angle(np.pi / 2))
     return abs(expand_flat(equations, chosen).rear_speed)
 
 
-def _rising(evidence: Evidence, alpha: float) -> float:
-    """Least slope of the squared rear rate along family 3 between its ends, in the direction in which it grows."""
+def _least_rate_slope(evidence: Evidence, alpha: float) -> float:
+    """Return the least slope of the squared rear rate along family 3 between its ends, in the direction of growth."""
     slopes = np.array([rear_rate_slope(point) for point in evidence.family(alpha, 3).points[1:-1]])
     return float((slopes * np.sign(slopes[-1])).min())

@@ -16,11 +16,11 @@ from .ledger import Check, LedgerLine, above, below, claim_line, count_line, equ
 from .pencil import generalised_eigenvalues, linearised_dae, number_of_finite, spurious
 from .structure import GAP_ROWS, derivatives, rank
 
-_DOUBLE_ZERO = 1e-6  # relative: two zeros that meet split by the root of round-off, times the condition
+_DOUBLE_ZERO = 1e-6  # relative: a double zero splits by the square root of round-off, times the condition
 
 
 def reduction_lines(evidence: Evidence) -> Iterator[LedgerLine]:
-    """Lines on section 4.1."""
+    """Yield the lines on section 4.1."""
     printed = evidence.figures["counts"]
     motion = named_motion(evidence, "Q2")
     surface, (q, qd) = Paraboloid(evidence.figures["Q2"]["alpha"]), motion.state()
@@ -62,7 +62,7 @@ def reduction_lines(evidence: Evidence) -> Iterator[LedgerLine]:
         source=linearised,
         checks=[Check("largest of X at Q2", field, 1e-9)],
     )
-    yield _same_equilibria(evidence)
+    yield _same_equilibria_line(evidence)
     singular, smallest = rank(slopes["qdd"])
     yield claim_line(
         section="4.1",
@@ -72,12 +72,12 @@ def reduction_lines(evidence: Evidence) -> Iterator[LedgerLine]:
         source=source("rank of the equations' derivatives by the accelerations", derivatives, rank, command=command),
         checks=[Check("round-off over the smallest singular value", 1e-12 / smallest, 1e-6)],
     )
-    yield _spurious(evidence)
-    yield _zero_everywhere(evidence)
+    yield _spurious_line(evidence)
+    yield _zero_eigenvalue_line(evidence)
 
 
-def _same_equilibria(evidence: Evidence) -> LedgerLine:
-    """X at the motions that the steady equations give, along all families."""
+def _same_equilibria_line(evidence: Evidence) -> LedgerLine:
+    """Make the line on equilibria: X at motions along all families that solve the steady equations."""
     worst, many = 0.0, 0
     for alpha in evidence.cases:
         for number in FAMILIES:
@@ -85,7 +85,7 @@ def _same_equilibria(evidence: Evidence) -> LedgerLine:
             for point in family.points[:: max(1, len(family.points) // 20)]:
                 q, qd = family.equations.motion(point.unknowns).state()
                 x = linearise(evidence.bicycle, family.equations.surface, q, qd).field
-                # Accelerations are differences of terms of the size of the squared rates.
+                # Accelerations are differences of terms of the magnitude of the squared rates.
                 worst, many = max(worst, float(np.abs(x).max() / (1 + np.abs(qd).max() ** 2))), many + 1
     return claim_line(
         section="4.1",
@@ -97,8 +97,8 @@ def _same_equilibria(evidence: Evidence) -> LedgerLine:
     )
 
 
-def _spurious(evidence: Evidence) -> LedgerLine:
-    """The pencil lambda E - H of the linearised DAE, untouched, against the seven of the reduced system."""
+def _spurious_line(evidence: Evidence) -> LedgerLine:
+    """Make the line on spurious eigenvalues: those of lambda E - H against the seven of the reduced system."""
     largest, texts, extra, orders, falsely = 0.0, [], [], [], 0
     for name in ("Q1", "Q2"):
         motion, surface = named_motion(evidence, name), Paraboloid(evidence.figures[name]["alpha"])
@@ -125,8 +125,8 @@ def _spurious(evidence: Evidence) -> LedgerLine:
             above("least number of eigenvalues beyond the seven", min(extra), 0),
             equals("finite eigenvalues that the pencil has", max(orders), 7),
         ],
-        measured="; ".join(texts) + ". The pencil is of index 3 and has seven finite eigenvalues: the others stand for "
-        "infinity, and how many of them come out finite, and where, is round-off's choice",
+        measured="; ".join(texts) + ". The pencil is of index 3 and has seven finite eigenvalues: the others are "
+        "infinite, and round-off determines how many of them come out finite, and where",
         source=source(
             "eigenvalues of lambda E - H in the heading frame, 27 x 27, by the QZ method, and the rank of "
             "((H - s E)^-1 E)^3, the number of the finite ones",
@@ -139,12 +139,12 @@ def _spurious(evidence: Evidence) -> LedgerLine:
     )
 
 
-def _zero_everywhere(evidence: Evidence) -> LedgerLine:
+def _zero_eigenvalue_line(evidence: Evidence) -> LedgerLine:
     worst = 0.0
     for alpha in evidence.cases:
         for number in FAMILIES:
             samples = evidence.samples(alpha, number)
-            # Where the bicycle is fast, eigenvalues are known relative to the largest only.
+            # Where the bicycle is fast, eigenvalues are known only relative to the largest.
             size = 1 + np.abs(samples.eigenvalues).max(axis=1)
             worst = max(worst, float((np.abs(samples.eigenvalues).min(axis=1) / size).max()))
     return claim_line(

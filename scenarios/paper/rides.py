@@ -1,4 +1,4 @@
-"""Section 4.2, Figures 8 and 9: Q1 leaves its circle, a disturbed Q2 tends to a neighbouring one."""
+"""Section 4.2, Figures 8 and 9: Q1 leaves its circle, a disturbed Q2 tends to a neighbouring circle."""
 
 from __future__ import annotations
 
@@ -20,35 +20,35 @@ from .energy import motion_of_energy
 from .evidence import Evidence
 from .ledger import Check, LedgerLine, above, below, claim_line, source
 
-_OUTPUT = 0.05  # s
-_LEAVES = 0.01  # of the circle's radius
-_WATCHED = {"paper": 50.0, "exact": 100.0}  # s: the paper's integrator leaves after 36 s, the precise one after 76 s
-_GROWING = {"paper": (10.0, 25.0), "exact": (40.0, 65.0)}  # s: after what decays has, before it is no longer small
-_LONG, _LATE = 1200.0, 100.0  # s: exp(-0.0111 x 1200) = 2e-6
-_LONG_OUTPUT = 0.25
-_CLOSE = 0.1  # of the circle's radius
+_OUTPUT = 0.05  # [s]
+_LEAVES = 0.01  # departure from the circle, relative to its radius
+_WATCHED = {"paper": 50.0, "exact": 100.0}  # [s] the paper's integrator leaves after 36 s, the precise one after 76 s
+_GROWING = {"paper": (10.0, 25.0), "exact": (40.0, 65.0)}  # [s] decaying modes are gone, the growing one is still small
+_LONG, _LATE = 1200.0, 100.0  # [s] exp(-0.0111 x 1200) = 2e-6
+_LONG_OUTPUT = 0.25  # [s]
+_CLOSE = 0.1  # departure, relative to the circle's radius
 _TOLERANCE = 1e-12
-_SLIGHT, _SETTLES = 1e-3, 400.0  # rad/s, s
+_SLIGHT, _SETTLES = 1e-3, 400.0  # [rad/s], [s]
 
 
 def ride_lines(evidence: Evidence) -> Iterator[LedgerLine]:
-    """Lines on the simulations of section 4.2, and on energy."""
-    yield from _unstable(evidence)
-    rides = {sign: _disturbed(evidence, sign) for sign in (1, -1)}
-    yield _energy(evidence, rides)
-    yield from _stable(evidence, rides)
+    """Yield the lines on the simulations of section 4.2, and on energy."""
+    yield from _unstable_lines(evidence)
+    rides = {sign: _ride_disturbed(evidence, sign) for sign in (1, -1)}
+    yield _energy_line(evidence, rides)
+    yield from _stable_lines(evidence, rides)
 
 
 @dataclass(frozen=True)
 class Leaving:
-    """How an integration started on Q1 leaves its circle.
+    """Departure of an integration started on Q1 from its circle.
 
     Attributes
     ----------
     at : float
-        When the distance from the axis is off by a hundredth; nan if never [s].
+        Time at which the distance from the axis is off by a hundredth; nan if never [s].
     rate : float
-        Growth rate of the unstable mode's share [1/s].
+        Growth rate of the unstable mode [1/s].
     """
 
     at: float
@@ -56,12 +56,12 @@ class Leaving:
 
 
 def radius(ride: PreciseMotion) -> np.ndarray:
-    """Distance of D from the axis [m]."""
+    """Return the distance of D from the axis [m]."""
     return np.hypot(ride.q[:, 0], ride.q[:, 1])
 
 
 def leaving_time(ride: PreciseMotion, circle: float) -> float:
-    """When the radius is first off by a hundredth, between two outputs as if it grew exponentially [s]."""
+    """Return the time at which the radius is first off by a hundredth, interpolated exponentially [s]."""
     off = np.abs(radius(ride) - circle) / circle
     beyond = np.flatnonzero(off > _LEAVES)
     if len(beyond) == 0:
@@ -73,7 +73,9 @@ def leaving_time(ride: PreciseMotion, circle: float) -> float:
     return float(ride.time[i - 1] + share * (ride.time[i] - ride.time[i - 1]))
 
 
-def _leave(evidence: Evidence, ride: PreciseMotion, motion: CircularMotion, window: tuple[float, float]) -> Leaving:
+def _measure_leaving(
+    evidence: Evidence, ride: PreciseMotion, motion: CircularMotion, window: tuple[float, float]
+) -> Leaving:
     reduced = linearise(evidence.bicycle, Paraboloid(evidence.figures["Q1"]["alpha"]), *motion.state())
     values, right = np.linalg.eig(reduced.jacobian)
     unstable = np.real(np.linalg.inv(right)[int(np.real(values).argmax())])
@@ -83,7 +85,7 @@ def _leave(evidence: Evidence, ride: PreciseMotion, motion: CircularMotion, wind
     return Leaving(leaving_time(ride, float(np.hypot(*motion.position[:2]))), rate)
 
 
-def _unstable(evidence: Evidence) -> Iterator[LedgerLine]:
+def _unstable_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     motion, surface = named_motion(evidence, "Q1"), Paraboloid(evidence.figures["Q1"]["alpha"])
     step = evidence.figures["simulation"]["step"]
     reduced = linearise(evidence.bicycle, surface, *motion.state())
@@ -93,33 +95,36 @@ def _unstable(evidence: Evidence) -> Iterator[LedgerLine]:
         times = np.arange(round(_WATCHED[how] / _OUTPUT) + 1) * _OUTPUT
         start = (evidence.bicycle, surface, *motion.state(), times)
         ride = simulate(*start) if how == "exact" else simulate_modified_euler(*start, h)
-        return _leave(evidence, ride, motion, _GROWING[how])
+        return _measure_leaving(evidence, ride, motion, _GROWING[how])
 
-    one, half, precise = integrate("paper", step), integrate("paper", step / 2), integrate("exact", 0.0)
-    # An error of order two shrinks by four when the step is halved: the ride leaves ln 4 / growth later.
-    delay, expected = half.at - one.at, np.log(4) / growth
+    whole, half = integrate("paper", step), integrate("paper", step / 2)
+    precise = integrate("exact", 0.0)
+    # An error of order two is divided by four when the step is halved: the ride leaves ln 4 / growth later.
+    delay, expected = half.at - whole.at, np.log(4) / growth
     grown = Check("growth rate of the precise ride, relative to the eigenvalue", abs(precise.rate / growth - 1), 1e-2)
     yield claim_line(
         section="4.2",
         claim="even with just numerical errors Q1 does not keep its circle",
-        thresholds=[below(f"time until the radius is off by {_LEAVES:.0%}", _or_never(one.at), _WATCHED["paper"], "s")],
+        thresholds=[
+            below(f"time until the radius is off by {_LEAVES:.0%}", _finite_or_inf(whole.at), _WATCHED["paper"], "s")
+        ],
         measured=f"started on Q1 to round-off, modified Euler at {step:g} s is off by 1 % of the radius at "
-        f"{one.at:.2f} s, at half the step {delay:.3f} s later (ln 4 / {growth:.5f} = {expected:.3f}: an error of "
+        f"{whole.at:.2f} s, at half the step {delay:.3f} s later (ln 4 / {growth:.5f} = {expected:.3f}: an error of "
         f"order two that grows with the eigenvalue); the precise integrator at {precise.at:.2f} s, growing at "
         f"{precise.rate:.5f} 1/s",
         source=source("rides from Q1 by two integrators", simulate_modified_euler, simulate, linearise),
         checks=[grown, Check("delay at half the step, less the expected", abs(delay - expected), 0.02)],
         kind="simulation",
     )
-    yield _rounded_start(evidence, motion, surface, step)
+    yield _rounded_start_line(evidence, motion, surface, step)
 
 
-def _or_never(time: float) -> float:
+def _finite_or_inf(time: float) -> float:
     return time if np.isfinite(time) else float("inf")
 
 
-def _rounded_start(evidence: Evidence, motion: CircularMotion, surface: Paraboloid, step: float) -> LedgerLine:
-    """From v* as printed: rounding to two decimals outweighs the integrator's errors by far."""
+def _rounded_start_line(evidence: Evidence, motion: CircularMotion, surface: Paraboloid, step: float) -> LedgerLine:
+    """Make the line on a start at v* as printed, where rounding to two decimals outweighs the integrator's errors."""
     v = [float(text) for text in evidence.figures["Q1"]["v"]]
     guess = (float(motion.position[2]), motion.pitch)
     start = consistent_state(evidence.bicycle, surface, (v[0], v[1]), v[2], v[3], (v[4], v[5], v[6]), guess=guess)
@@ -133,7 +138,9 @@ def _rounded_start(evidence: Evidence, motion: CircularMotion, surface: Parabolo
     return claim_line(
         section="4.2",
         claim="Q1, started from v* as printed, leaves its circle",
-        thresholds=[below(f"time until the radius is off by {_LEAVES:.0%}", _or_never(max(leaves)), times[-1], "s")],
+        thresholds=[
+            below(f"time until the radius is off by {_LEAVES:.0%}", _finite_or_inf(max(leaves)), times[-1], "s")
+        ],
         measured=f"off by 1 % at {leaves[0]:.3f} s, by the precise integrator at {leaves[1]:.3f} s: here it is the two "
         "printed decimals that matter, not the integrator",
         source=source("rides from v* as printed by two integrators", simulate_modified_euler, simulate),
@@ -142,7 +149,7 @@ def _rounded_start(evidence: Evidence, motion: CircularMotion, surface: Parabolo
     )
 
 
-def _disturbed(evidence: Evidence, sign: int) -> PreciseMotion:
+def _ride_disturbed(evidence: Evidence, sign: int) -> PreciseMotion:
     def compute() -> PreciseMotion:
         motion, surface = named_motion(evidence, "Q2"), Paraboloid(evidence.figures["Q2"]["alpha"])
         x, y, z = (float(value) for value in motion.position)
@@ -156,13 +163,13 @@ def _disturbed(evidence: Evidence, sign: int) -> PreciseMotion:
     return evidence.once(("ride of Q2", sign), compute)
 
 
-def _energies(evidence: Evidence, ride: PreciseMotion) -> np.ndarray:
+def _total_energy(evidence: Evidence, ride: PreciseMotion) -> np.ndarray:
     seen = observe(evidence.bicycle, Paraboloid(evidence.figures["Q2"]["alpha"]), ride.q, ride.qd)
     return seen.kinetic_energy + seen.potential_energy
 
 
-def _energy(evidence: Evidence, rides: dict[int, PreciseMotion]) -> LedgerLine:
-    drift = max(float(np.ptp(e) / e[0]) for e in (_energies(evidence, ride) for ride in rides.values()))
+def _energy_line(evidence: Evidence, rides: dict[int, PreciseMotion]) -> LedgerLine:
+    drift = max(float(np.ptp(e) / e[0]) for e in (_total_energy(evidence, ride) for ride in rides.values()))
     evaluations = sum(ride.evaluations for ride in rides.values())
     return claim_line(
         section="2.3",
@@ -178,18 +185,18 @@ def _energy(evidence: Evidence, rides: dict[int, PreciseMotion]) -> LedgerLine:
 
 @dataclass(frozen=True)
 class Settling:
-    """How a disturbed ride of Q2 settles.
+    """Settling of a disturbed ride of Q2.
 
     Attributes
     ----------
     limit : float
         Mean of the rear rate at the end [rad/s].
     left : float
-        Its span there [rad/s].
+        Span of the rear rate at the end [rad/s].
     predicted : float
         Rear rate of the circle of the same family that has the ride's energy [rad/s].
     decay : float
-        Rate at which its oscillation decays [1/s], negative.
+        Decay rate of the oscillation [1/s], negative.
     """
 
     limit: float
@@ -198,14 +205,16 @@ class Settling:
     decay: float
 
 
-def _settling(evidence: Evidence, ride: PreciseMotion, motion: CircularMotion) -> Settling:
+def _measure_settling(evidence: Evidence, ride: PreciseMotion, motion: CircularMotion) -> Settling:
     late, rear = ride.time >= _LONG - _LATE, ride.qd[:, REAR_ANGLE]
     family = evidence.family(evidence.figures["Q2"]["alpha"], evidence.figures["Q2"]["family"])
-    neighbour = motion_of_energy(family, float(_energies(evidence, ride)[0]), motion)
-    return Settling(float(rear[late].mean()), float(np.ptp(rear[late])), neighbour.rear_rate, _decay(ride, rear))
+    neighbour = motion_of_energy(family, float(_total_energy(evidence, ride)[0]), motion)
+    return Settling(
+        float(rear[late].mean()), float(np.ptp(rear[late])), neighbour.rear_rate, _measure_decay(ride, rear)
+    )
 
 
-def _stable(evidence: Evidence, rides: dict[int, PreciseMotion]) -> Iterator[LedgerLine]:
+def _stable_lines(evidence: Evidence, rides: dict[int, PreciseMotion]) -> Iterator[LedgerLine]:
     motion, surface = named_motion(evidence, "Q2"), Paraboloid(evidence.figures["Q2"]["alpha"])
     whole = [Check("rides that ended early", float(sum(ride.ended is not None for ride in rides.values())), 0.0)]
     circle = float(np.hypot(*motion.position[:2]))
@@ -221,9 +230,9 @@ def _stable(evidence: Evidence, rides: dict[int, PreciseMotion]) -> Iterator[Led
         checks=whole,
         kind="simulation",
     )
-    plus, minus = (_settling(evidence, ride, motion) for ride in rides.values())
-    error = max(abs(one.limit - one.predicted) for one in (plus, minus))
-    apart = [abs(one.limit - motion.rear_rate) for one in (plus, minus)]
+    plus, minus = (_measure_settling(evidence, ride, motion) for ride in rides.values())
+    error = max(abs(ride.limit - ride.predicted) for ride in (plus, minus))
+    apart = [abs(ride.limit - motion.rear_rate) for ride in (plus, minus)]
     left = max(plus.left, minus.left)
     yield claim_line(
         section="4.2",
@@ -256,19 +265,19 @@ def _stable(evidence: Evidence, rides: dict[int, PreciseMotion]) -> Iterator[Led
     )
 
 
-def _decay(ride: PreciseMotion, rear: np.ndarray, end: float = 500.0) -> float:
-    """Slope of the logarithm of the rear rate's span over windows of 20 s, from 100 s on [1/s]."""
+def _measure_decay(ride: PreciseMotion, rear: np.ndarray, end: float = 500.0) -> float:
+    """Return the slope of the logarithm of the rear rate's span over windows of 20 s, from 100 s on [1/s]."""
     starts = np.arange(100.0, end, 50.0)
     spans = [np.ptp(rear[(ride.time >= start) & (ride.time < start + 20)]) for start in starts]
     return float(np.polyfit(starts, np.log(spans), 1)[0])
 
 
 def disturbed_decay(bicycle: Bicycle, surface: Paraboloid, motion: CircularMotion) -> float:
-    """Rate at which a slightly disturbed ride on a circle settles [1/s]."""
+    """Return the rate at which a slightly disturbed ride on a circle settles [1/s]."""
     x, y, z = (float(value) for value in motion.position)
     rates = (_SLIGHT, 0.0, motion.rear_rate)
     start = consistent_state(bicycle, surface, (x, y), motion.lean, motion.steer, rates, guess=(z, motion.pitch))
-    # Long enough to see the slowest mode, short enough that the integrator's own error is not seen.
+    # Long enough for the slowest mode to dominate, short enough that the integrator's error does not.
     times = np.arange(round(_SETTLES / _LONG_OUTPUT) + 1) * _LONG_OUTPUT
     ride = simulate(bicycle, surface, *start, times, _TOLERANCE)
-    return _decay(ride, ride.qd[:, REAR_ANGLE], _SETTLES - 50.0) if ride.ended is None else float("nan")
+    return _measure_decay(ride, ride.qd[:, REAR_ANGLE], _SETTLES - 50.0) if ride.ended is None else float("nan")

@@ -1,4 +1,4 @@
-"""All circular motions on a surface, without the families' anchors: curves followed from a grid of starts."""
+"""Search for all circular motions on a surface without the families' anchors, from a grid of starts."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from ...reference.circular import (
 from ...reference.continuation import follow_curve, sign_changes
 from ...reference.kernels.steady import STANDING, UNKNOWNS
 
-_MOST = 25  # Newton steps
-_SAME = 1e-5  # two solutions of one start's condition; each is known to round-off
-_ON_CURVE = 0.1  # from a followed curve's nearest point: curves are followed in steps of as much
-# Unknowns that mirroring left and right turns about: y, lean, steer, yaw speed, and at both contacts the
-# position and the force across.
+_MOST = 25  # largest number of Newton steps
+_SAME = 1e-5  # distance of solutions of one start's condition that are the same; each is accurate to round-off
+_ON_CURVE = 0.1  # distance from a curve's nearest point at which a solution is on it: the step of following curves
+# Unknowns whose sign changes with left and right exchanged: y, lean, steer, yaw speed, and at both contacts the
+# lateral position and force.
 _ACROSS = [1, 3, 5, 6, 11, 14, 17, 20]
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Starts: angles on a grid, at rest, pivoting and at some rear rates that curves of benchmark size pass.
+    """Starts of a search: angles on a grid, at rest, pivoting and at rear rates of curves of the benchmark's size.
 
     Attributes
     ----------
     lean, steer : tuple
-        Least, largest [rad], and number.
+        Smallest, largest [rad], and number.
     rates : tuple of float
         [rad/s].
     """
@@ -48,7 +48,7 @@ class Grid:
 
     @property
     def described(self) -> str:
-        """The starts in words."""
+        """The starts as text."""
         (least, largest, leans), (first, last, steers) = self.lean, self.steer
         rates = ", ".join(f"{rate:g}" for rate in self.rates)
         return (
@@ -59,13 +59,13 @@ class Grid:
 
 
 GRID = Grid((-1.2, 1.2, 7), (0.05, 3.09, 7), (4.0, 12.0, 18.0, 24.0))
-# Starts of which none is one of the other grid's, nor at one of its rates: what both find is not a grid's chance.
+# None of these starts, nor any of the rates, is in the other grid: what both find does not depend on the grid.
 OTHER_GRID = Grid((-1.3, 1.3, 6), (0.02, 3.12, 6), (2.0, 7.0, 15.0, 30.0))
 
 
 @dataclass(frozen=True)
 class FoundMotion:
-    """What a search has found, with the steer in [0, pi].
+    """Result of a search, with the steer in [0, pi].
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class FoundMotion:
     curves : list of ndarray, shape (n, 22)
         Each from one end to the other, through a pivoting motion where it has one.
     described : str
-        How it was searched.
+        Description of the search.
     """
 
     equations: Steady
@@ -87,25 +87,25 @@ class FoundMotion:
     @property
     def families(self) -> int:
         """Number of families: curves, cut where a wheel's rate changes sign in a pivoting motion."""
-        return len(self.curves) + sum(_pivots(curve) for curve in self.curves)
+        return len(self.curves) + sum(_count_pivots(curve) for curve in self.curves)
 
 
 def search_motions(equations: Steady, grid: Grid = GRID) -> FoundMotion:
-    """Look for all circular motions of a bicycle on a surface."""
-    static = list(_distinct(_solutions(equations, unknown_condition(SIGMA, 0.0), grid)))
-    pivoting = list(_distinct(_solutions(equations, unknown_condition(REAR_SPEED, 0.0), grid)))
+    """Search for all circular motions of a bicycle on a surface."""
+    static = list(_drop_repeated(_solve_from_grid(equations, unknown_condition(SIGMA, 0.0), grid)))
+    pivoting = list(_drop_repeated(_solve_from_grid(equations, unknown_condition(REAR_SPEED, 0.0), grid)))
     starts = [*static, *pivoting]
     for rate in grid.rates:
-        starts += _solutions(equations, rear_rate_condition(rate), grid)
+        starts += _solve_from_grid(equations, rear_rate_condition(rate), grid)
     curves: list[np.ndarray] = []
     for start in starts:
         if all(distance(curve, start) > _ON_CURVE for curve in curves):
-            curves.append(_whole(equations, start))
+            curves.append(_follow_both_ways(equations, start))
     return FoundMotion(equations, static, pivoting, curves, grid.described)
 
 
 def find_missing(one: FoundMotion, other: FoundMotion) -> int:
-    """Number of equilibria, pivoting motions and curves that one of two searches has and the other has not."""
+    """Count the equilibria, pivoting motions and curves that only one of two searches has found."""
     lone = sum(abs(len(getattr(one, what)) - len(getattr(other, what))) for what in ("static", "pivoting", "curves"))
     for first, second in ((one, other), (other, one)):
         for what in ("static", "pivoting"):
@@ -113,36 +113,36 @@ def find_missing(one: FoundMotion, other: FoundMotion) -> int:
             lone += sum(
                 all(np.abs(search_coordinates(u) - k).max() > _SAME for k in known) for u in getattr(first, what)
             )
-        # In the middle of a curve: at their ends two followed curves may differ by a step.
+        # The middle of a curve is compared: at their ends two followed curves may differ by a step.
         middles = [curve[len(curve) // 2] for curve in first.curves]
         lone += sum(all(distance(curve, u) > _ON_CURVE for curve in second.curves) for u in middles)
     return lone
 
 
 def mirrored(unknowns: np.ndarray) -> np.ndarray:
-    """The same solution with left and right exchanged."""
+    """Return the same solution with left and right exchanged."""
     other = unknowns.copy()
     other[_ACROSS] *= -1
     return other
 
 
 def search_coordinates(unknowns: np.ndarray) -> np.ndarray:
-    """Where solutions (..., 22) lie: lean, steer, pitch, and angles of bounded size for radius and speed."""
+    """Return coordinates of solutions (..., 22): lean, steer, pitch, and bounded angles for radius and speed."""
     radius = np.hypot(unknowns[..., 0], unknowns[..., 1])
     parts = (*np.moveaxis(unknowns[..., [LEAN, STEER, PITCH]], -1, 0), np.arctan(radius / 5))
     return np.stack([*parts, np.arctan(unknowns[..., SIGMA])], axis=-1)
 
 
 def distance(curve: np.ndarray, unknowns: np.ndarray) -> float:
-    """Distance of a solution from the points of a curve (n, 22), in `search_coordinates`."""
+    """Return the distance of a solution from the points of a curve (n, 22), in `search_coordinates`."""
     return float(np.linalg.norm(search_coordinates(curve) - search_coordinates(unknowns), axis=1).min())
 
 
-def _pivots(curve: np.ndarray) -> int:
+def _count_pivots(curve: np.ndarray) -> int:
     return len(sign_changes(curve[:, REAR_SPEED], STANDING))
 
 
-def _solutions(equations: Steady, condition: Callable, grid: Grid) -> Iterator[np.ndarray]:
+def _solve_from_grid(equations: Steady, condition: Callable, grid: Grid) -> Iterator[np.ndarray]:
     for lean in np.linspace(*grid.lean):
         for steer in np.linspace(*grid.steer):
             try:
@@ -153,25 +153,25 @@ def _solutions(equations: Steady, condition: Callable, grid: Grid) -> Iterator[n
             unknowns[[LEAN, PITCH, STEER]] = (unknowns[[LEAN, PITCH, STEER]] + np.pi) % (2 * np.pi) - np.pi
             if unknowns[STEER] < 0:
                 unknowns = mirrored(unknowns)
-            if _possible(equations, unknowns):
+            if _is_possible(equations, unknowns):
                 yield unknowns
 
 
-def _possible(equations: Steady, unknowns: np.ndarray) -> bool:
-    """Whether a solution is a motion of a bicycle that stands on its wheels, above the ground."""
+def _is_possible(equations: Steady, unknowns: np.ndarray) -> bool:
+    """Return whether a solution is a motion of a bicycle that stands on its wheels, above the ground."""
     return bool(unknowns[SIGMA] >= -1e-9) and above_ground(equations, unknowns)
 
 
-def _distinct(solutions: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
-    seen: list[np.ndarray] = []
+def _drop_repeated(solutions: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
+    known: list[np.ndarray] = []
     for unknowns in solutions:
-        if all(np.abs(search_coordinates(unknowns) - other).max() > _SAME for other in seen):
-            seen.append(search_coordinates(unknowns))
+        if all(np.abs(search_coordinates(unknowns) - other).max() > _SAME for other in known):
+            known.append(search_coordinates(unknowns))
             yield unknowns
 
 
-def _whole(equations: Steady, start: np.ndarray) -> np.ndarray:
-    """The curve through a solution, followed both ways."""
+def _follow_both_ways(equations: Steady, start: np.ndarray) -> np.ndarray:
+    """Follow the curve through a solution both ways."""
     along = np.eye(UNKNOWNS)[STEER]
-    one, other = ([p.unknowns for p in follow_curve(equations, start, s * along, _ON_CURVE)] for s in (1, -1))
-    return np.array([*reversed(other), *one[1:]])
+    forward, backward = ([p.unknowns for p in follow_curve(equations, start, s * along, _ON_CURVE)] for s in (1, -1))
+    return np.array([*reversed(backward), *forward[1:]])

@@ -20,48 +20,48 @@ from .ledger import Check, LedgerLine, Source, Threshold, above, below, claim_li
 from .profile import abscissa
 from .rides import disturbed_decay
 
-_NEIGHBOUR = 0.05  # rad of lean and steer, of curves some 7 rad long
+_NEIGHBOUR = 0.05  # [rad] in lean and steer, of curves about 7 rad long
 _SHRINKING = (0.0, 0.0025, 0.005, 0.0075, 0.01, 0.015, 0.02, 0.025, 0.03, 0.033)
 _SCAN = (0.075, 0.1, 0.15, 0.3, 0.4, 0.5, 0.6, 0.75, 0.9)
 _VANISHING = source("where the last stable section of a family vanishes", last_stable, command="velodrome critical")
-_SEARCHED = 0.05  # alpha up to which last sections are looked for closely; the scan goes on from there
+_SEARCHED = 0.05  # alpha up to which the last sections are searched for closely; the scan continues from there
 
 
 def section_lines(evidence: Evidence) -> Iterator[LedgerLine]:
-    """Lines on where circular motions are Lyapunov stable."""
+    """Yield the lines on where circular motions are Lyapunov stable."""
     for alpha in evidence.cases:
-        yield _stable_families(evidence, alpha)
-    yield _next_to_cusps(evidence, 0.0, {2: "D", 4: "I"})
-    yield _next_to_cusps(evidence, 0.005, {2: "D"})
-    yield _small(evidence)
-    yield _second_and_fourth(evidence)
-    yield _shrinks(evidence)
-    yield _none_from(evidence)
-    yield _only_small(evidence)
+        yield _stable_families_line(evidence, alpha)
+    yield _next_to_cusps_line(evidence, 0.0, {2: "D", 4: "I"})
+    yield _next_to_cusps_line(evidence, 0.005, {2: "D"})
+    yield _small_line(evidence)
+    yield _second_and_fourth_line(evidence)
+    yield _shrinks_line(evidence)
+    yield _none_from_line(evidence)
+    yield _only_small_line(evidence)
 
 
-def _width(evidence: Evidence, ends: tuple[SectionEnd, SectionEnd]) -> float:
+def _section_width(evidence: Evidence, ends: tuple[SectionEnd, SectionEnd]) -> float:
     return float(abs(np.subtract(*(abscissa(evidence.bicycle, end.motion.front_rate) for end in ends))))
 
 
-def _text(number: int, ends: tuple[SectionEnd, SectionEnd]) -> str:
+def _describe_section(number: int, ends: tuple[SectionEnd, SectionEnd]) -> str:
     rates = " to ".join(f"{end.motion.rear_rate:.8f} ({end.cause})" for end in ends)
     return f"family {number}: rear rate {rates}"
 
 
-def _stable_families(evidence: Evidence, alpha: float) -> LedgerLine:
+def _stable_families_line(evidence: Evidence, alpha: float) -> LedgerLine:
     sections = {n: evidence.sections(alpha, n) for n in FAMILIES}
     stable = [n for n in FAMILIES if sections[n]]
     printed = [n for key, families in evidence.figures["stable_in"].items() if float(key) == alpha for n in families]
     named = ", ".join(map(str, printed)) or "none"
     least = _least_growth(evidence, alpha)
-    text = "; ".join(_text(n, ends) for n in stable for ends in sections[n])
+    text = "; ".join(_describe_section(n, ends) for n in stable for ends in sections[n])
     if not stable:
         text = f"none, on the families or on any curve from a grid of starts; slowest growth {least:.4f} 1/s"
     checks = [*_section_checks(evidence, alpha, sections), evidence.searched_again(alpha)]
-    # What is stable against the print must stay when it is disturbed, by the equations of motion themselves.
+    # Sections that are stable against the print must remain so under a disturbance, by the equations of motion.
     for number in set(stable) - set(printed):
-        checks += [_stays(evidence, alpha, number, ends) for ends in sections[number]]
+        checks += [_check_disturbed_ride(evidence, alpha, number, ends) for ends in sections[number]]
     thresholds: list[Threshold] = [
         equals(
             f"family {number}: whether it has a stable section (0, 1)", int(number in stable), int(number in printed)
@@ -89,19 +89,19 @@ def _stable_families(evidence: Evidence, alpha: float) -> LedgerLine:
 
 
 def _least_growth(evidence: Evidence, alpha: float) -> float:
-    """Slowest growth on all curves at alpha, of families or from a grid of starts [1/s]."""
+    """Return the smallest growth rate on all curves at alpha, of families or from a grid of starts [1/s]."""
     found = evidence.found(alpha)
     rates = [sample_curve(found.equations, curve[curve[:, SIGMA] >= 0]).growth_rate.min() for curve in found.curves]
     for number in FAMILIES:
         try:
             rates.append(evidence.samples(alpha, number).growth_rate.min())
         except ValueError:
-            continue  # from 0.42 to 0.46 families 3 and 4 have lost the pivoting motion they begin at
+            continue  # from 0.42 to 0.46 families 3 and 4 have no pivoting motion to begin at
     return float(min(rates))
 
 
-def _stays(evidence: Evidence, alpha: float, number: int, ends: tuple[SectionEnd, SectionEnd]) -> Check:
-    """A disturbed ride half-way in a section must decay as the eigenvalues say."""
+def _check_disturbed_ride(evidence: Evidence, alpha: float, number: int, ends: tuple[SectionEnd, SectionEnd]) -> Check:
+    """Check that a disturbed ride half-way in a section decays as the eigenvalues predict."""
     motion, reduced = _half_way(evidence, alpha, number, ends)
     decay = disturbed_decay(evidence.bicycle, Paraboloid(alpha), motion)
     slowest = growth_rate(Paraboloid(alpha), reduced.eigenvalues, motion.yaw_rate)
@@ -110,7 +110,7 @@ def _stays(evidence: Evidence, alpha: float, number: int, ends: tuple[SectionEnd
 
 
 def _section_checks(evidence: Evidence, alpha: float, sections: dict) -> list[Check]:
-    """Ends are crossings, a second tracing has the same, and inside nothing grows."""
+    """Check that ends are crossings, that a second tracing has the same ones, and that inside nothing grows."""
     checks = [evidence.residual((alpha,))]
     for number, pairs in sections.items():
         again = evidence.sections(alpha, number, OTHER_STEP)
@@ -118,9 +118,9 @@ def _section_checks(evidence: Evidence, alpha: float, sections: dict) -> list[Ch
         checks.append(Check(f"family {number}: sections missing from a second tracing", many, 0.0))
         for ends, same in zip(pairs, again, strict=False):
             off = max(abs(a.motion.rear_rate - b.motion.rear_rate) for a, b in zip(ends, same, strict=True))
-            # Energy extrema are solved less sharply: the growth rate leaves zero there like a root.
+            # Energy extrema are less accurate: there the growth rate leaves zero like a square root.
             checks.append(Check(f"family {number}: ends against the second tracing", off, 1e-6))
-            inside = _inside(evidence, alpha, number, ends)
+            inside = _growth_half_way(evidence, alpha, number, ends)
             checks.append(Check(f"family {number}: growth rate half-way (must be negative)", inside, -1e-4))
     return checks
 
@@ -128,19 +128,19 @@ def _section_checks(evidence: Evidence, alpha: float, sections: dict) -> list[Ch
 def _half_way(
     evidence: Evidence, alpha: float, number: int, ends: tuple[SectionEnd, SectionEnd]
 ) -> tuple[CircularMotion, Linearisation]:
-    """The motion half-way between a section's ends."""
+    """Return the motion half-way between a section's ends and its linearisation."""
     rate = 0.5 * (ends[0].motion.rear_rate + ends[1].motion.rear_rate)
     lean = 0.5 * (ends[0].motion.lean + ends[1].motion.lean)
     motion = min(evidence.motions(alpha, number, rate), key=lambda m: abs(m.lean - lean))
     return motion, linearise(evidence.bicycle, Paraboloid(alpha), *motion.state())
 
 
-def _inside(evidence: Evidence, alpha: float, number: int, ends: tuple[SectionEnd, SectionEnd]) -> float:
+def _growth_half_way(evidence: Evidence, alpha: float, number: int, ends: tuple[SectionEnd, SectionEnd]) -> float:
     motion, reduced = _half_way(evidence, alpha, number, ends)
     return growth_rate(Paraboloid(alpha), reduced.eigenvalues, motion.yaw_rate)
 
 
-def _next_to_cusps(evidence: Evidence, alpha: float, cusps: dict[int, str]) -> LedgerLine:
+def _next_to_cusps_line(evidence: Evidence, alpha: float, cusps: dict[int, str]) -> LedgerLine:
     gaps = {}
     for number, name in cusps.items():
         cusp, sections = evidence.special(alpha, number, name), evidence.sections(alpha, number)
@@ -170,12 +170,12 @@ def _next_to_cusps(evidence: Evidence, alpha: float, cusps: dict[int, str]) -> L
     )
 
 
-def _small(evidence: Evidence) -> LedgerLine:
+def _small_line(evidence: Evidence) -> LedgerLine:
     widths = {}
     for alpha in evidence.cases:
         for number in FAMILIES:
             for ends in evidence.sections(alpha, number):
-                widths[f"{alpha:g}, family {number}"] = _width(evidence, ends)
+                widths[f"{alpha:g}, family {number}"] = _section_width(evidence, ends)
     largest = max(widths.values(), default=0.0)
     text = "; ".join(f"{where}: {width:.4f}" for where, width in widths.items())
     return claim_line(
@@ -185,22 +185,22 @@ def _small(evidence: Evidence) -> LedgerLine:
             below("largest width on the figures' abscissa, a tenth of its length,", largest, 0.05 * np.pi, "rad")
         ],
         measured=f"widths on the figures' abscissa, which is pi/2 long: {text}",
-        source=_sections_of(evidence.cases),
+        source=_sections_source(evidence.cases),
         checks=[evidence.residual()],
         kind="stability",
     )
 
 
-def _sections_of(alphas: tuple[float, ...]) -> Source:
+def _sections_source(alphas: tuple[float, ...]) -> Source:
     return source("stable sections of all families", stable_sections, command=families_command_line(*alphas))
 
 
-def _last(evidence: Evidence, number: int) -> CriticalPoint | None:
+def _last_section(evidence: Evidence, number: int) -> CriticalPoint | None:
     return evidence.once(("last stable", number), lambda: last_stable(evidence.bicycle, number, _SEARCHED))
 
 
-def _second_and_fourth(evidence: Evidence) -> LedgerLine:
-    two, four = _last(evidence, 2), _last(evidence, 4)
+def _second_and_fourth_line(evidence: Evidence) -> LedgerLine:
+    two, four = _last_section(evidence, 2), _last_section(evidence, 4)
     others = [n for n in (1, 3) if any(evidence.sections(alpha, n) for alpha in evidence.cases)]
     claim = "when the curvature is very small there are stable sections in families 2 and 4"
     if two is None or four is None:
@@ -222,11 +222,11 @@ def _second_and_fourth(evidence: Evidence) -> LedgerLine:
     )
 
 
-def _shrinks(evidence: Evidence) -> LedgerLine:
+def _shrinks_line(evidence: Evidence) -> LedgerLine:
     slowest, first, parts = np.inf, np.inf, []
     for number in (2, 4):
-        widths = [sum(_width(evidence, e) for e in evidence.sections(a, number)) for a in _SHRINKING]
-        # Where there is none left it cannot shrink.
+        widths = [sum(_section_width(evidence, e) for e in evidence.sections(a, number)) for a in _SHRINKING]
+        # Where no section is left, the width cannot shrink.
         slowest = min([slowest, *(a - b for a, b in pairwise(widths) if a > 0 or b > 0)])
         first = min(first, widths[0])
         parts.append(f"family {number}: " + ", ".join(f"{width:.4f}" for width in widths))
@@ -239,18 +239,20 @@ def _shrinks(evidence: Evidence) -> LedgerLine:
         ],
         measured=f"widths on the figures' abscissa at alpha = {', '.join(f'{a:g}' for a in _SHRINKING)}: "
         f"{'; '.join(parts)}",
-        source=_sections_of(_SHRINKING),
+        source=_sections_source(_SHRINKING),
         checks=[evidence.residual((0.0, 0.005))],
         kind="stability",
     )
 
 
-def _none_from(evidence: Evidence) -> LedgerLine:
+def _none_from_line(evidence: Evidence) -> LedgerLine:
     start = evidence.figures["none_from"]
     alphas = sorted(alpha for alpha in {*evidence.cases, *_SCAN} if alpha >= start)
     slowest = {alpha: _least_growth(evidence, alpha) for alpha in alphas}
-    last = max((point.alpha for point in (_last(evidence, n) for n in (2, 4)) if point is not None), default=np.nan)
-    residual = max((p.residual for n in (2, 4) if (p := _last(evidence, n))), default=np.inf)
+    last = max(
+        (point.alpha for point in (_last_section(evidence, n) for n in (2, 4)) if point is not None), default=np.nan
+    )
+    residual = max((p.residual for n in (2, 4) if (p := _last_section(evidence, n))), default=np.inf)
     return claim_line(
         section="5",
         claim=f"from alpha = {start:g} on no stable section exists",
@@ -272,8 +274,8 @@ def _none_from(evidence: Evidence) -> LedgerLine:
     )
 
 
-def _only_small(evidence: Evidence) -> LedgerLine:
-    point, claim = _last(evidence, 2), "stable motions exist only on very small curvature"
+def _only_small_line(evidence: Evidence) -> LedgerLine:
+    point, claim = _last_section(evidence, 2), "stable motions exist only on very small curvature"
     if point is None:
         return claim_line("1", claim, [equals("last sections", 0, 1)], "no last one is found", _VANISHING, [])
     curvature = 2 * point.alpha

@@ -1,4 +1,4 @@
-"""Section 3.3, Figure 7, and section 5: the bowl of alpha = 1, and what is there always."""
+"""Section 3.3, Figure 7, and section 5: the bowl of alpha = 1, and motions that exist on every bowl."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from .limits import FlatLimit, find_limit
 from .search import FoundMotion, distance, search_coordinates, search_motions
 
 _STEEP, _DEEP = 1.0, 0.2
-_BETWEEN = (0.425, 0.44, 0.46)  # where no pivoting motion is left
-_MUCH = 0.4  # rad in the figures' coordinates: twice what counts as alike
+_BETWEEN = (0.425, 0.44, 0.46)  # alphas without a pivoting motion
+_MUCH = 0.4  # [rad] in the figures' coordinates: twice the distance of curves that count as alike
 _NEAR_REST, _NEAR_INFINITY = 0.41, 0.47  # alphas at which the pivoting motion is slow, and fast
 _G_AND_A = ("pivot", "static")
-_SAME = 0.1  # in `search_coordinates`: curves are followed in steps of as much
+_SAME = 0.1  # in `search_coordinates`: the step of following curves
 
 
 def steep_lines(evidence: Evidence) -> Iterator[LedgerLine]:
-    """Lines on alpha = 1 and on all alphas."""
+    """Yield the lines on alpha = 1 and on all alphas."""
     found = evidence.found(_STEEP)
-    yield _changed(evidence)
-    yield _still_there(evidence, found)
-    yield _third_and_fourth(evidence, found)
-    yield from _first_and_third(evidence, found)
-    yield from _four_still(evidence, found)
-    yield from _always(evidence)
-    yield _never_without(evidence)
+    yield _changed_line(evidence)
+    yield _still_there_line(evidence, found)
+    yield _third_and_fourth_line(evidence, found)
+    yield from _first_and_third_lines(evidence, found)
+    yield from _four_still_line(evidence, found)
+    yield from _always_lines(evidence)
+    yield _never_without_line(evidence)
 
 
-def _solved(found: FoundMotion) -> Check:
+def _check_residual(found: FoundMotion) -> Check:
     worst = 0.0
     for curve in found.curves:
         for u in curve[::5]:
@@ -47,7 +47,7 @@ def _solved(found: FoundMotion) -> Check:
     return Check("largest residual of the 21 equations along the curves", worst, 1e-12)
 
 
-def _changed(evidence: Evidence) -> LedgerLine:
+def _changed_line(evidence: Evidence) -> LedgerLine:
     apart_by = profiles(evidence, _DEEP, _STEEP, FAMILIES)
     return claim_line(
         section="3.3",
@@ -62,11 +62,11 @@ def _changed(evidence: Evidence) -> LedgerLine:
     )
 
 
-def _searched(found: FoundMotion, what: str) -> Source:
+def _search_source(found: FoundMotion, what: str) -> Source:
     return source(what, search_motions, search=found.described)
 
 
-def _still_there(evidence: Evidence, found: FoundMotion) -> LedgerLine:
+def _still_there_line(evidence: Evidence, found: FoundMotion) -> LedgerLine:
     forces = sample_curve(found.equations, np.array([*found.static, *found.pivoting])).normal_force
     return claim_line(
         section="3.3",
@@ -77,16 +77,16 @@ def _still_there(evidence: Evidence, found: FoundMotion) -> LedgerLine:
         ],
         measured=f"one of each, but in both the ground would have to pull the front wheel: {forces[0, 1]:.1f} N at A "
         f"(steer {found.static[0][STEER]:.6f}), {forces[-1, 1]:.1f} N at G",
-        source=_searched(found, "static equilibria and pivoting motions, and their contact forces"),
-        checks=[_solved(found), evidence.searched_again(_STEEP)],
+        source=_search_source(found, "static equilibria and pivoting motions, and their contact forces"),
+        checks=[_check_residual(found), evidence.searched_again(_STEEP)],
     )
 
 
-def _one_each(found: FoundMotion) -> bool:
+def _has_one_each(found: FoundMotion) -> bool:
     return (len(found.static), len(found.pivoting)) == (1, 1)
 
 
-def _third_and_fourth(evidence: Evidence, found: FoundMotion) -> LedgerLine:
+def _third_and_fourth_line(evidence: Evidence, found: FoundMotion) -> LedgerLine:
     gaps = []
     for number in (3, 4):
         start = evidence.family(_STEEP, number).points[0].unknowns
@@ -97,25 +97,25 @@ def _third_and_fourth(evidence: Evidence, found: FoundMotion) -> LedgerLine:
         thresholds=[below("largest difference of the constants of their ends from G's", max(gaps), 1e-12)],
         measured=f"both start in the one pivoting motion: constants differ by {max(gaps):.0e}",
         source=source("the ends of families 3 and 4", trace, command=families_command_line(_STEEP)),
-        checks=[_solved(found)],
+        checks=[_check_residual(found)],
     )
 
 
-def _holding(found: FoundMotion, unknowns: np.ndarray) -> np.ndarray:
-    """The curve that passes a solution."""
+def _curve_through(found: FoundMotion, unknowns: np.ndarray) -> np.ndarray:
+    """Return the curve that passes through a solution."""
     return min(found.curves, key=lambda curve: distance(curve, unknowns))
 
 
-def _towards(found: FoundMotion, curve: np.ndarray) -> FlatLimit:
-    """Limit of a curve's end at a lean of -pi/2."""
+def _flat_limit(found: FoundMotion, curve: np.ndarray) -> FlatLimit:
+    """Return the limit of a curve's end at a lean of -pi/2."""
     return find_limit(found.equations, [curve[0], curve[-1]], -1)
 
 
-def _first_and_third(evidence: Evidence, found: FoundMotion) -> Iterator[LedgerLine]:
-    at_rest, pivoting = _holding(found, found.static[0]), _holding(found, found.pivoting[0])
-    one, other = _towards(found, at_rest), _towards(found, pivoting)
+def _first_and_third_lines(evidence: Evidence, found: FoundMotion) -> Iterator[LedgerLine]:
+    at_rest, pivoting = _curve_through(found, found.static[0]), _curve_through(found, found.pivoting[0])
+    rest_end, pivot_end = _flat_limit(found, at_rest), _flat_limit(found, pivoting)
     touch = evidence.touching((1, 3))
-    solved, again = _solved(found), evidence.searched_again(_STEEP)
+    solved, again = _check_residual(found), evidence.searched_again(_STEEP)
     exchanged = [solved]
     if touch is not None:
         exchanged.append(Check("residual of the touching point's equations", touch.residual, 1e-12))
@@ -125,20 +125,22 @@ def _first_and_third(evidence: Evidence, found: FoundMotion) -> Iterator[LedgerL
         claim="by alpha = 1 family 3 has met family 1",
         thresholds=[
             equals("alphas below 1 at which they touch", int(touch is not None), 1),
-            below("larger steer of the two curves' flat ends", max(abs(one.steer), abs(other.steer)), 1e-3, "rad"),
-            above("lesser front rate there", min(one.front_rate, other.front_rate), 300.0, "rad/s"),
+            below(
+                "larger steer of the two curves' flat ends", max(abs(rest_end.steer), abs(pivot_end.steer)), 1e-3, "rad"
+            ),
+            above("lesser front rate there", min(rest_end.front_rate, pivot_end.front_rate), 300.0, "rad/s"),
         ],
         measured=f"they have exchanged ends {where}: the curve that starts in A, as family 1 did, runs to F (-pi/2, 0, "
-        f"infinity), as family 3 did; the curve of G tends to the same corner of the figure (steers {one.steer:.5f}, "
-        f"{other.steer:.5f})",
+        f"infinity), as family 3 did; the curve of G tends to the same corner of the figure (steers "
+        f"{rest_end.steer:.5f}, {pivot_end.steer:.5f})",
         source=source(
             "the touching point, and the curves' limits", reconnections, find_limit, command="velodrome critical"
         ),
         checks=exchanged,
     )
-    yield _at_b(evidence, found)
+    yield _at_b_line(evidence, found)
     near = min(distance(pivoting, u) for u in at_rest)
-    apart = abs(one.radius - other.radius)
+    apart = abs(rest_end.radius - pivot_end.radius)
     yield claim_line(
         section="3.3",
         claim="so at alpha = 1 families 1, 3 and 4 are one combined family",
@@ -149,18 +151,22 @@ def _first_and_third(evidence: Evidence, found: FoundMotion) -> Iterator[LedgerL
         ],
         measured=f"the curve of A and the curve of G (through H into family 4) share no motion: nowhere nearer than "
         f"{near:.3f} (lean, steer, pitch, bounded radius and speed); at the corner they share in the figure D rides "
-        f"circles of {one.radius:.4f} and {other.radius:.4f} m, {apart:.4f} m apart",
-        source=_searched(found, "the curves through A and through G"),
-        checks=[solved, again, Check("residual on the way to the corner", max(one.residual, other.residual), 1e-12)],
+        f"circles of {rest_end.radius:.4f} and {pivot_end.radius:.4f} m, {apart:.4f} m apart",
+        source=_search_source(found, "the curves through A and through G"),
+        checks=[
+            solved,
+            again,
+            Check("residual on the way to the corner", max(rest_end.residual, pivot_end.residual), 1e-12),
+        ],
     )
-    yield _combined_somewhere(evidence)
+    yield _combined_somewhere_line(evidence)
 
 
-def _at_b(evidence: Evidence, found: FoundMotion) -> LedgerLine:
-    """B as the text has it: straight ahead, upright, which is the limit of large circles with the handlebar forward."""
+def _at_b_line(evidence: Evidence, found: FoundMotion) -> LedgerLine:
+    """Make the line on B as in the text: upright straight motion, the limit of large circles, handlebar forward."""
     ends = [(curve, u) for curve in found.curves for u in (curve[0], curve[-1]) if u[STEER] < 0.5 * np.pi]
     straight, end = max(ends, key=lambda pair: float(np.hypot(*pair[1][:2])))
-    pivoting, at_rest = _holding(found, found.pivoting[0]), _holding(found, found.static[0])
+    pivoting, at_rest = _curve_through(found, found.pivoting[0]), _curve_through(found, found.static[0])
     apart = min(distance(pivoting, u) for u in straight)
     from_a = min(distance(at_rest, u) for u in straight)
     return claim_line(
@@ -173,18 +179,18 @@ def _at_b(evidence: Evidence, found: FoundMotion) -> LedgerLine:
         f"(here lean {end[LEAN]:.2f}, steer {end[STEER]:.2f}, D's circle {np.hypot(*end[:2]):.0f} m). It lies on a "
         f"curve of its own, nowhere nearer than {apart:.3f} to the curve of G and {from_a:.3f} to the curve of A. The "
         "text lacks the figure: that it letters another point B there cannot be excluded",
-        source=_searched(found, "the curves through large circles, through G and through A"),
-        checks=[_solved(found), evidence.searched_again(_STEEP)],
+        source=_search_source(found, "the curves through large circles, through G and through A"),
+        checks=[_check_residual(found), evidence.searched_again(_STEEP)],
     )
 
 
-def _four_still(evidence: Evidence, found: FoundMotion) -> Iterator[LedgerLine]:
-    """Number of families at alpha = 1 by how curves are cut, beside those on the plane by the same cut."""
+def _four_still_line(evidence: Evidence, found: FoundMotion) -> Iterator[LedgerLine]:
+    """Count the families at alpha = 1 by different ways to cut the curves, and those on the plane in the same ways."""
     level = evidence.found(evidence.cases[0])
     cuts = {
         "whole curves": (len(found.curves), len(level.curves)),
         "curves cut at the pivoting motion": (found.families, level.families),
-        "those whose wheels are both pushed, cut there": (_pushed(found), _pushed(level)),
+        "those whose wheels are both pushed, cut there": (_count_pushed(found), _count_pushed(level)),
     }
     yield count_by_cut(
         section="5",
@@ -192,22 +198,26 @@ def _four_still(evidence: Evidence, found: FoundMotion) -> Iterator[LedgerLine]:
         printed=evidence.figures["counts"]["families"],
         counts={cut: here for cut, (here, _) in cuts.items()},
         measured="; ".join(f"{cut}: {here}, and {there} on the plane" for cut, (here, there) in cuts.items())
-        + f" ({'; '.join(_ends(curve) for curve in found.curves)}). Curves that pass on to others at alphas between "
-        "have no numbers of their own",
-        source=_searched(found, "all curves of circular motions, counted under each way to cut them"),
+        + f" ({'; '.join(_describe_ends(curve) for curve in found.curves)}). Curves whose parts pass to other curves "
+        "between these alphas have no numbers of their own",
+        source=_search_source(found, "all curves of circular motions, counted under each way to cut them"),
         checks=[
-            _solved(found),
+            _check_residual(found),
             evidence.searched_again(evidence.cases[0], _STEEP),
-            Check("how near is the same, over the nearest two curves' distance", _SAME / _nearest(found), 1.0),
+            Check(
+                "distance of solutions that count as the same, over the smallest between two curves",
+                _SAME / _smallest_distance(found),
+                1.0,
+            ),
         ],
     )
 
 
-def _pushed(found: FoundMotion) -> int:
-    """Number of pieces along which the ground pushes both wheels, cut at pivoting motions in them."""
+def _count_pushed(found: FoundMotion) -> int:
+    """Count the pieces along which the ground pushes on both wheels, cut at pivoting motions in them."""
     pieces = 0
     for curve in found.curves:
-        # A pivoting motion itself has a rear rate of zero to round-off, of either sign: its neighbours tell.
+        # At a pivoting motion the rear rate is round-off of either sign: the sign changes between its neighbours.
         moving = curve[(curve[:, SIGMA] >= 0) & (np.abs(curve[:, REAR_SPEED]) > STANDING)]
         physical = sample_curve(found.equations, moving).physical
         turns = (moving[:-1, REAR_SPEED] * moving[1:, REAR_SPEED] < 0) & physical[:-1] & physical[1:]
@@ -215,23 +225,23 @@ def _pushed(found: FoundMotion) -> int:
     return pieces
 
 
-def _nearest(found: FoundMotion) -> float:
-    """Least distance between two curves."""
+def _smallest_distance(found: FoundMotion) -> float:
+    """Return the smallest distance between two curves."""
     pairs = [(a, b) for i, a in enumerate(found.curves) for b in found.curves[:i]]
     return min(
         float(np.linalg.norm(search_coordinates(a)[:, None] - search_coordinates(b), axis=2).min()) for a, b in pairs
     )
 
 
-def _ends(curve: np.ndarray) -> str:
+def _describe_ends(curve: np.ndarray) -> str:
     return " to ".join(
         f"lean {u[LEAN]:.2f} steer {u[STEER]:.2f} radius {np.hypot(*u[:2]):.1f} m" for u in curve[[0, -1]]
     )
 
 
-def _combined_somewhere(evidence: Evidence) -> LedgerLine:
-    """Where families 1, 3, 4 are one curve: from where 1 and 3 touch to where the pivoting motion comes to rest."""
-    touch, (rest, _) = evidence.touching((1, 3)), _at_rest(evidence)
+def _combined_somewhere_line(evidence: Evidence) -> LedgerLine:
+    """Make the line on one curve of families 1, 3, 4: from where 1 and 3 touch to where the pivot comes to rest."""
+    touch, (rest, _) = evidence.touching((1, 3)), _pivot_at_rest(evidence)
     low = np.nan if touch is None else touch.alpha
     middle = evidence.family(0.5 * (low + rest), 3).ends if low < rest else ("", "")
     return claim_line(
@@ -250,16 +260,16 @@ def _combined_somewhere(evidence: Evidence) -> LedgerLine:
     )
 
 
-def _at_rest(evidence: Evidence) -> tuple[float, np.ndarray]:
-    """Alpha at which the pivoting motion known from the plane comes to rest, and the motion."""
+def _pivot_at_rest(evidence: Evidence) -> tuple[float, np.ndarray]:
+    """Return the alpha at which the pivoting motion known from the plane comes to rest, and the motion."""
     start = with_angle(evidence.found(_DEEP).pivoting[0])
     return evidence.once(
         ("pivot at rest",), lambda: pivot_at(evidence.bicycle, start, _DEEP, towards=_NEAR_REST, angle=0.0)
     )
 
 
-def _infinitely_fast(evidence: Evidence) -> tuple[float, np.ndarray]:
-    """Alpha at which the pivoting motion of steep bowls is infinitely fast, and the motion."""
+def _infinitely_fast_pivot(evidence: Evidence) -> tuple[float, np.ndarray]:
+    """Return the alpha at which the pivoting motion of steep bowls is infinitely fast, and the motion."""
     start = with_angle(evidence.found(_STEEP).pivoting[0])
     return evidence.once(
         ("infinitely fast pivot",),
@@ -267,9 +277,9 @@ def _infinitely_fast(evidence: Evidence) -> tuple[float, np.ndarray]:
     )
 
 
-def _never_without(evidence: Evidence) -> LedgerLine:
-    """Families 3 and 4 meet in a pivoting motion: from one alpha to another there is none."""
-    (rest, slow), (fast, quick) = _at_rest(evidence), _infinitely_fast(evidence)
+def _never_without_line(evidence: Evidence) -> LedgerLine:
+    """Make the line on families 3 and 4 meeting in a pivoting motion, of which there is none in a range of alphas."""
+    (rest, slow), (fast, quick) = _pivot_at_rest(evidence), _infinitely_fast_pivot(evidence)
     inside = [alpha for alpha in _BETWEEN if rest < alpha < fast]
     found = [evidence.found(alpha) for alpha in inside]
     squares = []
@@ -296,20 +306,20 @@ def _never_without(evidence: Evidence) -> LedgerLine:
         checks=[
             Check("squared rates of the two between, over 1 rad^2/s^2 (must be negative)", highest, -1.0),
             evidence.searched_again(*inside),
-            *(_solved(each) for each in found),
+            *(_check_residual(each) for each in found),
         ],
     )
 
 
-def _always(evidence: Evidence) -> Iterator[LedgerLine]:
+def _always_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     cases = {alpha: evidence.found(alpha) for alpha in evidence.cases}
-    solved = [*(_solved(found) for found in cases.values()), evidence.searched_again(*cases)]
+    solved = [*(_check_residual(found) for found in cases.values()), evidence.searched_again(*cases)]
     many = "; ".join(f"{a:g}: {len(f.static)} and {len(f.pivoting)}" for a, f in cases.items())
-    searched = _searched(next(iter(cases.values())), "static equilibria and pivoting motions of the five cases")
+    searched = _search_source(next(iter(cases.values())), "static equilibria and pivoting motions of the five cases")
     yield claim_line(
         section="5",
         claim="in the five cases there are one static equilibrium and one pivoting motion",
-        thresholds=[equals("cases with one of each", sum(map(_one_each, cases.values())), len(cases))],
+        thresholds=[equals("cases with one of each", sum(map(_has_one_each, cases.values())), len(cases))],
         measured=f"found at alpha = {many}",
         source=searched,
         checks=solved,
@@ -355,12 +365,12 @@ def _always(evidence: Evidence) -> Iterator[LedgerLine]:
         measured=f"not between the five cases: at alpha = {alpha:g} {len(between.static)} static equilibria (steers "
         + ", ".join(f"{u[STEER]:.4f}" for u in between.static)
         + f") and {len(between.pivoting)} pivoting motions",
-        source=_searched(between, "static equilibria and pivoting motions between the five cases"),
-        checks=[_solved(between), _steers_apart(between), evidence.searched_again(alpha)],
+        source=_search_source(between, "static equilibria and pivoting motions between the five cases"),
+        checks=[_check_residual(between), _check_steers_apart(between), evidence.searched_again(alpha)],
     )
 
 
-def _steers_apart(found: FoundMotion) -> Check:
+def _check_steers_apart(found: FoundMotion) -> Check:
     steers = np.sort([u[STEER] for u in found.static])
     gap = float(np.diff(steers).min()) if len(steers) > 1 else np.inf
     return Check("round-off over the distance of two static equilibria", 1e-12 / gap, 1e-6)

@@ -1,4 +1,4 @@
-"""Sections 2 and 3.1: coordinates, constraints, equations, symmetries, and what makes a motion circular."""
+"""Sections 2 and 3.1: coordinates, constraints, equations, symmetries, and conditions of a circular motion."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ from .ledger import Check, LedgerLine, below, claim_line, count_line, equals, so
 CONTACT_ROWS, GAP_ROWS, ROLLING_ROWS = slice(9, 15), slice(15, 17), slice(17, 21)
 _BODIES, _HINGES = 4, 3
 _UNCHANGED = 1e-10  # of accelerations of order 10 to 100: round-off times the condition of the mass matrix, 1e3
-_ROUND_OFF = 1e-9  # of the largest singular value: what is below is zero to round-off
-# A state with nothing special about it: leaning, steered, all three free rates at work.
+_ROUND_OFF = 1e-9  # relative to the largest singular value: smaller ones are zero to round-off
+# A generic state: leaning, steered, all three free rates different from zero.
 _PLACE, _LEAN, _STEER, _RATES = (1.3, -2.1), 0.2, 0.4, (0.3, -0.5, 12.0)
 
 
 def structure_lines(evidence: Evidence) -> Iterator[LedgerLine]:
-    """Lines on sections 2 and 3.1."""
+    """Yield the lines on sections 2 and 3.1."""
     printed, bicycle, surface = evidence.figures["counts"], evidence.bicycle, Paraboloid(0.2)
     q, qd = consistent_state(bicycle, surface, _PLACE, _LEAN, _STEER, _RATES)
-    yield from _bodies(printed, bicycle, q)
-    yield from _constraints(printed, bicycle, surface, q, qd)
-    yield from _equations(printed, bicycle, surface, q, qd)
-    yield from _symmetries(printed, bicycle, surface, q, qd)
-    yield from _constants(printed, evidence)
+    yield from _body_lines(printed, bicycle, q)
+    yield from _constraint_lines(printed, bicycle, surface, q, qd)
+    yield from _equation_lines(printed, bicycle, surface, q, qd)
+    yield from _symmetry_lines(printed, bicycle, surface, q, qd)
+    yield from _constant_lines(printed, evidence)
 
 
 def rank(matrix: np.ndarray) -> tuple[int, float]:
-    """Rank, and how far the last singular value that counts stands above round-off (relative)."""
+    """Return the rank and the smallest singular value that counts, relative to the largest."""
     values = np.linalg.svd(matrix, compute_uv=False)
     many = int(np.sum(values > _ROUND_OFF * values[0]))
     return many, float(values[many - 1] / values[0])
 
 
-def _clear(smallest: float) -> Check:
-    """A rank counts only if no singular value is near the limit that it is told by."""
+def _check_rank(smallest: float) -> Check:
+    """Check that no singular value is near the limit of the rank."""
     return Check("limit of round-off over the smallest singular value that counts", _ROUND_OFF / smallest, 1e-3)
 
 
-def _bodies(printed: dict[str, int], bicycle: Bicycle, q: np.ndarray) -> Iterator[LedgerLine]:
+def _body_lines(printed: dict[str, int], bicycle: Bicycle, q: np.ndarray) -> Iterator[LedgerLine]:
     names = [f.name for f in fields(bicycle) if f.name != "gravity"]
     yield count_line(
         section="2.1",
@@ -71,9 +71,9 @@ def _bodies(printed: dict[str, int], bicycle: Bicycle, q: np.ndarray) -> Iterato
         value=free,
         measured=f"velocities of {_BODIES} bodies under the {len(COORDINATES)} rates: rank {free}",
         source=source("rank of the bodies' velocities under unit rates", body_velocities, angular_velocities, rank),
-        checks=[_clear(smallest), hinged],
+        checks=[_check_rank(smallest), hinged],
     )
-    product = _turn(2, q[3]) @ _turn(0, q[4]) @ _turn(1, q[5])
+    product = _turn_matrix(2, q[3]) @ _turn_matrix(0, q[4]) @ _turn_matrix(1, q[5])
     error = float(np.abs(product - rotations(bicycle, q[None])[0, 0]).max())
     yield claim_line(
         section="2.1",
@@ -81,11 +81,11 @@ def _bodies(printed: dict[str, int], bicycle: Bicycle, q: np.ndarray) -> Iterato
         thresholds=[below("largest entry of the difference", error, 1e-14)],
         measured=f"product of the three turns: off by {error:.0e}",
         source=source("the frame's rotation against the product of three turns", rotations),
-        checks=[Check("a turn that is none", -abs(q[4]), -0.1)],
+        checks=[Check("lean at which the order is tested, negated (must not be zero)", -abs(q[4]), -0.1)],
     )
 
 
-def _turn(axis: int, angle: float) -> np.ndarray:
+def _turn_matrix(axis: int, angle: float) -> np.ndarray:
     matrix, (i, j) = np.eye(3), [k for k in range(3) if k != axis]
     sign = -1 if axis == 1 else 1
     matrix[i, i] = matrix[j, j] = np.cos(angle)
@@ -94,7 +94,7 @@ def _turn(axis: int, angle: float) -> np.ndarray:
 
 
 def derivatives(bicycle: Bicycle, surface: Paraboloid, q: np.ndarray, qd: np.ndarray) -> dict[str, np.ndarray]:
-    """Derivatives of the 21 equations by q, qd, qdd, contact parameters and forces, by the complex step."""
+    """Differentiate the 21 equations by q, qd, qdd, contact parameters and forces, by the complex step."""
     now = dynamics(bicycle, surface, q, qd)
     arguments = {"q": q, "qd": qd, "qdd": now.acceleration, "p": now.contact.ravel(), "force": now.force.ravel()}
     out = {}
@@ -108,14 +108,14 @@ def derivatives(bicycle: Bicycle, surface: Paraboloid, q: np.ndarray, qd: np.nda
     return out
 
 
-def _constraints(
+def _constraint_lines(
     printed: dict[str, int], bicycle: Bicycle, surface: Paraboloid, q: np.ndarray, qd: np.ndarray
 ) -> Iterator[LedgerLine]:
     slopes = derivatives(bicycle, surface, q, qd)
     ranked = source("rank of the constraints' derivatives at a state with nothing special about it", derivatives, rank)
 
     def line(claim: str, key: str, value: int, measured: str, smallest: float) -> LedgerLine:
-        return count_line("2.2", claim, printed[key], value, measured, ranked, [_clear(smallest)])
+        return count_line("2.2", claim, printed[key], value, measured, ranked, [_check_rank(smallest)])
 
     contact = slopes["p"][CONTACT_ROWS]
     solved, smallest = rank(contact)
@@ -147,7 +147,7 @@ def _constraints(
     )
 
 
-def _equations(
+def _equation_lines(
     printed: dict[str, int], bicycle: Bicycle, surface: Paraboloid, q: np.ndarray, qd: np.ndarray
 ) -> Iterator[LedgerLine]:
     now = dynamics(bicycle, surface, q, qd)
@@ -178,11 +178,11 @@ def _equations(
         measured=f"mass matrix of condition {condition:.1e}, forces on the bicycle of rank {regular}: accelerations "
         "and multipliers follow from one regular system",
         source=source("condition of the mass matrix, rank of the forces", mass_matrix, derivatives, rank),
-        checks=[_clear(smallest), left],
+        checks=[_check_rank(smallest), left],
     )
 
 
-def _symmetries(
+def _symmetry_lines(
     printed: dict[str, int], bicycle: Bicycle, surface: Paraboloid, q: np.ndarray, qd: np.ndarray
 ) -> Iterator[LedgerLine]:
     here = dynamics(bicycle, surface, q, qd)
@@ -196,14 +196,14 @@ def _symmetries(
     spun = q.copy()
     spun[7:] += (1.0, -2.0)
     by_wheels = below("change of the accelerations", change(spun, qd, np.eye(3)), _UNCHANGED)
-    turn = _turn(2, 0.7)
+    turn = _turn_matrix(2, 0.7)
     turned, rates = q.copy(), qd.copy()
     turned[:3], rates[:3], turned[YAW] = turn @ q[:3], turn @ qd[:3], q[YAW] + 0.7
     by_yaw = below("change of the accelerations, turned back,", change(turned, rates, turn.T), _UNCHANGED)
     lean = q.copy()
     lean[4] += 1e-3
     # Accelerations are of order 10 to 100.
-    moved = Check("what the test sees of a lean of 1e-3 (must be seen)", -change(lean, qd, np.eye(3)), -1e-3)
+    moved = Check("change by a lean of 1e-3, negated (must be seen)", -change(lean, qd, np.eye(3)), -1e-3)
     changed = source("accelerations at a state and at the turned one", dynamics)
     yield claim_line(
         section="3.1",
@@ -227,7 +227,7 @@ def _symmetries(
     yield count_line("3.1", "six coordinates are not cyclic", printed["noncyclic_coordinates"], six, text, changed)
 
 
-def _constants(printed: dict[str, int], evidence: Evidence) -> Iterator[LedgerLine]:
+def _constant_lines(printed: dict[str, int], evidence: Evidence) -> Iterator[LedgerLine]:
     residual_check = evidence.residual()
     family = evidence.family(evidence.cases[0], 1)
     motion = family.equations.motion(family.points[0].unknowns)

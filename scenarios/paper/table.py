@@ -22,7 +22,7 @@ _WHOSE = {"paper": "the paper's", "ours": "ours: the measurement does not pass i
 
 
 def show_ledger(console: Console, lines: Sequence[LedgerLine]) -> None:
-    """Print the ledger: every line in the paper's order, then those that do not hold and whose they are."""
+    """Print the ledger: every line in the paper's order; those that do not hold follow, with whose fault they are."""
     table = Table("§", "claim", "printed", "measured", "verdict", box=None, pad_edge=False)
     for line in lines:
         row = (line.section, line.claim, line.printed or "", line.measured)
@@ -31,7 +31,7 @@ def show_ledger(console: Console, lines: Sequence[LedgerLine]) -> None:
     console.print()
     for line in lines:
         if not line.holds:
-            console.print(_failure(line), style="red", markup=False, highlight=False, soft_wrap=True)
+            console.print(_describe_failure(line), style="red", markup=False, highlight=False, soft_wrap=True)
             for threshold in line.thresholds:
                 text = f"    wanted: {threshold.text}; it is {threshold.value:.6g}"
                 console.print(text, markup=False, highlight=False, soft_wrap=True)
@@ -42,17 +42,17 @@ def show_ledger(console: Console, lines: Sequence[LedgerLine]) -> None:
     console.print(ledger_summary(lines), markup=False, highlight=False, soft_wrap=True)
 
 
-def _failure(line: LedgerLine) -> str:
+def _describe_failure(line: LedgerLine) -> str:
     return f"{line.section}: {line.claim}: {line.measured} ({_WHOSE[line.fault or 'ours']})"
 
 
 def ledger_summary(lines: Sequence[LedgerLine]) -> str:
-    """One line: how many lines of each verdict."""
+    """Return the numbers of lines by verdict as one line of text."""
     return f"{len(lines)} lines: " + ", ".join(f"{n} {verdict}" for verdict, n in counts(lines).items() if n)
 
 
 def ledger_markdown(lines: Sequence[LedgerLine]) -> str:
-    """The ledger as a Markdown document."""
+    """Return the ledger as a Markdown document."""
     rows = ["# The paper, line by line", "", ledger_summary(lines), ""]
     rows += [
         "| § | claim | printed | measured | verdict | threshold | computed | reproduced by |",
@@ -68,12 +68,12 @@ def ledger_markdown(lines: Sequence[LedgerLine]) -> str:
             verdict,
             line.threshold,
             ". ".join(part for part in (line.source.computed, line.source.search) if part),
-            _reproduced_by(line),
+            _list_commands(line),
         )
         rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(rows) + "\n"
 
 
-def _reproduced_by(line: LedgerLine) -> str:
+def _list_commands(line: LedgerLine) -> str:
     command = [line.source.command] if line.source.command else []
     return ", ".join(f"`{part}`" for part in (*command, *line.source.functions))

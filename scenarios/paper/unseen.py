@@ -1,4 +1,4 @@
-"""What the text of the paper at hand does not hold, or what is no matter of measuring."""
+"""Claims that the available text of the paper does not contain, or that cannot be measured."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from .ledger import LedgerLine, untestable_line
 
 
 def unseen_lines(evidence: Evidence) -> Iterator[LedgerLine]:
-    """Lines on claims that cannot be tested, with the reason."""
+    """Yield lines on claims that cannot be tested, with the reason."""
     yield untestable_line(
         section="1",
         claim="on a curved surface no closed set of ordinary differential equations can be obtained",
-        why="told of what elimination by hand or by a computer's algebra yields, not of the motion; section 4.1 itself "
-        "has seven of them about a state",
+        why="a statement on what elimination by hand or computer algebra yields, not on the motion; section 4.1 itself "
+        "has seven such equations about a state",
     )
     yield untestable_line(
         section="2.1",
         claim="Table 1: the values of the 25 parameters",
-        why="the text lacks the table; that the bicycle is the benchmark's is held by the accelerations of Basu-Mandal "
-        "et al., which every line is tested by",
+        why="the text lacks the table; every line is tested by the accelerations of Basu-Mandal et al., which show "
+        "that the bicycle is the benchmark's",
         kind="number",
     )
     yield untestable_line(
         section="2.3",
         claim="Equations 1 to 17 as printed",
-        why="the text lacks the formulas; their number, structure and solutions are held",
+        why="the text lacks the formulas; their number, structure and solutions are tested",
     )
     yield untestable_line(
         section="3.2",

@@ -1,5 +1,6 @@
 """A scenario in every engine: planned, run, measured, and stored as a run folder."""
 
+from ..scenario import configure_engine
 from .folder import RunPlan, library_versions, write_run_recording
 from .installed import installed_engines
 from .runner import (
@@ -8,7 +9,6 @@ from .runner import (
     RunWatch,
     Trace,
     claimed_noise,
-    configure_engine,
     measure_one,
     measure_run,
     plan_run,

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -14,10 +13,14 @@ from ...engines.engine import Engine, Settings, Trajectory, packages
 from ...reference.surface import SurfaceOfRevolution
 from ...reports.drawing import make_summary
 from ..error import ScenarioError
-from ..files import write_json, write_text
+from ..files import write_sealed, write_text
 from ..scenario import Scenario, Start
+from .machine import describe_machine, find_commit
 
 LIBRARIES = ("velodrome", "numpy", "scipy", "numba", "exudyn", "mujoco", "rerun-sdk", "pyarrow", "jinja2")
+
+
+RUN_VERSION = 2  # of manifest.json and metrics.json; those of version 1 have no digest and no version
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,29 @@ def new_folder(out: Path, name: str) -> Path:
             raise ScenarioError(f"{out}: the run folder cannot be made: {error.strerror}") from error
         return folder
     raise ScenarioError(f"{out}: too many runs of {name} in one second")
+
+
+def resolve_scenario(plan: RunPlan) -> Scenario:
+    """The scenario of a plan with nothing left open: the bicycle's numbers, and all settings of engines that ride.
+
+    What other engines' tables say stays as it is.
+    """
+    engines = dict(plan.scenario.engines)
+    for name, (_, settings) in plan.engines.items():
+        values = settings.model_dump(mode="json", exclude_none=True)
+        if not _has_none(values):
+            engines[name] = values
+    bicycle = asdict(plan.scenario.make_bicycle())
+    return plan.scenario.model_copy(update={"bicycle": bicycle, "engines": engines})
+
+
+def _has_none(value: Any) -> bool:
+    """Whether TOML cannot say a value: it has no word for nothing."""
+    if isinstance(value, Mapping):
+        return any(_has_none(item) for item in value.values())
+    if isinstance(value, list):
+        return any(_has_none(item) for item in value)
+    return value is None
 
 
 def write_manifest(
@@ -98,7 +124,8 @@ def write_manifest(
         "left_out": plan.left_out,
         "verdicts": list(verdicts),
         "libraries": library_versions(),
-        "platform": {"system": platform.platform(), "machine": platform.machine(), "python": platform.python_version()},
+        "suite": find_commit(),
+        "platform": describe_machine(),
         "start": {
             "family": start.family,
             "growth_rate": start.growth_rate,
@@ -106,7 +133,7 @@ def write_manifest(
             "qd": start.problem.qd.tolist(),
         },
     }
-    write_json(folder / "manifest.json", manifest)
+    write_sealed(folder / "manifest.json", manifest, RUN_VERSION)
     return manifest
 
 

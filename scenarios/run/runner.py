@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import threading
 from collections.abc import Callable, Mapping
@@ -13,17 +12,23 @@ from typing import Any
 
 import numpy as np
 import tomli_w
-from pydantic import ValidationError
 
 from ...engines.admission import ride_engine
-from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, load_engine, why_failed
-from ...engines.guard import call_engine
+from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, why_failed
 from ...engines.storage import write_trajectory
 from ...reports.measure import ROUND_OFF, compute_metrics, cut_at_fall, evaluate_ride
 from ..error import ScenarioError
-from ..files import write_json, write_text
-from ..scenario import Scenario, Start, format_validation_error, make_start, refuse_unknown
-from .folder import RunPlan, new_folder, write_manifest, write_page, write_run_recording
+from ..files import write_sealed, write_text
+from ..scenario import (
+    Scenario,
+    Start,
+    configure_engine,
+    join_complaints,
+    list_engine_faults,
+    make_start,
+    refuse_engine,
+)
+from .folder import RUN_VERSION, RunPlan, new_folder, resolve_scenario, write_manifest, write_page, write_run_recording
 from .installed import installed_engines
 
 # (engine, simulated time reached, duration)
@@ -111,11 +116,19 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
         If an engine is not installed, a setting is wrong, or the motion does not exist.
     """
     there = installed_engines()
-    for engine in [*(wanted or []), *scenario.engines]:
-        if engine not in there:
-            raise ScenarioError(f"engine {engine!r} is not installed; there are {', '.join(there)}")
+    faults = [refuse_engine(engine, there) for engine in wanted or [] if engine not in there]
     names = [engine for engine in there if engine == REFERENCE or not wanted or engine in wanted]
-    chosen = {engine: configure_engine(engine, scenario.engines.get(engine, {})) for engine in names}
+    chosen: dict[str, tuple[Engine, Settings]] = {}
+    cause: BaseException | None = None
+    for engine in names:
+        try:
+            chosen[engine] = configure_engine(engine, scenario.engines.get(engine, {}))
+        except ScenarioError as error:
+            faults.append(str(error))
+            cause = cause or error.__cause__ or error  # --traceback shows it
+    faults += list_engine_faults(scenario.engines, skipped=names)
+    if faults:
+        raise ScenarioError(join_complaints(faults)) from cause
     start = make_start(scenario)
     left_out: dict[str, str] = {}
     for engine, (library, settings) in chosen.items():
@@ -129,31 +142,6 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
             raise ScenarioError(f"engines.{engine}: its check failed: {why_failed(error)}") from error
     chosen = {engine: pair for engine, pair in chosen.items() if engine not in left_out}
     return RunPlan(name, scenario, start, chosen, left_out)
-
-
-def configure_engine(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
-    """Load an engine and validate its settings.
-
-    Raises
-    ------
-    ScenarioError
-        If it is no engine, or a setting is unknown or out of range.
-    """
-    try:
-        engine = load_engine(name)
-    except ValueError as error:
-        raise ScenarioError(" ".join(str(error).split())) from error
-    try:
-        refuse_unknown(values, engine.settings.model_fields)
-        # As JSON: strictness would refuse a TOML array where a setting is a tuple.
-        text = json.dumps(dict(values), default=str)
-        return engine, call_engine(engine.settings.model_validate_json, text, strict=True)
-    except ValidationError as error:
-        raise ScenarioError(f"engines.{name}.{format_validation_error(error)}") from error
-    except ValueError as error:
-        raise ScenarioError(f"engines.{name}: {error}") from error
-    except Exception as error:  # settings may have code of their own
-        raise ScenarioError(f"engines.{name}: its settings failed: {why_failed(error)}") from error
 
 
 def run_plan(
@@ -192,7 +180,7 @@ def store_run(
     See `run_plan` for the parameters.
     """
     folder = new_folder(out, plan.name)
-    write_text(folder / "scenario.toml", tomli_w.dumps(plan.scenario.model_dump(exclude_none=True)))
+    write_text(folder / "scenario.toml", tomli_w.dumps(resolve_scenario(plan).model_dump(exclude_none=True)))
     write_manifest(folder, plan, {}, {})
 
     def store(name: str, rides: Rides) -> None:
@@ -203,7 +191,7 @@ def store_run(
     rides = ride_plan(plan, watch, note, trace, store)
     with _deaf_to_interrupts():
         result = measure_run(plan, rides)
-        write_json(folder / "metrics.json", result.metrics)
+        write_sealed(folder / "metrics.json", result.metrics, RUN_VERSION)
         write_run_recording(folder, plan, result.shown, result.metrics, result.failures, result.verdicts)
         complete = not result.interrupted
         found = write_manifest(folder, plan, result.trajectories, result.failures, result.verdicts, complete=complete)

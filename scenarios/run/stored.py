@@ -10,9 +10,12 @@ from typing import Any
 import numpy as np
 
 from ...engines.engine import Trajectory
+from ...engines.format_version import VERSION_KEY, read_version
 from ...engines.storage import read_trajectory
 from ..error import ScenarioError
+from ..files import DIGEST_KEY, content_digest
 from ..scenario import show_value
+from .folder import RUN_VERSION
 
 
 def find_part(folder: Path, name: str) -> Path:
@@ -33,12 +36,14 @@ def find_part(folder: Path, name: str) -> Path:
 
 
 def read_document(folder: Path, name: str) -> Mapping[str, Any]:
-    """A JSON object of a run folder.
+    """A JSON object of a run folder, without its version and its digest.
+
+    Folders of before there were versions have neither and are read as they stand.
 
     Raises
     ------
     ScenarioError
-        If it is missing, cannot be read, or is something else.
+        If it is missing, cannot be read, is something else, of a newer format, or was changed since it was written.
     """
     path = find_part(folder, name)
     try:
@@ -49,7 +54,17 @@ def read_document(folder: Path, name: str) -> Mapping[str, Any]:
         raise ScenarioError(f"{path}: not a JSON document: {' '.join(str(error).split())}") from error
     if not isinstance(found, dict):
         raise ScenarioError(f"{path}: not a JSON object")
-    return found
+    try:
+        version = read_version(found, RUN_VERSION)
+    except ValueError as error:
+        raise ScenarioError(f"{path}: {error}") from error
+    sealed = version > 1 or DIGEST_KEY in found
+    if sealed and found.get(DIGEST_KEY) != content_digest(found):
+        raise ScenarioError(
+            f"{path}: was changed since it was written: its contents do not match their digest; "
+            "run the scenario again, or take the folder from where it is whole"
+        )
+    return {key: value for key, value in found.items() if key not in (VERSION_KEY, DIGEST_KEY)}
 
 
 def read_json(path: Path) -> Any:

@@ -1,5 +1,7 @@
 """Scenario files: their schema, the surfaces they can name, and the start they describe."""
 
+from .bicycle_file import BicycleFile, read_bicycle_file
+from .engine_settings import configure_engine, list_engine_faults, refuse_engine
 from .schema import (
     OF_THE_MOTION,
     CircularTable,
@@ -15,27 +17,31 @@ from .start import Start, make_start, output_times
 from .surfaces import make_bowl, name_surface, parse_surface
 from .table import (
     Table,
-    UnknownName,
+    error_place,
     format_validation_error,
-    list_kinds,
+    join_complaints,
+    list_complaints,
     place_error,
     read_toml,
-    refuse_unknown,
     show_value,
 )
 
 __all__ = [
     "OF_THE_MOTION",
+    "BicycleFile",
     "CircularTable",
     "Gate",
     "Scenario",
     "Simulation",
     "Start",
     "Table",
-    "UnknownName",
+    "configure_engine",
+    "error_place",
     "format_validation_error",
+    "join_complaints",
     "library_names",
-    "list_kinds",
+    "list_complaints",
+    "list_engine_faults",
     "load_scenario",
     "make_bowl",
     "make_start",
@@ -43,9 +49,10 @@ __all__ = [
     "output_times",
     "parse_surface",
     "place_error",
+    "read_bicycle_file",
     "read_scenario_file",
     "read_toml",
-    "refuse_unknown",
+    "refuse_engine",
     "show_value",
     "validate_scenario",
 ]

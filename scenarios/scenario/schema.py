@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, ValidatorFunctionWrapHandler, field_validator, model_validator
 
-from ...reference.bicycle import Bicycle
+from ...engines.names import suggest_name
+from ...reference.bicycle import Bicycle, require_rigid_bodies
 from ..error import ScenarioError
+from .engine_settings import list_engine_faults
 from .surfaces import SurfaceTable
-from .table import Table, UnknownName, format_validation_error, place_error, read_toml, show_value
+from .table import Table, join_complaints, list_complaints, place_error, read_toml, show_value, validate_known
 
 LIBRARY = Path(__file__).parents[1] / "library"
 # The tables that the motion depends on.
@@ -130,31 +132,49 @@ class Scenario(Table):
     def _tags_are_lines(cls, tags: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(_line_of_text(tag) for tag in tags)
 
-    @model_validator(mode="before")
+    @field_validator("motion", mode="before")
     @classmethod
-    def _circular_by_default(cls, data: Any) -> Any:
-        if isinstance(data, Mapping) and isinstance(data.get("motion"), Mapping) and "kind" not in data["motion"]:
-            return {**data, "motion": {"kind": "circular", **data["motion"]}}
-        return data
+    def _circular_by_default(cls, motion: Any) -> Any:
+        if isinstance(motion, Mapping) and "kind" not in motion:
+            return {"kind": "circular", **motion}
+        return motion
 
-    @model_validator(mode="after")
-    def _bicycle_exists(self) -> Scenario:
-        self.make_bicycle()
-        return self
+    @field_validator("bicycle")
+    @classmethod
+    def _bicycle_exists(cls, bicycle: dict[str, float]) -> dict[str, float]:
+        faults = _bicycle_faults(bicycle)
+        if faults:
+            raise ValueError("; ".join(faults))
+        return bicycle
+
+    @field_validator("bicycle", mode="wrap")
+    @classmethod
+    def _known_parameters(cls, bicycle: Any, handler: ValidatorFunctionWrapHandler) -> dict[str, float]:
+        words = "{name} is unknown ({meant})"
+        return validate_known("Bicycle", bicycle, Bicycle.__dataclass_fields__, handler, words)
 
     def make_bicycle(self) -> Bicycle:
-        """Build the benchmark bicycle with this scenario's overrides.
-
-        Raises
-        ------
-        ValueError
-            If a name is unknown or a value is not possible.
-        """
-        unknown = sorted(set(self.bicycle) - set(Bicycle.__dataclass_fields__))
-        if unknown:
-            names = ", ".join(Bicycle.__dataclass_fields__)
-            raise UnknownName(f"bicycle parameter {show_value(repr(unknown[0]))} is unknown; there are {names}")
+        """Build the benchmark bicycle with this scenario's overrides."""
         return Bicycle(**self.bicycle)
+
+
+def _bicycle_faults(values: Mapping[str, float]) -> list[str]:
+    """Say which parameters no bicycle has, or what is wrong with all of them together; nothing if nothing is."""
+    try:
+        require_rigid_bodies(Bicycle(**values))
+    except ValueError as error:
+        together = str(error)
+    else:
+        return []
+    faults = []
+    for name, value in values.items():
+        try:
+            Bicycle(**{name: value})
+        except ValueError as error:
+            # Of inertias only all together can be judged.
+            if str(error).startswith(f"bicycle parameter {name} is"):
+                faults.append(str(error))
+    return [fault.removeprefix("bicycle parameter ") for fault in faults or [together]]
 
 
 def _line_of_text(text: str) -> str:
@@ -189,12 +209,13 @@ def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tupl
     ScenarioError
         With one line.
     """
-    if source in library_names():
+    names = library_names()
+    if source in names:
         name, text = source, (LIBRARY / f"{source}.toml").read_text(encoding="utf-8")
     elif Path(source).suffix != ".toml":
         raise ScenarioError(
-            f"no scenario {show_value(repr(source))} in the library; there are {', '.join(library_names())}, "
-            "or give a path to a .toml file"
+            f"no scenario {show_value(repr(source))} in the library ({suggest_name(source, names)})"
+            "; name one of it, or give a path to a .toml file"
         )
     else:
         name, text = read_scenario_file(source)
@@ -202,19 +223,38 @@ def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tupl
         data = read_toml(text)
     except ValueError as error:
         raise ScenarioError(f"{show_value(source)}: not valid TOML: {show_value(str(error))}") from error
+    faults = []
+    for key, value in (changes or {}).items():
+        try:
+            data = place_error(data, {key: value})
+        except ValueError as error:
+            faults.append(f"--set {error}")
     try:
-        data = place_error(data, changes or {})
-    except ValueError as error:
-        raise ScenarioError(f"--set {error}") from error
-    return name, validate_scenario(data, source)
+        scenario = validate_scenario(data, source)
+    except ScenarioError as error:
+        if not faults:
+            raise
+        faults.append(str(error))
+    else:
+        if not faults:
+            return name, scenario
+    raise ScenarioError(join_complaints(faults))
 
 
 def validate_scenario(data: Mapping[str, Any], source: str) -> Scenario:
-    """Validate a scenario's data; the first thing wrong makes the one line of a `ScenarioError`."""
+    """Validate a scenario's data.
+
+    Raises
+    ------
+    ScenarioError
+        With everything wrong in one line, the settings of all engines included. Of a scenario without another fault
+        they are left to `velodrome.scenarios.run.plan_run`: to load all engines takes a second.
+    """
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError(f"{show_value(source)}: {format_validation_error(error)}") from error
+        faults = [*list_complaints(error), *list_engine_faults(data.get("engines"))]
+        raise ScenarioError(f"{show_value(source)}: {join_complaints(faults)}") from error
 
 
 def read_scenario_file(source: str) -> tuple[str, str]:

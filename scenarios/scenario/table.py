@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
-from collections.abc import Iterable, Mapping
-from typing import Any, get_args
+from collections.abc import Callable, Collection, Iterable, Mapping
+from typing import Any, Self, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
+from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
+
+from ...engines.names import closest_name, suggest_name
+
+Validated = TypeVar("Validated")
 
 # Letters of somebody else's text in a line: enough to find it by.
 _LONGEST = 200
@@ -64,28 +70,86 @@ def place_error(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str
 
 
 class Table(BaseModel):
-    """Base of all tables: unknown keys are refused with the known ones, values are checked, nothing changes later."""
+    """Base of all tables: unknown keys are refused, values are checked, nothing changes later.
+
+    Everything wrong with a table is told at once: values are checked beside unknown keys too, those of a misspelt
+    key as if it were written as it is meant.
+    """
 
     # Strict: true is no number, and neither is "18".
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
-    @model_validator(mode="before")
+    @model_validator(mode="wrap")
     @classmethod
-    def _known_keys(cls, data: Any) -> Any:
-        if isinstance(data, Mapping):
-            refuse_unknown(data, cls.model_fields)
-        return data
+    def _known_keys(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        return validate_known(cls.__name__, data, cls.model_fields, handler)
 
 
 class UnknownName(ValueError):
     """A name that is none of those that there are: a typing error, whatever its value."""
 
 
-def refuse_unknown(data: Mapping[str, Any], known: Iterable[str]) -> None:
-    """Raise UnknownName with the known keys if there is another."""
-    unknown = sorted(set(data) - set(known))
-    if unknown:
-        raise UnknownName(f"unknown key {show_value(repr(unknown[0]))}; there are {', '.join(known)}")
+UNKNOWN_NAME = "unknown_name"  # pydantic's type of error of such a name
+
+
+def validate_known(
+    title: str,
+    data: Any,
+    known: Collection[str],
+    validate: Callable[[Any], Validated],
+    words: str = "unknown key {name} ({meant})",
+) -> Validated:
+    """Validate a mapping and refuse names in it that are unknown, all complaints at once.
+
+    Parameters
+    ----------
+    title : str
+        Of the error.
+    data : Any
+        What is no mapping is left to ``validate``.
+    known : collection of str
+    validate : callable
+        Validates the mapping without unknown names. A misspelt one takes its right name.
+    words : str
+        What is said of an unknown name, with ``{name}`` and ``{meant}``.
+
+    Raises
+    ------
+    ValidationError
+        With an error of type `UNKNOWN_NAME` a name, and whatever ``validate`` finds.
+    """
+    unknown = sorted(set(data) - set(known), key=str) if isinstance(data, Mapping) else []
+    if not unknown:
+        return validate(data)
+    found: list[InitErrorDetails] = []
+    right = {name: value for name, value in data.items() if name in known}
+    for name in unknown:
+        fields = {"name": show_value(repr(name)), "meant": suggest_name(str(name), known)}
+        # pydantic fills the template by itself; what is typed may have braces.
+        error = PydanticCustomError(UNKNOWN_NAME, words, fields)  # pyright: ignore[reportArgumentType]
+        found.append({"type": error, "loc": (str(name),), "input": data[name]})
+        meant = closest_name(str(name), known)
+        if meant is not None:
+            right.setdefault(meant, data[name])
+    try:
+        validate(right)
+    except ValidationError as error:
+        found += [_copy_error(entry) for entry in error.errors()]
+    raise ValidationError.from_exception_data(title, found)
+
+
+def _copy_error(entry: ErrorDetails) -> InitErrorDetails:
+    """An error as pydantic takes it back, with its message as it is."""
+    fields = {**entry.get("ctx", {}), "message": entry["msg"]}  # the message last, for nothing to be filled into it
+    kind = PydanticCustomError(entry["type"], "{message}", fields)  # pyright: ignore[reportArgumentType]
+    return {"type": kind, "loc": entry["loc"], "input": entry["input"]}
+
+
+def list_unknown(data: Mapping[str, Any], known: Collection[str]) -> list[str]:
+    """Say of every key of a mapping that is unknown what is known."""
+    return [
+        f"unknown key {show_value(repr(name))} ({suggest_name(name, known)})" for name in sorted(set(data) - set(known))
+    ]
 
 
 _PLAIN_WORDS = {
@@ -112,14 +176,51 @@ def _written(value: Any) -> str:
         return "nested too deeply"
 
 
+_MOST = 20  # complaints of one line; who reads more than that has another file than they think
+
+
+def join_complaints(complaints: Iterable[str]) -> str:
+    """Put complaints into one line, separated by ``; ``, each once; of more than 20 the rest is counted."""
+    found = list(dict.fromkeys(complaints))
+    rest = [f"and {len(found) - _MOST} more"] if len(found) > _MOST else []
+    return "; ".join(found[:_MOST] + rest)
+
+
 def format_validation_error(error: ValidationError) -> str:
-    """Say the first thing wrong in one line: where, what, what came."""
-    first = error.errors()[0]
-    # Discriminator values appear in the location of a union's member: they are no keys of the file.
-    where = ".".join(show_value(str(part)) for part in first["loc"] if part not in list_kinds())
-    message = " ".join(_PLAIN_WORDS.get(first["type"], first["msg"].removeprefix("Value error, ")).split())
-    came = first.get("input")
-    left_out = isinstance(came, Mapping | BaseModel) or first["type"] == "missing"
+    """Say everything wrong in one line: where, what, what came."""
+    return join_complaints(list_complaints(error))
+
+
+def list_complaints(error: ValidationError) -> list[str]:
+    """Say everything wrong, each with its place: where, what, what came."""
+    return [_complaint(entry) for entry in error.errors()]
+
+
+def error_place(entry: ErrorDetails) -> tuple[str, ...]:
+    """Keys that lead to what is wrong.
+
+    Discriminator values appear in the location of a union's member: they are no keys of the file.
+    """
+    return tuple(str(part) for part in entry["loc"] if part not in list_kinds())
+
+
+def _complaint(entry: ErrorDetails) -> str:
+    place, came, facts = error_place(entry), entry.get("input"), entry.get("ctx", {})
+    message = " ".join(_PLAIN_WORDS.get(entry["type"], entry["msg"].removeprefix("Value error, ")).split())
+    left_out = isinstance(came, Mapping | BaseModel) or entry["type"] == "missing"
+    if entry["type"] == UNKNOWN_NAME:
+        place, left_out = place[:-1], True
+    elif entry["type"] == "union_tag_invalid":
+        tag, place = str(facts["tag"]), (*place, "kind")
+        message = f"unknown kind {show_value(repr(tag))} ({suggest_name(tag, _quoted(facts['expected_tags']))})"
+    elif entry["type"] == "literal_error" and isinstance(came, str):
+        closest = closest_name(came, _quoted(facts["expected"]))
+        message += "" if closest is None else f", did you mean {closest!r}?"
+    where = ".".join(show_value(part) for part in place)
     value = "" if left_out else f" (it is {show_value(_written(came))})"
-    more = len(error.errors()) - 1
-    return f"{where}: {message}{value}".lstrip(": ") + (f"; and {more} more" if more else "")
+    return f"{where}: {message}{value}".lstrip(": ")
+
+
+def _quoted(text: str) -> list[str]:
+    """Words that stand in quotes in a text of pydantic's."""
+    return re.findall(r"'([^']*)'", text)

@@ -1,5 +1,14 @@
 """Studies that run one scenario many times."""
 
+from .bicycle import BicycleStudy, find_bicycle, study_bicycle, write_bicycle
 from .precision import all_ran, study_precision, write_precision
 
-__all__ = ["all_ran", "study_precision", "write_precision"]
+__all__ = [
+    "BicycleStudy",
+    "all_ran",
+    "find_bicycle",
+    "study_bicycle",
+    "study_precision",
+    "write_bicycle",
+    "write_precision",
+]

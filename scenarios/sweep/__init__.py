@@ -1,4 +1,4 @@
-"""Many runs: a sweep file, its tasks, worker processes or a Dask cluster, one data set."""
+"""Sweeps: a sweep file, its tasks, worker processes or a Dask cluster, and one data set of results."""
 
 from .cluster import on_cluster
 from .live import SweepView

@@ -1,8 +1,8 @@
-"""Workers on a Dask cluster: the same tasks, in the same kind of process, so the same rows to the bit.
+"""Workers on a Dask cluster: the same tasks in the same kind of process, hence rows equal to the bit.
 
-Each thread of a Dask worker keeps one worker process of `pool`: limits, crashes and their rows are what they
-are on one machine, and a Dask worker dies of no engine. One that is lost for another reason has its batches done
-elsewhere. Dask's protocol carries pickles: a scheduler that is not to be trusted must not be connected to.
+Each thread of a Dask worker keeps one worker process of `pool`, so limits, crashes and their rows are the same as
+on one machine, and no engine ends a Dask worker. If a Dask worker is lost for another reason, its batches are done
+elsewhere. Dask's protocol carries pickles: connect only to a scheduler that you trust.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from .pool import Done, Pool, WorkersBroken
 from .run import Work
 from .worker import Setup
 
-_FIRST, _LARGEST, _SPAN = 4, 250, 1.0  # tasks in a batch: the first ones, at most; seconds that it should take
-_IN_FLIGHT = 3  # batches a thread: one at work, the next at hand
-_PATIENCE = 30  # seconds for a scheduler to answer and for a first worker to come
+_FIRST, _LARGEST, _SPAN = 4, 250, 1.0  # tasks in the first batches and at most; seconds that a batch should take
+_IN_FLIGHT = 3  # batches per thread: one being done, the next ones waiting
+_PATIENCE = 30  # seconds to wait for a scheduler to answer and for a first worker to connect
 
-_here = threading.local()
+_thread_state = threading.local()
 
 
 def on_cluster(address: str) -> Work:
-    """Work on the cluster of a Dask scheduler, e.g. ``tcp://127.0.0.1:8786``.
+    """Return work on the cluster of a Dask scheduler, e.g. ``tcp://127.0.0.1:8786``.
 
     Raises
     ------
@@ -48,22 +48,22 @@ def on_cluster(address: str) -> Work:
     def work(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
         try:
             if tasks:
-                yield from _distributed(client, setup, tasks)
+                yield from _run_batches(client, setup, tasks)
         except (CancelledError, OSError) as error:
-            raise WorkersBroken(f"the scheduler at {address} has gone") from error
+            raise WorkersBroken(f"the scheduler at {address} is lost") from error
         finally:
             client.close()
 
     return work
 
 
-def _distributed(client: Any, setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
+def _run_batches(client: Any, setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
     from distributed import KilledWorker, as_completed
 
     try:
         client.wait_for_workers(1, timeout=_PATIENCE)
     except TimeoutError as error:
-        raise WorkersBroken(f"no worker has come to the scheduler within {_PATIENCE} s") from error
+        raise WorkersBroken(f"no worker connected to the scheduler within {_PATIENCE} s") from error
     batches, versions = _Batches(tasks, setup.time_limit), library_versions()
     at_work: dict[Any, list[Task]] = {}
     arriving = as_completed(loop=client.loop)
@@ -82,7 +82,7 @@ def _distributed(client: Any, setup: Setup, tasks: Sequence[Task]) -> Generator[
         try:
             found = future.result()
         except OSError as error:
-            raise WorkersBroken(f"a Dask worker, or the way to it, has failed: {error}") from error
+            raise WorkersBroken(f"a Dask worker, or the connection to it, failed: {error}") from error
         except KilledWorker:
             found = batches.lost(batch)
         else:
@@ -93,42 +93,42 @@ def _distributed(client: Any, setup: Setup, tasks: Sequence[Task]) -> Generator[
 
 
 class _Batches:
-    """Tasks in batches that take about a second: one costs the scheduler some ten milliseconds.
+    """Tasks in batches that take about a second each: a batch costs the scheduler about ten milliseconds.
 
     Parameters
     ----------
     tasks : sequence of Task
     time_limit : float
-        What a task counts for that did not come to its end [s].
+        Time that an unfinished task counts for [s].
     """
 
     def __init__(self, tasks: Sequence[Task], time_limit: float) -> None:
         self._waiting = deque(tasks)
-        self._alone: deque[Task] = deque()
+        self._singles: deque[Task] = deque()
         self._time_limit = time_limit
         self._rows, self._seconds = 0, 0.0
 
     def next(self, threads: int) -> list[Task]:
-        """The next batch; neighbours, who share a start. Empty when all are out."""
-        if self._alone:
-            return [self._alone.popleft()]
+        """Return the next batch of neighbouring tasks, which share a start; empty when all are out."""
+        if self._singles:
+            return [self._singles.popleft()]
         size = _FIRST if not self._rows else int(min(_LARGEST, _SPAN * self._rows / max(self._seconds, 1e-6)))
-        # The last batches are smaller: no worker is to wait long for another's.
+        # The last batches are smaller, so that no worker waits long for another one.
         size = min(len(self._waiting), max(1, min(size, len(self._waiting) // (2 * threads))))
         return [self._waiting.popleft() for _ in range(size)]
 
     def learn(self, found: Sequence[Done]) -> None:
-        """See how long tasks take."""
+        """Update the estimate of how long tasks take."""
         self._rows += len(found)
         self._seconds += sum(done.timing.get("task_time", self._time_limit) for done in found)
 
     def lost(self, batch: list[Task]) -> list[Done]:
-        """Tasks whose workers died time and again: one by one, and a row for the one that it was."""
+        """Queue the tasks of a batch whose workers died repeatedly one by one; give up a batch of one task."""
         if len(batch) > 1:
-            self._alone.extend(batch)
+            self._singles.extend(batch)
             return []
-        words = "the Dask workers that had it were lost, again and again"
-        return [Done(batch[0].index, {"status": "killed", "reason": words}, {})]
+        reason = "the Dask workers that ran it were lost again and again"
+        return [Done(batch[0].index, {"status": "killed", "reason": reason}, {})]
 
 
 def do_batch(setup: Setup, tasks: Sequence[Task], libraries: dict[str, str]) -> list[Done]:
@@ -139,26 +139,26 @@ def do_batch(setup: Setup, tasks: Sequence[Task], libraries: dict[str, str]) -> 
     setup : Setup
     tasks : sequence of Task
     libraries : dict
-        Versions that the rows are to be of.
+        Versions that the rows must come from.
 
     Raises
     ------
     WorkersBroken
         If other versions are installed here, or no worker process starts.
     """
-    here = _versions()
+    here = _cached_versions()
     for name in sorted({*libraries, *here}):
         if libraries.get(name) != here.get(name):
             raise WorkersBroken(f"a Dask worker has {name} {here.get(name)}, this sweep is of {libraries.get(name)}")
     line = setup.line()
-    if getattr(_here, "line", None) != line:
-        if hasattr(_here, "pool"):
-            _here.pool.close()
-        _here.pool, _here.line = Pool(setup, 1), line
-    return list(_here.pool.run(tasks))
+    if getattr(_thread_state, "line", None) != line:
+        if hasattr(_thread_state, "pool"):
+            _thread_state.pool.close()
+        _thread_state.pool, _thread_state.line = Pool(setup, 1), line
+    return list(_thread_state.pool.run(tasks))
 
 
 @cache
-def _versions() -> dict[str, str]:
-    """Versions of the libraries of a Dask worker; to look them up takes as long as some rides do."""
+def _cached_versions() -> dict[str, str]:
+    """Return the versions of a Dask worker's libraries; looking them up takes as long as some rides."""
     return library_versions()

@@ -1,4 +1,4 @@
-"""The schema of a sweep file: a base scenario, engines, and what changes from run to run."""
+"""The schema of a sweep file: a base scenario, engines, and changes from run to run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from ..error import ScenarioError
 from ..scenario import (
     Scenario,
     Table,
-    format_validation_error,
+    join_complaints,
+    list_complaints,
     load_scenario,
     read_scenario_file,
     read_toml,
@@ -27,7 +28,7 @@ _Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
 
 
 def flatten_table(table: Any) -> Any:
-    """Dotted keys for tables in tables: ``{"surface": {"alpha": 1}}`` becomes ``{"surface.alpha": 1}``."""
+    """Replace tables in tables by dotted keys: ``{"surface": {"alpha": 1}}`` becomes ``{"surface.alpha": 1}``."""
     if not isinstance(table, Mapping):
         return table  # the schema says what is wrong with it
     found: dict[str, Any] = {}
@@ -43,7 +44,7 @@ class Hypercube(Table):
     """Points of a Latin hypercube."""
 
     count: int = Field(ge=1, description="number of points")
-    seed: int = Field(ge=0, description="of the random numbers")
+    seed: int = Field(ge=0, description="seed of the random numbers")
     ranges: dict[str, _Range] = Field(min_length=1, description="dotted key to [low, high]")
 
     @field_validator("ranges", mode="before")
@@ -125,18 +126,27 @@ def read_sweep(path: Path) -> tuple[SweepFile, dict[str, Any]]:
         data = read_toml(text)
     except ValueError as error:
         raise ScenarioError(f"{show_value(str(path))}: not valid TOML: {show_value(str(error))}") from error
+    faults, sweep, base = [], None, None
+    cause: ScenarioError | ValidationError | None = None
     try:
         sweep = SweepFile.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError(f"{path}: {format_validation_error(error)}") from error
-    return sweep, _base(sweep, path).model_dump(mode="json", exclude_none=True)
-
-
-def _base(sweep: SweepFile, path: Path) -> Scenario:
-    if isinstance(sweep.scenario, dict):
-        return validate_scenario(sweep.scenario, f"{path}: scenario")
-    source = sweep.scenario
+        faults += list_complaints(error)
+        cause = error
     try:
-        return load_scenario(str(path.parent / source) if source.endswith(".toml") else source)[1]
+        base = _base(data.get("scenario"), path)
     except ScenarioError as error:
-        raise ScenarioError(f"{path}: scenario: {error}") from error
+        faults.append(f"scenario: {error}")
+        cause = cause or error
+    if sweep is None or base is None:
+        raise ScenarioError(f"{show_value(str(path))}: {join_complaints(faults)}") from cause
+    return sweep, base.model_dump(mode="json", exclude_none=True)
+
+
+def _base(source: Any, path: Path) -> Scenario | None:
+    """The base scenario; None where what should say it is neither text nor a table."""
+    if isinstance(source, dict):
+        return validate_scenario(source, "its tables")
+    if not isinstance(source, str):
+        return None
+    return load_scenario(str(path.parent / source) if source.endswith(".toml") else source)[1]

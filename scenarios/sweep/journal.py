@@ -1,8 +1,8 @@
-"""The journal of a sweep: finished rows, a line each, there before anybody is told of them.
+"""The journal of a sweep: finished rows, one per line, each written before it is reported.
 
-A line is a checksum, the task's index and JSON, which names the sweep and the task that the row is of. What a crash or
-a full disk leaves of a line is not taken for one, and a damaged line is as if its task had not run. Of two lines of one
-task the later holds: it was tried again. One process at a time writes.
+A line is a checksum, the task's index and JSON, which names the sweep and the task that the row belongs to. A line cut
+short by a crash or a full disk is ignored, and for a damaged line it is as if its task had not run. Of two lines of
+one task the later one holds: the task was tried again. Only one process writes at a time.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any, BinaryIO
 
 from ..error import ScenarioError
 
-_BATCH, _WAIT = 200, 0.5  # rows, seconds: what a power failure may cost; a killed process costs none
+_BATCH, _WAIT = 200, 0.5  # rows, seconds that a power failure may lose; a killed process loses none
 
 
 @dataclass(frozen=True)
@@ -29,11 +29,11 @@ class JournalLine:
     Attributes
     ----------
     sweep : str
-        Key of the sweep that it is of; see `store.open_folder`.
+        Key of the sweep that it belongs to; see `store.open_folder`.
     key : str
         The task's key, with a digest of all that determines its row.
     index : int
-        The task's place in the sweep.
+        The task's index in the sweep.
     row, timing : dict
     """
 
@@ -44,19 +44,19 @@ class JournalLine:
     timing: dict[str, Any]
 
     def encode(self) -> bytes:
-        """As the journal has it."""
+        """Return the line as it is written to the journal."""
         found = {"sweep": self.sweep, "key": self.key, "row": self.row, "timing": self.timing}
         body = f"{self.index} {json.dumps(found, separators=(',', ':'), allow_nan=False)}".encode()
         return b"%08x %b\n" % (zlib.crc32(body), body)
 
 
 def parse_lines(line: bytes) -> JournalLine | None:
-    """Read a line; None if it is not whole.
+    """Parse one line; return None if it is incomplete or damaged.
 
     Raises
     ------
     ForeignLine
-        If it is whole and not of a journal such as this version writes.
+        If it is complete but not in the format of this version's journals.
     """
     checksum, _, body = line.rstrip(b"\n").partition(b" ")
     if not line.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(body):
@@ -68,25 +68,25 @@ def parse_lines(line: bytes) -> JournalLine | None:
             str(found["sweep"]), str(found["key"]), int(index), dict(found["row"]), dict(found["timing"])
         )
     except (KeyError, TypeError, ValueError) as error:
-        raise ForeignLine("a line of another kind of journal") from error
+        raise ForeignLine("a line of another journal format") from error
 
 
 class ForeignLine(ValueError):
-    """A whole line that is not of this journal."""
+    """A complete line that does not belong to this journal."""
 
 
 class Journal:
-    """Appends rows to a file that one process at a time may have open; a context.
+    """Append rows to a file that one process at a time may have open; a context.
 
     Parameters
     ----------
     path : Path
-        Made if need be. What a crash left of a line at its end is cut off before the first line is added.
+        Created if it does not exist. An incomplete line at its end is removed before the first line is added.
 
     Raises
     ------
     ScenarioError
-        If another process writes it.
+        If another process is writing to it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -97,15 +97,15 @@ class Journal:
         except OSError as error:
             os.close(self._file)
             raise ScenarioError(f"{path.parent}: another sweep is writing there") from error
-        self._end = _whole_lines(path)
-        self._cut = False
+        self._end = _length_of_whole_lines(path)
+        self._partial_line_removed = False
         self._unsynced, self._synced_at = 0, time.monotonic()
 
     def __enter__(self) -> Journal:
         return self
 
     def __exit__(self, *_: object) -> None:
-        os.close(self._file)  # and with it the lock
+        os.close(self._file)  # this also releases the lock
 
     def append(self, line: JournalLine) -> None:
         """Write a finished task.
@@ -113,42 +113,42 @@ class Journal:
         Raises
         ------
         OSError
-            If the disk is full, or the like; the journal is then as before.
+            If the disk is full or another error occurs; the journal is then as before.
         """
-        if not self._cut:
-            self._cut_off()
+        if not self._partial_line_removed:
+            self._remove_partial_line()
         data = line.encode()
         written = 0
         try:
             while written < len(data):
                 written += os.write(self._file, data[written:])
         except OSError:
-            self._cut_off()
+            self._remove_partial_line()
             raise
         self._end += len(data)
         self._unsynced += 1
         if self._unsynced >= _BATCH or time.monotonic() - self._synced_at > _WAIT:
             self.sync()
 
-    def _cut_off(self) -> None:
-        """Cut off what stands behind the last whole line."""
+    def _remove_partial_line(self) -> None:
+        """Remove what follows the last complete line."""
         os.ftruncate(self._file, self._end)
         os.lseek(self._file, self._end, os.SEEK_SET)
-        self._cut = True
+        self._partial_line_removed = True
 
     def sync(self) -> None:
-        """Let a power failure cost nothing of what is written."""
+        """Write everything to the disk, so that a power failure loses nothing."""
         os.fsync(self._file)
         self._unsynced, self._synced_at = 0, time.monotonic()
 
 
 def finished_rows(path: Path) -> Iterator[tuple[int, JournalLine]]:
-    """Read the whole lines of a journal in their order, each with its offset.
+    """Read the complete lines of a journal in order, each with its offset.
 
     Raises
     ------
     ForeignLine
-        If one is of another kind of journal.
+        If a line has another journal format.
     """
     if not path.exists():
         return
@@ -166,12 +166,12 @@ def line_at(file: BinaryIO, offset: int) -> JournalLine:
     file.seek(offset)
     found = parse_lines(file.readline())
     if found is None:
-        raise OSError(f"{file.name}: was changed while it was read")
+        raise OSError(f"{file.name}: changed while it was being read")
     return found
 
 
-def _whole_lines(path: Path) -> int:
-    """Length of a file up to its last line feed."""
+def _length_of_whole_lines(path: Path) -> int:
+    """Return the length of a file up to its last line feed."""
     with path.open("rb") as file:
         end = file.seek(0, os.SEEK_END)
         while end > 0:

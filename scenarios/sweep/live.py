@@ -1,4 +1,4 @@
-"""The live view of a sweep: how far, how fast, how long yet, what failed and why; on stderr."""
+"""The live view of a sweep on stderr: progress, speed, remaining time, and the reasons of failures."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from .pool import Done
 from .rows import BROKEN, COMPUTED, REFUSED
 
 _REASONS = 4
-_RECENT = 500  # rows that the rate is taken over
+_RECENT = 500  # rows over which the rate is computed
 ROW_STYLES = dict.fromkeys(COMPUTED, "cyan") | {"done": "green", REFUSED: "yellow"} | dict.fromkeys(BROKEN, "red")
 
 
 class SweepView:
-    """A context that shows rows as they come; quiet where stderr is no terminal.
+    """Show rows as they arrive; a context. Shows nothing where stderr is no terminal.
 
     Parameters
     ----------
     total : int
         Number of tasks.
     console : Console, optional
-        Stderr's if not given.
+        Standard error's by default.
     """
 
     def __init__(self, total: int, console: Console | None = None) -> None:
@@ -50,27 +50,29 @@ class SweepView:
             self._live.stop()
 
     def watch(self, task: Task, done: Done, fresh: bool) -> None:
-        """Take in a row; one of an earlier session says nothing of the rate."""
+        """Count a row; a row of an earlier session does not count for the rate."""
         status = done.row["status"]
         self._rows += 1
         self._counts[status] += 1
         if fresh:
             self._arrivals.append(time.monotonic())
         if status in BROKEN:
-            words = f"{task.key} {task.engine} {status}: {done.row['reason']}"
-            self._reasons.append(Text(words, style="red", no_wrap=True, overflow="ellipsis"))
+            text = f"{task.key} {task.engine} {status}: {done.row['reason']}"
+            self._reasons.append(Text(text, style="red", no_wrap=True, overflow="ellipsis"))
 
     def picture(self) -> Group:
-        """What is shown now."""
+        """Return what to show now."""
         line = Table.grid(padding=(0, 2))
-        line.add_row(ProgressBar(self._total, self._rows, width=30), f"{self._rows} of {self._total}", *self._speed())
+        line.add_row(
+            ProgressBar(self._total, self._rows, width=30), f"{self._rows} of {self._total}", *self._format_speed()
+        )
         counts = Text("  ").join(
             Text(f"{status} {n}", ROW_STYLES[status]) for status, n in sorted(self._counts.items())
         )
         return Group(line, counts, *self._reasons)
 
-    def _speed(self) -> tuple[str, str]:
-        """Rate and remaining time."""
+    def _format_speed(self) -> tuple[str, str]:
+        """Return the rate and the remaining time as texts."""
         recent = len(self._arrivals) - 1
         if recent == 0:
             return "", ""

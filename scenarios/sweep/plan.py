@@ -1,10 +1,10 @@
-"""From a sweep file to its tasks: everything bad input could break is found before anything runs."""
+"""From a sweep file to its tasks; all bad input is found before anything runs."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,15 +12,26 @@ from typing import Any
 from pydantic import ValidationError
 
 from ...engines.engine import REFERENCE, UnsuitableProblem, load_engine
+from ...engines.names import suggest_name
 from ..error import ScenarioError
 from ..run import configure_engine, installed_engines, library_versions
-from ..scenario import Scenario, UnknownName, format_validation_error, list_kinds, make_start, place_error
+from ..scenario import (
+    Scenario,
+    error_place,
+    join_complaints,
+    list_complaints,
+    list_engine_faults,
+    make_start,
+    place_error,
+    refuse_engine,
+)
 from .file import SweepFile, read_sweep
 from .points import count_points, make_points
 
-MOST_TASKS = 5_000_000  # tasks; some 2 GB in the planning process
-# Errors of pydantic that a value of the right type may have.
+MOST_TASKS = 5_000_000  # tasks; about 2 GB in the planning process
+# Types of pydantic's errors that a value of the right type may have.
 _OF_A_POINT = ("value_error", "greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")
+_TOLD = 20  # complaints after which the rest of the points is not looked at
 _CHECKED = 50  # kinds of runs whose engine is asked beforehand; each may need a motion, a tenth of a second
 
 
@@ -31,14 +42,14 @@ class Task:
     Attributes
     ----------
     index : int
-        Place in the sweep.
+        Index in the sweep.
     key : str
         Index and hash of the resolved run.
     engine : str
     changes : dict
-        Dotted key to value, of those that concern this engine.
+        Values by dotted key, of the changes that concern this engine.
     refused : str or None
-        Why there is nothing to run at this point; None if there is.
+        Why this point cannot be run; None if it can.
     """
 
     index: int
@@ -70,7 +81,7 @@ class SweepPlan:
     tasks: list[Task]
 
     def facts(self) -> dict[str, Any]:
-        """What must be the same for rows of two sessions to belong to one data set."""
+        """Return what must be the same for rows of two sessions to belong to one data set."""
         digest = hashlib.sha256()
         for task in self.tasks:
             digest.update(f"{task.key} {task.engine}\n".encode())
@@ -83,22 +94,24 @@ class SweepPlan:
 
 
 def plan_sweep(path: Path) -> SweepPlan:
-    """Read a sweep file, validate every run of it, number them.
+    """Read a sweep file, validate all its runs and number them.
 
-    Settings of one engine do not multiply the runs of another: runs that come out the same are one task. A point
-    that is none, such as a drawn inertia that no rigid body has, is a task that is refused.
+    Settings of one engine do not multiply the runs of another: equal runs are one task. An impossible point, such as a
+    drawn inertia that no rigid body has, becomes a task that is refused.
 
     Raises
     ------
     ScenarioError
-        With one line, if the file is wrong: a name that is none, a value that it states and that cannot be, or
-        nothing but points that are refused.
+        If the file is wrong, in one line: an unknown name, a stated value that is impossible, or only points that
+        are refused.
     """
     sweep, base = read_sweep(path)
     names = installed_engines()
-    for engine in sweep.engines:
-        if engine not in names:
-            raise ScenarioError(f"{path}: engine {engine!r} is not installed; there are {', '.join(names)}")
+    riding = {*sweep.engines, REFERENCE}
+    # Of engines that ride, a grid may have other settings; those are checked at every point.
+    faults = [refuse_engine(engine, names) for engine in sweep.engines if engine not in names]
+    faults += [f"scenario: {fault}" for fault in list_engine_faults(base.get("engines"), skipped=riding)]
+    at_points: dict[str, str] = {}  # complaint to complaint with the first point that it is about
     if count_points(sweep) * len(sweep.engines) > MOST_TASKS:
         raise ScenarioError(
             f"{path}: {count_points(sweep) * len(sweep.engines)} runs; at most {MOST_TASKS} fit one sweep"
@@ -106,14 +119,26 @@ def plan_sweep(path: Path) -> SweepPlan:
     checker = _Checker(path, base, drawn=sweep.latin_hypercube.ranges if sweep.latin_hypercube else ())
     tasks: list[Task] = []
     seen: set[tuple[str, str]] = set()
+    present = [engine for engine in sweep.engines if engine in names]
     for changes in make_points(sweep):
-        _refuse_other_engines(path, sweep, changes)
-        for engine in sweep.engines:
+        for line in _name_other_engines(sweep, changes):
+            at_points.setdefault(line, line)
+        for engine in present:
             own = concerning(engine, changes)
-            digest, refused = checker.resolve(engine, own)
+            try:
+                digest, refused = checker.resolve(engine, own)
+            except _FileError as error:
+                for line in error.complaints:
+                    at_points.setdefault(line, f"{point_text(own)}{line}")
+                continue
             if (engine, digest) not in seen:
                 seen.add((engine, digest))
                 tasks.append(Task(len(tasks), f"{len(tasks):07d}-{digest[:12]}", engine, own, refused))
+        if len(at_points) > _TOLD:
+            break
+    faults += at_points.values()
+    if faults:
+        raise ScenarioError(f"{path}: {join_complaints(faults)}")
     for engine in sweep.engines:
         if all(task.refused for task in tasks if task.engine == engine):
             raise ScenarioError(checker.first_refusal[engine])
@@ -121,12 +146,12 @@ def plan_sweep(path: Path) -> SweepPlan:
 
 
 def concerning(engine: str, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Changes without the settings of other engines; the reference's concern all, who are held against it."""
+    """Select the changes without settings of other engines; the reference's concern all, which are compared with it."""
     return {key: value for key, value in changes.items() if _engine_of(key) in (None, engine, REFERENCE)}
 
 
 def prune_settings(data: dict[str, Any], engine: str) -> dict[str, Any]:
-    """A scenario's data with the settings of this engine and the reference only."""
+    """Return a scenario's data with the settings of this engine and the reference only."""
     engines = data.get("engines", {})
     if not isinstance(engines, Mapping):
         return data
@@ -138,19 +163,36 @@ def _engine_of(key: str) -> str | None:
     return rest.partition(".")[0] if table == "engines" else None
 
 
-def _refuse_other_engines(path: Path, sweep: SweepFile, changes: Mapping[str, Any]) -> None:
+def _name_other_engines(sweep: SweepFile, changes: Mapping[str, Any]) -> Iterator[str]:
+    """Say of every changed setting of an engine that is not of the sweep that it is none of its."""
+    riding = (*sweep.engines, REFERENCE)
     for key in changes:
         engine = _engine_of(key)
-        if engine is not None and engine not in (*sweep.engines, REFERENCE):
-            raise ScenarioError(f"{path}: {key}: {engine!r} is not among the sweep's engines")
+        if engine is not None and engine not in riding:
+            yield f"{key}: {engine!r} is not among the sweep's engines ({suggest_name(engine, riding)})"
+
+
+def point_text(changes: Mapping[str, Any]) -> str:
+    """What a complaint about a point begins with: nothing where the point changes nothing."""
+    at = ", ".join(f"{key} = {value!r}" for key, value in changes.items())
+    return f"at {at}: " if at else ""
 
 
 class _FileError(ScenarioError):
-    """What is wrong with the file itself, not with a point of it."""
+    """What is wrong with the file itself, not with a point of it.
+
+    Attributes
+    ----------
+    complaints : list of str
+    """
+
+    def __init__(self, complaints: Sequence[str]) -> None:
+        super().__init__(join_complaints(complaints))
+        self.complaints = list(complaints)
 
 
 class _Checker:
-    """Validates runs, each part once.
+    """Validate runs, each part only once.
 
     Parameters
     ----------
@@ -158,7 +200,7 @@ class _Checker:
     base : dict
         The base scenario as resolved.
     drawn : collection of str
-        Dotted keys whose values the file does not state: they are drawn.
+        Dotted keys of values that are not in the file but drawn.
     """
 
     def __init__(self, path: Path, base: dict[str, Any], drawn: Collection[str]) -> None:
@@ -168,40 +210,39 @@ class _Checker:
         self.first_refusal: dict[str, str] = {}
 
     def resolve(self, engine: str, changes: Mapping[str, Any]) -> tuple[str, str | None]:
-        """Validate a run; return the hash of what it is resolved to, and why it is refused, or None if it is not.
+        """Validate a run; return the hash of the resolved run, and why it is refused, or None if it is not.
 
         Raises
         ------
-        ScenarioError
+        _FileError
             If the file is wrong.
         """
         try:
             data = prune_settings(place_error(self._base, changes), engine)
         except ValueError as error:
-            raise ScenarioError(f"{self._where(changes)}: {error}") from error
+            raise _FileError([str(error)]) from error
         refused = None
         try:
             data = self._resolved(engine, data, changes)
+        except _FileError:
+            raise
         except ScenarioError as error:
-            line = f"{self._where(changes)}: {error}"
-            if isinstance(error, _FileError):
-                raise ScenarioError(line) from error
-            self.first_refusal.setdefault(engine, line)
+            self.first_refusal.setdefault(engine, f"{self._path}: {point_text(changes)}{error}")
             refused = str(error)
         return hashlib.sha256(canonical_text([engine, data]).encode()).hexdigest(), refused
-
-    def _where(self, changes: Mapping[str, Any]) -> str:
-        at = ", ".join(f"{key} = {value!r}" for key, value in changes.items())
-        return f"{self._path}: at {at}" if at else str(self._path)
 
     def _resolved(self, engine: str, data: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
         stated = [key for key in changes if key not in self._drawn]
         try:
             scenario = Scenario.model_validate(data)
         except ValidationError as error:
-            raise _complaint(format_validation_error(error), error, stated) from error
+            complaints = list_complaints(error)
+            if _is_of_file(error, stated):
+                raise _FileError([*complaints, *list_engine_faults(data.get("engines"))]) from error
+            raise ScenarioError(join_complaints(complaints)) from error
         resolved = scenario.model_dump(mode="json", exclude_none=True)
-        for name in {engine, REFERENCE}:
+        # In this order: a set's order differs from one process to the next.
+        for name in dict.fromkeys((engine, REFERENCE)):
             self._configure(name, resolved["engines"].get(name, {}), stated)
         self._ask(engine, scenario, resolved)
         return resolved
@@ -212,11 +253,13 @@ class _Checker:
             try:
                 configure_engine(engine, settings)
             except ScenarioError as error:
-                raise _complaint(str(error), error.__cause__, stated, ("engines", engine)) from error
+                if _is_of_file(error.__cause__, stated, ("engines", engine)):
+                    raise _FileError([str(error)]) from error
+                raise
             self._settings.add(text)
 
     def _ask(self, engine: str, scenario: Scenario, data: Mapping[str, Any]) -> None:
-        """Let the engine refuse a step that does not divide the output interval, and the like."""
+        """Raise what the engine refuses, such as a step that does not divide the output interval."""
         kind = canonical_text([engine, data["engines"].get(engine, {}), data["simulation"]])
         if kind not in self._kinds and len(self._kinds) < _CHECKED:
             self._kinds[kind] = _why_refused(engine, scenario)
@@ -225,16 +268,16 @@ class _Checker:
 
 
 def _why_refused(engine: str, scenario: Scenario) -> str | None:
-    """Ask an engine whether it takes a run; what only the run itself can tell is no refusal."""
+    """Return why an engine refuses a run, None if it does not; errors that only the run can show do not count."""
     try:
         problem = make_start(scenario).problem
     except ScenarioError:
-        return None  # a motion that does not exist is a row
+        return None  # a motion that does not exist becomes a row
     library, settings = configure_engine(engine, scenario.engines.get(engine, {}))
     try:
         library.check(problem, settings)
     except UnsuitableProblem:
-        return None  # so is ground that the engine does not know
+        return None  # so does ground that is unsuitable for the engine
     except ValueError as error:
         return f"engines.{engine}: {error}"
     except Exception:
@@ -242,25 +285,22 @@ def _why_refused(engine: str, scenario: Scenario) -> str | None:
     return None
 
 
-def _complaint(
-    line: str, cause: BaseException | None, stated: Collection[str], place: tuple[str, ...] = ()
-) -> ScenarioError:
+def _is_of_file(cause: BaseException | None, stated: Collection[str], place: tuple[str, ...] = ()) -> bool:
     """Tell what is wrong with the file from what is wrong with a point.
 
     Of a point are values that do not go together, and a drawn value out of its range. Of the file are names that are
     none, values of another type, and values out of range that the file itself states.
     """
     if not isinstance(cause, ValidationError):
-        return _FileError(line)
+        return True
     for error in cause.errors():
-        where = ".".join(str(part) for part in (*place, *error["loc"]) if part not in list_kinds())
+        where = ".".join((*place, *error_place(error)))
         ours = any(where == key or where.startswith(f"{key}.") for key in stated)
-        unknown = isinstance(error.get("ctx", {}).get("error"), UnknownName)
-        if ours or unknown or error["type"] not in _OF_A_POINT:
-            return _FileError(line)
-    return ScenarioError(line)
+        if ours or error["type"] not in _OF_A_POINT:
+            return True
+    return False
 
 
 def canonical_text(data: Any) -> str:
-    """JSON of which there is one for equal data."""
+    """Return JSON that is the same for equal data."""
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)

@@ -12,7 +12,7 @@ from .file import Hypercube, SweepFile
 
 
 def count_points(sweep: SweepFile) -> int:
-    """Number of points, before any that coincide are made one."""
+    """Return the number of points, before equal ones are merged."""
     sizes = [len(values) for values in sweep.grid.values()]
     cube = 1 if sweep.latin_hypercube is None else sweep.latin_hypercube.count
     found = max(1, len(sweep.list)) * cube
@@ -22,15 +22,15 @@ def count_points(sweep: SweepFile) -> int:
 
 
 def make_points(sweep: SweepFile) -> Iterator[dict[str, Any]]:
-    """Changes of every point, dotted key to value; the grid's last key changes fastest."""
+    """Yield the changes at every point by dotted key; the grid's last key changes fastest."""
     rows = sweep.list or ({},)
-    cube = [{}] if sweep.latin_hypercube is None else list(_sampled(sweep.latin_hypercube))
+    cube = [{}] if sweep.latin_hypercube is None else list(_sample_hypercube(sweep.latin_hypercube))
     for row, sample, values in product(rows, cube, product(*sweep.grid.values())):
         yield {**row, **sample, **dict(zip(sweep.grid, values, strict=True))}
 
 
-def _sampled(cube: Hypercube) -> Iterator[dict[str, float]]:
-    # scipy.stats takes half a second to load; only this needs it.
+def _sample_hypercube(cube: Hypercube) -> Iterator[dict[str, float]]:
+    # Imported here: scipy.stats takes half a second to load.
     from scipy.stats import qmc
 
     unit = qmc.LatinHypercube(len(cube.ranges), rng=cube.seed).random(cube.count)

@@ -1,4 +1,4 @@
-"""Workers on this machine: tasks out, rows in, whatever becomes of a worker."""
+"""Workers on this machine: they receive tasks and return rows, and are replaced when they die."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from .worker import RETIRED, Setup
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
-ATTEMPTS = 3  # a worker may be killed for no fault of its task's; a third time the task is taken to be why
-_AHEAD = 2  # tasks that a worker has: the next is there before the last one's row is read
-_CHUNK = 16  # neighbours share a start, so they go to one worker, up to so many
-_STARTING = 600.0  # s for a worker to load and compile everything; half a minute on an idle machine
-_PATIENCE = 30.0  # s for a keeper to say that its child is dead, or to make another: a fork, milliseconds of work
-_LOOK = 0.2  # s between looks at the clock and at workers that are silent
+ATTEMPTS = 3  # a worker may be killed for other reasons; the third time its task is taken to be the cause
+_AHEAD = 2  # tasks sent to a worker, so that the next one is there before the last one's row is read
+_CHUNK = 16  # largest number of neighbouring tasks, which share a start, that go to one worker
+_STARTING = 600.0  # [s] for a worker to load and compile everything; half a minute on an idle machine
+_PATIENCE = 30.0  # [s] for a keeper to report that its child is dead, or to fork another, which takes milliseconds
+_LOOK = 0.2  # [s] between checks of the time limits and of silent workers
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,10 @@ class WorkersBroken(RuntimeError):
 
 @dataclass(eq=False)
 class _Worker:
-    """One worker process and what it has to do.
+    """One worker process and its tasks.
 
-    Its keeper owes a word while it starts, when it is asked for the next child, and when its child is dead; one that
-    is silent until ``overdue``, because somebody has stopped it or it is stuck, is replaced.
+    The keeper must report when it has started, when it has forked the next child, and when its child is dead. A keeper
+    that is silent until ``overdue``, because it was stopped or hangs, is replaced.
     """
 
     process: subprocess.Popen[bytes]
@@ -68,7 +68,7 @@ class _Worker:
     hung: int | None = None  # index of the task that it was killed for
 
     def say(self, line: str) -> None:
-        """Send a line; a worker that has gone is noticed elsewhere."""
+        """Send a line; a lost worker is noticed elsewhere."""
         assert self.process.stdin is not None
         with suppress(BrokenPipeError):
             self.process.stdin.write(line.encode() + b"\n")
@@ -90,7 +90,7 @@ class Pool:
         self._deaths: Counter[int] = Counter()
         self._failed_starts = 0
         self._queue: deque[Task] = deque()
-        self._workers = [self._started() for _ in range(workers)]
+        self._workers = [self._start_worker() for _ in range(workers)]
 
     def __enter__(self) -> Pool:
         return self
@@ -99,19 +99,19 @@ class Pool:
         self.close()
 
     def close(self) -> None:
-        """End all workers, in the middle of a task too."""
+        """End all workers, even in the middle of a task."""
         for worker in self._workers:
-            self._end(worker)
+            self._end_worker(worker)
         self._workers = []
         self._selector.close()
 
     def run(self, tasks: Iterable[Task]) -> Iterator[Done]:
-        """Do tasks, in any order; each comes back once.
+        """Do tasks in any order and yield the result of each once.
 
         Raises
         ------
         WorkersBroken
-            If workers do not even start.
+            If workers cannot even start.
         """
         self._queue.extend(tasks)
         self._deaths.clear()
@@ -119,29 +119,29 @@ class Pool:
         for worker in self._workers:
             self._feed(worker)
         while left:
-            for done in self._heard():
+            for done in self._receive():
                 left -= 1
                 yield done
-            for done in self._overdue():
+            for done in self._check_deadlines():
                 left -= 1
                 yield done
 
-    def _heard(self) -> Iterator[Done]:
+    def _receive(self) -> Iterator[Done]:
         for chosen, _ in self._selector.select(_LOOK):
             worker: _Worker = chosen.data
             data = os.read(chosen.fd, 1 << 16)
             if not data:
-                yield from self._replaced(worker)
+                yield from self._replace_worker(worker)
                 continue
             *lines, worker.rest = (worker.rest + data).split(b"\n")
             for line in filter(None, lines):
                 try:
                     message = json.loads(line)
                 except ValueError:
-                    continue  # what a child wrote as it was killed
-                yield from self._answered(worker, message)
+                    continue  # a child was killed while it wrote this
+                yield from self._handle_message(worker, message)
 
-    def _answered(self, worker: _Worker, message: dict[str, Any]) -> Iterator[Done]:
+    def _handle_message(self, worker: _Worker, message: dict[str, Any]) -> Iterator[Done]:
         if "row" in message:
             if worker.sent and worker.sent[0].index == message["index"]:
                 worker.sent.popleft()
@@ -153,25 +153,25 @@ class Pool:
             worker.child, worker.overdue = message["pid"], None
             self._feed(worker)
         elif "died" in message:
-            yield from self._buried(worker, message["died"])
+            yield from self._handle_death(worker, message["died"])
             worker.overdue = time.monotonic() + _PATIENCE
             worker.say("\nagain")
         elif "broken" in message:
             raise WorkersBroken(f"no worker starts: {message['broken']}")
 
     def _feed(self, worker: _Worker) -> None:
-        """Let a worker have its next tasks."""
+        """Send a worker its next tasks."""
         if worker.child is None:
             return
-        while len(worker.sent) < _AHEAD and (worker.mine or self._share(worker)):
+        while len(worker.sent) < _AHEAD and (worker.mine or self._give_share(worker)):
             task = worker.mine.popleft()
             if not worker.sent:
                 worker.due = time.monotonic() + self._setup.time_limit
             worker.sent.append(task)
             worker.say(json.dumps({"index": task.index, "engine": task.engine, "changes": task.changes}))
 
-    def _share(self, worker: _Worker) -> bool:
-        """Give a worker a chunk of the queue, or where that is empty half of what another has."""
+    def _give_share(self, worker: _Worker) -> bool:
+        """Give a worker a chunk of the queue, or half of another worker's tasks where the queue is empty."""
         if self._queue:
             size = max(1, min(_CHUNK, len(self._queue) // (4 * len(self._workers))))
             worker.mine.extend(self._queue.popleft() for _ in range(size))
@@ -181,8 +181,8 @@ class Pool:
             worker.mine.appendleft(richest.mine.pop())
         return bool(worker.mine)
 
-    def _buried(self, worker: _Worker, status: int) -> Iterator[Done]:
-        """What comes of a child's death: a row for the task at fault, the others again."""
+    def _handle_death(self, worker: _Worker, status: int) -> Iterator[Done]:
+        """Handle a child's death: yield a row for the task at fault, queue the others again."""
         worker.child = None
         head = worker.sent[0] if worker.sent else None
         self._failed_starts += head is None
@@ -191,11 +191,13 @@ class Pool:
         retired = os.WIFEXITED(status) and os.WEXITSTATUS(status) == RETIRED
         given_up: Done | None = None
         if head is not None and worker.hung == head.index:
-            given_up = _lost(head, "timeout", f"no result within {self._setup.time_limit!r} s")
+            given_up = _failed_task(head, "timeout", f"no result within {self._setup.time_limit!r} s")
         elif head is not None and worker.hung is None and not retired:
             self._deaths[head.index] += 1
             if self._deaths[head.index] >= ATTEMPTS:
-                given_up = _lost(head, "killed", f"its process ended {ATTEMPTS} times, last by {_cause(status)}")
+                given_up = _failed_task(
+                    head, "killed", f"its process ended {ATTEMPTS} times, last by {_describe_status(status)}"
+                )
         worker.hung = None
         if given_up is not None:
             worker.sent.popleft()
@@ -204,43 +206,39 @@ class Pool:
         if given_up is not None:
             yield given_up
 
-    def _overdue(self) -> Iterator[Done]:
-        """Kill children that hang, replace workers that have gone without a word or keep silent."""
+    def _check_deadlines(self) -> Iterator[Done]:
+        """Kill children that hang; replace workers that died unnoticed or are silent."""
         now = time.monotonic()
         for worker in list(self._workers):
             if worker.overdue is None and worker.child is not None and _is_dead(worker.child):
                 worker.overdue = now + _PATIENCE
             if worker.process.poll() is not None or (worker.overdue is not None and now > worker.overdue):
-                yield from self._replaced(worker)
+                yield from self._replace_worker(worker)
             elif worker.sent and worker.child is not None and worker.hung is None and now > worker.due:
                 worker.hung = worker.sent[0].index
                 _kill(worker.child)
             elif not worker.sent:
                 self._feed(worker)
 
-    def _replaced(self, worker: _Worker) -> Iterator[Done]:
-        """Put a new worker in the place of one that has gone."""
+    def _replace_worker(self, worker: _Worker) -> Iterator[Done]:
+        """Replace a lost worker by a new one."""
         if worker not in self._workers:
             return
-        self._end(worker)
-        yield from self._buried(worker, signal.SIGKILL)
-        fresh = self._started()
+        self._end_worker(worker)
+        yield from self._handle_death(worker, signal.SIGKILL)
+        fresh = self._start_worker()
         fresh.mine = worker.mine
         self._workers[self._workers.index(worker)] = fresh
 
-    def _started(self) -> _Worker:
+    def _start_worker(self) -> _Worker:
         process = subprocess.Popen(
-            [
-                sys.executable,
-                "-P",
-                "-m",
-                "velodrome.scenarios.sweep.worker",
-            ],  # -P: no module of the folder it is run in
+            # -P: no modules from the working directory
+            [sys.executable, "-P", "-m", "velodrome.scenarios.sweep.worker"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             env=os.environ | ONE_THREAD,
-            # Ctrl-C is the parent's to answer.
+            # Ctrl-C is handled by the parent.
             start_new_session=True,
         )
         worker = _Worker(process, time.monotonic() + _STARTING)
@@ -249,8 +247,8 @@ class Pool:
         self._selector.register(process.stdout, selectors.EVENT_READ, worker)
         return worker
 
-    def _end(self, worker: _Worker) -> None:
-        """End a worker with its child: by the end of its input, or by force if it does not listen."""
+    def _end_worker(self, worker: _Worker) -> None:
+        """End a worker with its child: by closing its input, or by force if it does not react."""
         process = worker.process
         assert process.stdin is not None
         assert process.stdout is not None
@@ -264,22 +262,22 @@ class Pool:
             process.kill()
             process.wait()
         if worker.child is not None and process.returncode != 0:
-            _kill(worker.child)  # a keeper that ends by itself takes its child along
+            _kill(worker.child)  # a keeper that ends by itself ends its child as well
         process.stdout.close()
 
 
-def _lost(task: Task, status: str, reason: str) -> Done:
+def _failed_task(task: Task, status: str, reason: str) -> Done:
     return Done(task.index, {"status": status, "reason": reason}, {})
 
 
-def _cause(status: int) -> str:
+def _describe_status(status: int) -> str:
     if os.WIFSIGNALED(status):
         return signal.Signals(os.WTERMSIG(status)).name
     return f"exit status {os.WEXITSTATUS(status)}"
 
 
 def _is_dead(pid: int) -> bool:
-    """Whether a process is dead and its parent has not taken notice; False where the system does not tell."""
+    """Return whether a process is dead and not yet reaped by its parent; False where the system does not say."""
     try:
         state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
     except OSError:

@@ -8,14 +8,15 @@ from typing import Any
 
 import pyarrow as pa
 
+from ...engines.storage import versioned_metadata
 from .plan import Task
 
 COMPUTED = ("done", "fell", "ended", "no-motion")
-REFUSED = "refused"  # a point that is none: its values do not go together, or were drawn from where there is nothing
+REFUSED = "refused"  # an impossible point: its values contradict each other, or a drawn value is out of range
 BROKEN = ("failed", "timeout", "killed", "memory")
 STATUSES = (*COMPUTED, REFUSED, *BROKEN)
 
-_LONGEST_REASON = 500  # letters
+_LONGEST_REASON = 500  # characters
 
 _ERRORS = ("position_error_max", "position_error_end", "orientation_error_max", "orientation_error_end")
 ROW_FACTS = {
@@ -47,7 +48,7 @@ METRICS: dict[str, pa.DataType] = {
     "ended": pa.string(),
     "horizon": pa.float64(),
 }
-# What differs from one run of the same task to the next: kept apart, so that the rest is equal to the bit.
+# Values that differ between runs of the same task; they are kept apart, so that the rest is equal to the bit.
 TIMING: dict[str, pa.DataType] = {
     "key": pa.string(),
     "index": pa.int64(),
@@ -63,9 +64,9 @@ TIMING: dict[str, pa.DataType] = {
 
 
 def row_schema(tasks: Sequence[Task]) -> pa.Schema:
-    """Columns of the data set beside the engine, which is the partition: facts, parameters, metrics."""
+    """Return the columns of the data set except the engine, which is the partition: facts, parameters, metrics."""
     fields = [*ROW_FACTS.items(), *_parameter_types(tasks).items(), *METRICS.items()]
-    return pa.schema([pa.field(name, kind) for name, kind in fields])
+    return pa.schema([pa.field(name, kind) for name, kind in fields], metadata=versioned_metadata({}))
 
 
 def _parameter_types(tasks: Iterable[Task]) -> dict[str, pa.DataType]:
@@ -87,7 +88,7 @@ def _column_type(kinds: set[type]) -> pa.DataType:
 
 
 def make_record(task: Task, row: Mapping[str, Any], columns: pa.Schema) -> dict[str, Any]:
-    """A row as the data set has it: the task's parameters with what a worker found."""
+    """Return a row as the data set has it: the task's parameters and the worker's results."""
     values: dict[str, Any] = {"key": task.key, "index": task.index, **row}
     for key, value in task.changes.items():
         text = columns.field(key).type == pa.string() and not isinstance(value, str)
@@ -96,5 +97,5 @@ def make_record(task: Task, row: Mapping[str, Any], columns: pa.Schema) -> dict[
 
 
 def reason_line(text: str) -> str:
-    """Fit for a row: one line, not endless, nothing that is no text."""
+    """Make a text fit for a row: a single line of limited length and valid characters."""
     return " ".join(text.encode(errors="replace").decode().split())[:_LONGEST_REASON]

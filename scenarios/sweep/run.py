@@ -23,7 +23,7 @@ SweepWatch = Callable[[Task, Done, bool], None]
 
 @dataclass(frozen=True)
 class SweepOutcome:
-    """What a sweep came to.
+    """Result of a sweep.
 
     Attributes
     ----------
@@ -31,11 +31,11 @@ class SweepOutcome:
     counts : dict
         Rows by engine and status.
     missing : int
-        Tasks without a row, and those to be tried again that were not.
+        Number of tasks without a row, and of those that were not tried again as requested.
     stopped : str or None
-        Why it ended before its end; None if it did not.
+        Why the sweep stopped early; None if it did not.
     interrupted : bool
-        Whether Ctrl-C did it.
+        Whether it was stopped by Ctrl-C.
     """
 
     folder: Path
@@ -46,7 +46,7 @@ class SweepOutcome:
 
 
 def locally(workers: int) -> Work:
-    """Work on processes of this machine."""
+    """Return work on processes of this machine."""
 
     def work(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
         if not tasks:
@@ -60,31 +60,31 @@ def locally(workers: int) -> Work:
 def run_sweep(
     plan: SweepPlan, out: Path, work: Work, resume: bool, watch: SweepWatch, retry: Collection[str] = ()
 ) -> SweepOutcome:
-    """Do what is missing of a sweep, and make its data set once nothing is.
+    """Do the missing tasks of a sweep, and write its data set once none is missing.
 
     Parameters
     ----------
-    plan : Plan
+    plan : SweepPlan
     out : Path
         The sweep's own folder.
     work : callable
-        Does tasks, in any order, here or elsewhere.
+        Does tasks in any order, here or elsewhere.
     resume : bool
-        Whether the folder holds a part of this sweep.
+        Whether the folder already has a part of this sweep.
     watch : callable
-        Called with every task, its row and whether it is of this session; those of earlier ones come first.
+        Called with every task, its row and whether the row is of this session; rows of earlier sessions come first.
     retry : collection of str
-        Statuses of rows that are done again; until a new row is there, the old one stays.
+        Statuses of rows that are done again; the old row stays until there is a new one.
 
     Raises
     ------
     ScenarioError
-        If the folder is not this sweep's, or another process writes to it.
+        If the folder belongs to another sweep, or another process writes to it.
     """
     opened = open_folder(out, plan, resume)
     stopped, interrupted = None, False
     with Journal(out / JOURNAL) as journal:
-        have = _stored(out / JOURNAL, plan, opened)
+        have = _read_stored(out / JOURNAL, plan, opened)
         refuse_other_limits(out, plan, opened, {status for status, _ in have.values()} - set(retry))
         missing = {task.index for task in plan.tasks if task.index not in have or have[task.index][0] in retry}
         for index, (status, reason) in have.items():
@@ -93,7 +93,7 @@ def run_sweep(
         try:
             if missing:
                 write_sweep_manifest(out, plan, opened, complete=False)
-            with closing(_arriving(plan, work, missing)) as arriving:
+            with closing(_yield_results(plan, work, missing)) as arriving:
                 for done in arriving:
                     task = plan.tasks[done.index]
                     journal.append(JournalLine(opened.key, task.key, done.index, done.row, done.timing))
@@ -115,13 +115,13 @@ def run_sweep(
     return SweepOutcome(out, rows, len(missing), stopped, interrupted)
 
 
-def _stored(path: Path, plan: SweepPlan, opened: Opened) -> dict[int, tuple[str, str | None]]:
-    """Status and reason of the rows of a journal, by the task's index.
+def _read_stored(path: Path, plan: SweepPlan, opened: Opened) -> dict[int, tuple[str, str | None]]:
+    """Return status and reason of the rows of a journal, by the task's index.
 
     Raises
     ------
     ScenarioError
-        If a row is not of this sweep.
+        If a row does not belong to this sweep.
     """
     found: dict[int, tuple[str, str | None]] = {}
     try:
@@ -135,15 +135,15 @@ def _stored(path: Path, plan: SweepPlan, opened: Opened) -> dict[int, tuple[str,
     return found
 
 
-def _arriving(plan: SweepPlan, work: Work, missing: Collection[int]) -> Generator[Done]:
-    """Rows of all missing tasks, first of those that are refused: nobody has to work for them."""
+def _yield_results(plan: SweepPlan, work: Work, missing: Collection[int]) -> Generator[Done]:
+    """Yield rows of all missing tasks, beginning with those that are refused, which need no work."""
     tasks = [task for task in plan.tasks if task.index in missing]
     for task in tasks:
         if task.refused is not None:
             yield Done(task.index, {"status": REFUSED, "reason": reason_line(task.refused)}, {})
-    with closing(work(_setup(plan), [task for task in tasks if task.refused is None])) as arriving:
+    with closing(work(_make_setup(plan), [task for task in tasks if task.refused is None])) as arriving:
         yield from arriving
 
 
-def _setup(plan: SweepPlan) -> Setup:
+def _make_setup(plan: SweepPlan) -> Setup:
     return Setup(plan.base, plan.file.time_limit, plan.file.memory_limit)

@@ -1,4 +1,4 @@
-"""The folder of a sweep: ``sweep.json``, the journal, and the data set that is made of it when all is done."""
+"""The folder of a sweep: ``sweep.json``, the journal, and the data set made from it when all tasks are done."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ...engines.files import write_whole
+from ...engines.format_version import VERSION_KEY, read_version
+from ...engines.storage import versioned_metadata
 from ..error import ScenarioError
 from ..files import make_folder, write_json
 from ..run import read_json
@@ -23,22 +25,22 @@ from .rows import TIMING, make_record, row_schema
 
 MANIFEST, JOURNAL, RESULTS, TIMINGS = "sweep.json", "journal.txt", "results", "timing.parquet"
 _BLOCK = 20_000  # rows of a row group
-_FORMAT = 2  # of the manifest and the journal
+SWEEP_VERSION = 2  # of the manifest, the journal and the data set; earlier, "format" says it
 
 
 @dataclass(frozen=True)
 class Opened:
-    """A sweep's folder.
+    """A sweep's folder after it has been opened.
 
     Attributes
     ----------
     key : str
-        Digest of all that the sweep's rows depend on, as it was when the sweep was begun; every line of its journal
-        carries it.
+        Digest of all that determines the sweep's rows, from when the sweep was started; every line of its journal
+        has it.
     limits : dict
-        Limits under which the rows that it has were done.
+        Limits under which the existing rows were done.
     facts : dict
-        What the rows of this session are of; see `SweepPlan.facts`.
+        What determines the rows of this session; see `SweepPlan.facts`.
     """
 
     key: str
@@ -47,12 +49,12 @@ class Opened:
 
 
 def open_folder(out: Path, plan: SweepPlan, resume: bool) -> Opened:
-    """Make the folder of a new sweep, or see that an old one is of the same sweep.
+    """Make the folder of a new sweep, or check that an existing one is of the same sweep.
 
     Raises
     ------
     ScenarioError
-        If there is a sweep already, or none to resume, or another.
+        If there is a sweep already, no sweep to resume, or another sweep.
     """
     facts, known = plan.facts(), out / MANIFEST
     if resume:
@@ -60,7 +62,7 @@ def open_folder(out: Path, plan: SweepPlan, resume: bool) -> Opened:
         _same(known, then, facts)
         return Opened(then["key"], then["limits"], facts)
     if known.exists():
-        raise ScenarioError(f"{out}: holds a sweep already: go on with it by --resume, or name another folder by --out")
+        raise ScenarioError(f"{out}: holds a sweep already: continue it with --resume, or name another folder by --out")
     if (out / JOURNAL).exists():
         raise ScenarioError(
             f"{out}: holds the {JOURNAL} of a sweep without its {MANIFEST}: name another folder by --out"
@@ -73,7 +75,7 @@ def open_folder(out: Path, plan: SweepPlan, resume: bool) -> Opened:
 
 def write_sweep_manifest(out: Path, plan: SweepPlan, opened: Opened, complete: bool) -> None:
     """Write what the folder's rows are of, and whether all are there."""
-    found = {"format": _FORMAT, "key": opened.key} | opened.facts | {"limits": opened.limits}
+    found = {VERSION_KEY: SWEEP_VERSION, "key": opened.key} | opened.facts | {"limits": opened.limits}
     write_json(out / MANIFEST, found | {"title": plan.file.title, "complete": complete})
 
 
@@ -82,20 +84,20 @@ def _limits(plan: SweepPlan) -> dict[str, Any]:
 
 
 def refuse_other_limits(out: Path, plan: SweepPlan, opened: Opened, statuses: Collection[str]) -> None:
-    """Refuse to keep rows of these statuses where they would be others under the limits of the file.
+    """Refuse to keep rows with these statuses if they could be different under the limits of the file.
 
     Raises
     ------
     ScenarioError
-        If the file's limits are not those under which rows timed out or had no memory left.
+        If the file's limits are not those under which rows timed out or ran out of memory.
     """
     now = _limits(plan)
     for limit, status in (("time_limit", "timeout"), ("memory_limit", "memory")):
         then = opened.limits.get(limit)
         if then != now[limit] and status in statuses:
             raise ScenarioError(
-                f"{out}: has rows of status {status} that are of {limit} {then!r}, and the file says {now[limit]!r}: "
-                f"try them again by --retry {status}"
+                f"{out}: has rows of status {status} under {limit} {then!r}, but the file has {now[limit]!r}: "
+                f"try them again with --retry {status}"
             )
 
 
@@ -108,11 +110,15 @@ def _manifest(path: Path) -> dict[str, Any]:
         raise ScenarioError(f"{path}: is not of a sweep: {error}") from error
     if not isinstance(found, dict):
         raise ScenarioError(f"{path}: is not of a sweep")
+    try:
+        read_version(found, SWEEP_VERSION)
+    except ValueError as error:
+        raise ScenarioError(f"{path}: {error}") from error
     return found
 
 
 def _same(path: Path, then: Mapping[str, Any], now: Mapping[str, Any]) -> None:
-    """Refuse to mix rows of two sweeps, or of two versions of anything."""
+    """Refuse to mix rows of two sweeps, or of two versions of an engine or a library."""
     for part in ("libraries", "engines"):
         old, new = then.get(part), now[part]
         if not isinstance(old, dict):
@@ -120,30 +126,31 @@ def _same(path: Path, then: Mapping[str, Any], now: Mapping[str, Any]) -> None:
         for name in sorted({*old} & {*new}):
             if old[name] != new[name]:
                 raise ScenarioError(
-                    f"{path.parent}: was begun with {name} {old[name]}, and here is {new[name]}: "
-                    "their rows do not belong together"
+                    f"{path.parent}: was begun with {name} {old[name]}, but {new[name]} is installed: "
+                    "their rows cannot be mixed"
                 )
-    if then.get("format") != _FORMAT or not isinstance(then.get("limits"), dict) or "key" not in then:
+    version = then.get(VERSION_KEY, then.get("format"))
+    if version != SWEEP_VERSION or not isinstance(then.get("limits"), dict) or "key" not in then:
         raise ScenarioError(
-            f"{path.parent}: was begun by another version of velodrome, whose rows do not say what they are of; "
-            "begin it anew in another folder by --out"
+            f"{path.parent}: was begun by another version of velodrome, whose rows do not name their sweep; "
+            "start it again in another folder by --out"
         )
     if then.get("hash") != now["hash"]:
         raise ScenarioError(f"{path.parent}: is of another sweep, or the file has changed; --out names another folder")
 
 
 def part_of(out: Path, engine: str) -> Path:
-    """The part of the data set that holds an engine's rows."""
+    """Return the path of the part of the data set with an engine's rows."""
     return out / RESULTS / f"engine={quote(engine, safe='')}" / "part-0.parquet"
 
 
 def write_results(out: Path, plan: SweepPlan, opened: Opened) -> None:
-    """Make the data set of a complete journal, sorted by key, a part an engine; and say that it is complete.
+    """Write the data set of a complete journal, sorted by key, one part per engine, and mark the sweep complete.
 
     Raises
     ------
     OSError
-        If the disk is full, or the like; the journal stays, and nothing looks whole that is not.
+        If the disk is full or another error occurs; the journal stays, and no incomplete file looks complete.
     """
     offsets = {line.index: offset for offset, line in finished_rows(out / JOURNAL)}
     columns = row_schema(plan.tasks)
@@ -153,17 +160,17 @@ def write_results(out: Path, plan: SweepPlan, opened: Opened) -> None:
             part = part_of(out, engine)
             part.parent.mkdir(parents=True, exist_ok=True)
             own = ((task, line_at(journal, offset)) for task, offset in done if task.engine == engine)
-            # A run that was killed could not say its version.
+            # A run that was killed could not report its version.
             found = ({"version": version} | make_record(task, line.row, columns) for task, line in own)
             _write(part, columns, found)
         every = ((task, line_at(journal, offset)) for task, offset in done)
         clocks = ({"key": task.key, "index": task.index, "engine": task.engine, **line.timing} for task, line in every)
-        _write(out / TIMINGS, pa.schema(list(TIMING.items())), clocks)
+        _write(out / TIMINGS, pa.schema(list(TIMING.items()), metadata=versioned_metadata({})), clocks)
     write_sweep_manifest(out, plan, replace(opened, limits=_limits(plan)), complete=True)
 
 
 def _write(path: Path, columns: pa.Schema, records: Iterator[dict[str, Any]]) -> None:
-    """Write records as Parquet, whole or not at all, without holding them all."""
+    """Write records as Parquet, completely or not at all, without holding all of them in memory."""
     with write_whole(path) as partial, pq.ParquetWriter(partial, columns, compression="zstd") as writer:
         block = list(islice(records, _BLOCK))
         while block:

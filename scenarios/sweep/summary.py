@@ -1,4 +1,4 @@
-"""What a sweep came to, by engine."""
+"""The results of a sweep by engine."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ _REASONS = 5
 
 
 def summarise_sweep(plan: SweepPlan, outcome: SweepOutcome) -> dict[str, Any]:
-    """The JSON document of `velodrome sweep`.
+    """Return the JSON document of `velodrome sweep`.
 
     Parameters
     ----------
-    plan : Plan
-    outcome : Outcome
+    plan : SweepPlan
+    outcome : SweepOutcome
 
     Returns
     -------
     dict
-        ``sweep, folder, tasks, missing, complete, stopped`` and ``engines``: per engine ``rows`` by status and, of
-        a complete sweep, ``position_error`` (median and worst of the rides' largest), ``rows_per_second`` of one
+        ``sweep, folder, tasks, missing, complete, stopped`` and ``engines``: by engine ``rows`` by status and, for
+        a complete sweep, ``position_error`` (median and worst of the largest errors), ``rows_per_second`` of one
         worker, and ``reasons`` of rows that broke or were refused.
     """
     complete = outcome.stopped is None
     engines: dict[str, Any] = {}
     for engine in plan.file.engines:
         entry: dict[str, Any] = {"rows": outcome.counts[engine]}
-        engines[engine] = entry | (_of_results(outcome, engine) if complete else {})
+        engines[engine] = entry | (_summarise_results(outcome, engine) if complete else {})
     return {
         "sweep": plan.name,
         "title": plan.file.title,
@@ -51,7 +51,7 @@ def summarise_sweep(plan: SweepPlan, outcome: SweepOutcome) -> dict[str, Any]:
     }
 
 
-def _of_results(outcome: SweepOutcome, engine: str) -> dict[str, Any]:
+def _summarise_results(outcome: SweepOutcome, engine: str) -> dict[str, Any]:
     columns = ["status", "reason", "position_error_max"]
     table = pq.ParquetFile(part_of(outcome.folder, engine)).read(columns=columns)
     errors = table.column("position_error_max").drop_null().to_numpy()
@@ -67,7 +67,7 @@ def _of_results(outcome: SweepOutcome, engine: str) -> dict[str, Any]:
 
 
 def status_of(outcome: SweepOutcome) -> int:
-    """Exit status: 0 if every run has its result, 1 if some broke or are missing, 130 after Ctrl-C."""
+    """Return the exit status: 0 if every run has its result, 1 if some broke or are missing, 130 after Ctrl-C."""
     if outcome.interrupted:
         return 130
     broke = any(counts.get(status) for counts in outcome.counts.values() for status in BROKEN)
@@ -75,13 +75,13 @@ def status_of(outcome: SweepOutcome) -> int:
 
 
 def resume_command(plan: SweepPlan, outcome: SweepOutcome, retry: Collection[str] = ()) -> str:
-    """What goes on with a sweep that was stopped."""
+    """Return the command that continues a stopped sweep."""
     again = "".join(f" --retry {status}" for status in retry)
     return f"velodrome sweep {plan.path} --out {outcome.folder} --resume{again}"
 
 
 def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> None:
-    """Print a table by engine, why rows broke, and where the data set is or how to go on."""
+    """Print a table by engine, why rows broke, and where the data set is or how to continue."""
     entries: Mapping[str, Mapping[str, Any]] = document["engines"]
     statuses = [status for status in ROW_STYLES if any(entry["rows"].get(status) for entry in entries.values())]
     table = Table("engine", box=None, pad_edge=False)
@@ -92,19 +92,19 @@ def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> 
     for name, entry in entries.items():
         error = entry.get("position_error") or {}
         numbers = (error.get("median"), error.get("worst"), entry.get("rows_per_second"))
-        shown = ("–" if number is None else f"{number:.3g}" for number in numbers)
-        table.add_row(name, *(str(entry["rows"].get(status, 0)) for status in statuses), *shown)
+        cells = ("–" if number is None else f"{number:.3g}" for number in numbers)
+        table.add_row(name, *(str(entry["rows"].get(status, 0)) for status in statuses), *cells)
     console.print(table)
     for name, entry in entries.items():
         for reason in entry.get("reasons", ()):
-            _say(console, f"{name} {reason}", ROW_STYLES[reason.partition(":")[0]])
+            _print_line(console, f"{name} {reason}", ROW_STYLES[reason.partition(":")[0]])
     if document["stopped"] is None:
-        _say(console, f"data set: {document['folder']}/{RESULTS}")
+        _print_line(console, f"data set: {document['folder']}/{RESULTS}")
         return
-    missing = f"{document['missing']} of {document['tasks']} runs are missing, what is done is kept"
-    _say(console, f"{document['stopped']}: {missing}", "yellow")
-    _say(console, f"go on with: {resume}")
+    missing = f"{document['missing']} of {document['tasks']} runs are missing, finished runs are kept"
+    _print_line(console, f"{document['stopped']}: {missing}", "yellow")
+    _print_line(console, f"continue with: {resume}")
 
 
-def _say(console: Console, line: str, style: str | None = None) -> None:
+def _print_line(console: Console, line: str, style: str | None = None) -> None:
     console.print(line, style=style, markup=False, highlight=False, soft_wrap=True)

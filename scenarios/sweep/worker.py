@@ -1,11 +1,12 @@
-"""A worker of a sweep: ``python -m velodrome.scenarios.sweep.worker``, spoken to in lines of JSON.
+"""A worker of a sweep: ``python -m velodrome.scenarios.sweep.worker``, which communicates in lines of JSON.
 
-The process that is started loads and compiles everything once and then only keeps a child, a fork of itself
-that does the tasks. Whatever kills the child costs one task: the next child is there in milliseconds.
+The keeper, the process that is started, loads and compiles everything once and then only keeps a child, a fork of
+itself that does the tasks. If the child is killed, only one task is lost, and the next child is ready in
+milliseconds.
 
-In, on standard input: first the sweep (`Setup`), then tasks; ``again`` after the news of a child's death asks
-for the next child. Out, on standard output: ``{"pid": ...}`` when a child is ready, a line per row, and
-``{"died": wait status}`` from the keeper. The end of the input ends both, in the middle of a task too.
+Standard input: first the sweep (`Setup`), then tasks; ``again`` after the report of a child's death asks for the next
+child. Standard output: ``{"pid": ...}`` when a child is ready, one line per row, and ``{"died": wait status}`` from
+the keeper. The end of the input ends both processes, even in the middle of a task.
 """
 
 from __future__ import annotations
@@ -22,23 +23,23 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-RETIRED = 75  # exit status of a child that has run out of memory once and may be in pieces
-_INPUT_ENDED = 76  # of a child that has nothing more to do; an engine may end it with any other, 0 included
-_GRACE = 60.0  # seconds beyond its time limit after which a child that nobody watches ends itself
+RETIRED = 75  # exit status of a child that ran out of memory and may be in an inconsistent state
+_INPUT_ENDED = 76  # exit status of a child without further tasks; an engine may end it with any other, even 0
+_GRACE = 60.0  # seconds beyond its time limit after which a child without a parent ends itself
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What every worker of a sweep must know.
+    """What every worker of a sweep needs to know.
 
     Attributes
     ----------
     base : dict
         The base scenario as resolved, JSON values.
     time_limit : float
-        Of a task [s].
+        Of a task, wall-clock time [s].
     memory_limit : float or None
-        Address space that a task may take beyond what a worker has at rest [MB].
+        Address space that a task may use in addition to that of an idle worker [MB].
     """
 
     base: dict[str, Any]
@@ -46,22 +47,22 @@ class Setup:
     memory_limit: float | None
 
     def line(self) -> str:
-        """As one line of JSON."""
+        """Return the setup as one line of JSON."""
         return json.dumps(asdict(self))
 
 
 def main() -> None:
     """Keep a child at work until the input ends."""
     tasks, results = os.dup(0), os.dup(1)
-    # Engines print, and read, what they like: not into the protocol.
+    # Engines may print and read: this must not interfere with the protocol.
     with open(os.devnull, "r+b") as nothing:
         for standard in (0, 1, 2):
             os.dup2(nothing.fileno(), standard)
     try:
-        setup = Setup(**json.loads(next(_lines(tasks, at_a_time=1))))
-        _warm()
-    except Exception as error:  # said to whoever started it: there is nowhere else
-        _say(results, {"broken": f"{type(error).__name__}: {error}"})
+        setup = Setup(**json.loads(next(_read_lines(tasks, at_a_time=1))))
+        _warm_up()
+    except Exception as error:  # reported to the parent, since there is no other output
+        _send(results, {"broken": f"{type(error).__name__}: {error}"})
         sys.exit(1)
     death, bell = os.pipe()
     os.set_blocking(bell, False)
@@ -72,20 +73,20 @@ def main() -> None:
         if child == 0:
             signal.set_wakeup_fd(-1)
             signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-            _serve(setup, tasks, results)
-        status = _watch(child, tasks, death)
+            _do_tasks(setup, tasks, results)
+        status = _wait_for_child(child, tasks, death)
         if status is None or (os.WIFEXITED(status) and os.WEXITSTATUS(status) == _INPUT_ENDED):
             return
-        _say(results, {"died": status})
-        # What the child left unread is sent again.
-        if all(line != "again" for line in _lines(tasks, at_a_time=1)):
+        _send(results, {"died": status})
+        # Tasks that the child has left unread are sent again.
+        if all(line != "again" for line in _read_lines(tasks, at_a_time=1)):
             return
 
 
-def _watch(child: int, tasks: int, death: int) -> int | None:
-    """Wait for a child's end; kill it and return None when the other end of the input has gone."""
+def _wait_for_child(child: int, tasks: int, death: int) -> int | None:
+    """Wait for a child's end; kill it and return None if the input is closed."""
     poll = select.poll()
-    poll.register(tasks, 0)  # only its hang-up counts: what is in it is the child's
+    poll.register(tasks, 0)  # only for its hang-up: the data in it are for the child
     poll.register(death, select.POLLIN)
     while True:
         events = dict(poll.poll())
@@ -100,25 +101,25 @@ def _watch(child: int, tasks: int, death: int) -> int | None:
             return None
 
 
-def _serve(setup: Setup, tasks: int, results: int) -> None:
-    """Do tasks until the input ends; never returns."""
+def _do_tasks(setup: Setup, tasks: int, results: int) -> None:
+    """Do tasks until the input ends; never return."""
     from .task import Tasks
 
     status = 1
     try:
         work = Tasks(setup.base)
-        _say(results, {"pid": os.getpid()})
+        _send(results, {"pid": os.getpid()})
         _limit_memory(setup.memory_limit)
         who = {"host": platform.node(), "process": os.getpid()}
-        for line in _lines(tasks):
+        for line in _read_lines(tasks):
             task = json.loads(line)
-            # A hung run is killed from outside; where nobody is left to do so, the kernel does.
+            # The parent kills a hung run; without a parent, the kernel does.
             signal.setitimer(signal.ITIMER_REAL, setup.time_limit + _GRACE)
             row, timing = work.do(task["engine"], task["changes"])
             signal.setitimer(signal.ITIMER_REAL, 0)
-            _say(results, {"index": task["index"], "row": row, "timing": timing | who})
+            _send(results, {"index": task["index"], "row": row, "timing": timing | who})
             if row["status"] == "memory":
-                os._exit(RETIRED)  # what it has left may be too little for the next task
+                os._exit(RETIRED)  # the remaining memory may be too little for the next task
         status = _INPUT_ENDED
     finally:
         os._exit(status)
@@ -133,8 +134,8 @@ def _limit_memory(megabytes: float | None) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
 
 
-def _warm() -> None:
-    """Load what every task needs and compile the reference, or load what is compiled."""
+def _warm_up() -> None:
+    """Load what every task needs and compile the reference, or load the compiled code."""
     from ..scenario import load_scenario
     from .task import Tasks
 
@@ -142,8 +143,8 @@ def _warm() -> None:
     Tasks(scenario.model_dump(mode="json", exclude_none=True)).do("reference", {})
 
 
-def _lines(source: int, at_a_time: int = 1 << 16) -> Iterator[str]:
-    """Whole lines from a pipe; ``at_a_time`` of 1 leaves in it all that follows the last one asked for."""
+def _read_lines(source: int, at_a_time: int = 1 << 16) -> Iterator[str]:
+    """Yield complete lines from a pipe; with ``at_a_time`` 1, all that follows the last line asked for stays in it."""
     rest = b""
     while data := os.read(source, at_a_time):
         *whole, rest = (rest + data).split(b"\n")
@@ -151,8 +152,8 @@ def _lines(source: int, at_a_time: int = 1 << 16) -> Iterator[str]:
             yield line.decode(errors="replace")
 
 
-def _say(results: int, message: dict[str, Any]) -> None:
-    # The line feed in front ends what a dead child may have left unfinished.
+def _send(results: int, message: dict[str, Any]) -> None:
+    # The leading line feed ends a line that a dead child may have left incomplete.
     data = b"\n" + json.dumps(message).encode() + b"\n"
     while data:
         data = data[os.write(results, data) :]

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from velodrome.scenarios.error import ScenarioError
 
 PATIENCE = 5.0  # CPU time that an answer may take [s]
-# A path of 200 letters, the names of all parameters of a bicycle, and some words.
-LONGEST = 1000
+# Twenty complaints, each of a place, a value of 200 letters and some words, and the names of a bicycle's parameters.
+LONGEST = 20 * 500
 
 
 def is_one_line(text: str) -> bool:

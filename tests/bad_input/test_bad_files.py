@@ -18,12 +18,16 @@ from complaints import is_one_line, refusing
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.sealing import sealed
 from velodrome.engines.engine import Trajectory
+from velodrome.engines.format_version import VERSION_KEY
 from velodrome.engines.storage import METADATA_KEY, read_trajectory
 from velodrome.scenarios.error import ScenarioError
+from velodrome.scenarios.files import DIGEST_KEY
 from velodrome.scenarios.gate import checks as gate
 from velodrome.scenarios.gate.verdict import judge_sample
 from velodrome.scenarios.run.runner import plan_run, run_plan
+from velodrome.scenarios.run.stored import read_document
 from velodrome.scenarios.scenario.schema import load_scenario
 from velodrome.scenarios.view import viewing as view
 
@@ -179,6 +183,18 @@ def test_a_table_that_is_no_trajectory_is_refused(
     assert is_one_line(str(caught.value))
 
 
+def test_a_trajectory_of_a_newer_format_is_refused_with_what_to_do(path: Path, folder: Path) -> None:
+    pq.write_table(facts(schema_version=2)(pq.read_table(folder / "reference.parquet")), path)
+    with pytest.raises(ValueError, match="its schema_version is 2, and this velodrome reads up to 1") as caught:
+        read_trajectory(path)
+    assert is_one_line(str(caught.value))
+
+
+def test_a_trajectory_says_its_format(folder: Path) -> None:
+    found = json.loads((pq.read_schema(folder / "reference.parquet").metadata or {})[METADATA_KEY])
+    assert found["schema_version"] == 1
+
+
 def test_a_trajectory_of_an_earlier_version_has_no_digest_and_is_read(path: Path, folder: Path) -> None:
     good = folder / "reference.parquet"
     pq.write_table(facts()(pq.read_table(good)), path)
@@ -246,7 +262,7 @@ def page_or_refused(spoilt: Path, name: str, text: bytes) -> None:
 @given(DOCUMENTS, ALTERATION)
 def test_the_page_of_an_altered_run_is_written_or_refused(spoilt: Path, name: str, alteration: Any) -> None:
     document = json.loads((spoilt / name).read_text())
-    page_or_refused(spoilt, name, json.dumps(altered(document, *alteration)).encode())
+    page_or_refused(spoilt, name, sealed(altered(document, *alteration)).encode())
 
 
 @pytest.mark.slow
@@ -254,7 +270,56 @@ def test_the_page_of_an_altered_run_is_written_or_refused(spoilt: Path, name: st
 @given(DOCUMENTS, ALTERATION)
 def test_the_pages_of_many_altered_runs_are_written_or_refused(spoilt: Path, name: str, alteration: Any) -> None:
     document = json.loads((spoilt / name).read_text())
-    page_or_refused(spoilt, name, json.dumps(altered(document, *alteration)).encode())
+    page_or_refused(spoilt, name, sealed(altered(document, *alteration)).encode())
+
+
+@settings(max_examples=40)
+@given(DOCUMENTS, ALTERATION)
+def test_any_change_of_a_sealed_document_is_seen(spoilt: Path, name: str, alteration: Any) -> None:
+    good = json.loads((spoilt / name).read_text())
+    changed = altered(good, *alteration)
+    text = (spoilt / name).read_bytes()
+    (spoilt / name).write_text(json.dumps(changed))
+    try:
+        with refusing() as said:
+            assert read_document(spoilt, name) == {
+                key: good[key] for key in good if key not in (VERSION_KEY, DIGEST_KEY)
+            }
+            assert json.dumps(changed, sort_keys=True) == json.dumps(good, sort_keys=True)
+        assert all(line.startswith(f"{spoilt / name}: ") for line in said)
+    finally:
+        (spoilt / name).write_bytes(text)
+
+
+def test_the_order_and_the_layout_of_a_document_do_not_matter(spoilt: Path) -> None:
+    path = spoilt / "metrics.json"
+    text, found = path.read_text(), read_document(spoilt, "metrics.json")
+    path.write_text(json.dumps(dict(reversed(json.loads(text).items())), indent=4))
+    try:
+        assert read_document(spoilt, "metrics.json") == found
+    finally:
+        path.write_text(text)
+
+
+@pytest.mark.parametrize(
+    ("version", "words"),
+    [
+        (3, "its schema_version is 3, and this velodrome reads up to 2: .*pip install --upgrade velodrome"),
+        (10**40, "its schema_version is very large"),
+        *((value, "its schema_version is no whole number from 1 to 2") for value in (0, -1, 2.0, True, None, "2", [])),
+    ],
+    ids=repr,
+)
+def test_a_document_of_another_format_is_refused_with_what_to_do(version: Any, words: str, spoilt: Path) -> None:
+    path = spoilt / "manifest.json"
+    text = path.read_text()
+    path.write_text(sealed(json.loads(text) | {VERSION_KEY: version}))
+    try:
+        with pytest.raises(ScenarioError, match=words) as caught:
+            read_document(spoilt, "manifest.json")
+        assert is_one_line(str(caught.value))
+    finally:
+        path.write_text(text)
 
 
 @settings(max_examples=30)
@@ -368,6 +433,16 @@ def test_a_baseline_of_another_ride_is_refused(changes: dict[str, Any], words: s
     (tmp_path / "q2.json").write_text(json.dumps(BASELINE | changes))
     with pytest.raises(ScenarioError, match=words):
         gate.read_baseline("q2", tmp_path, gate.load_gated("q2")[1])
+
+
+def test_a_baseline_without_a_version_is_read_and_a_newer_one_refused(tmp_path: Path) -> None:
+    older = {key: value for key, value in BASELINE.items() if key != VERSION_KEY}
+    assert older != BASELINE
+    (tmp_path / "q2.json").write_text(json.dumps(older))
+    assert gate.read_baseline("q2", tmp_path) == BASELINE["engines"]
+    (tmp_path / "q2.json").write_text(json.dumps(BASELINE | {VERSION_KEY: 2}))
+    with pytest.raises(ScenarioError, match=r"not a baseline: its schema_version is 2, .* reads up to 1"):
+        gate.read_baseline("q2", tmp_path)
 
 
 def test_a_file_is_no_folder_of_baselines(tmp_path: Path) -> None:

@@ -18,12 +18,13 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
+from tests.sealing import sealed
 from velodrome.engines import engine as registry
 from velodrome.reports.drawing.summary import make_summary
 from velodrome.reports.figures.precision import precision_figure
 from velodrome.scenarios.gate.ci_files import junit_xml, markdown_page
 from velodrome.scenarios.gate.verdict import Verdict
-from velodrome.scenarios.run.folder import new_folder
+from velodrome.scenarios.run.folder import new_folder, resolve_scenario
 from velodrome.scenarios.run.runner import plan_run, run_plan
 from velodrome.scenarios.scenario.schema import LIBRARY, load_scenario
 from velodrome.scenarios.view import viewing as view
@@ -81,7 +82,7 @@ def test_a_scenarios_name_stays_inside_the_output_folder(stem: str, tmp_path: Pa
     assert sorted(entry.name for entry in (tmp_path / "in").iterdir()) == [path.name]
     names = {"scenario.toml", "manifest.json", "metrics.json", "reference.parquet", "comparison.rrd", "report.html"}
     assert {entry.name for entry in folder.iterdir()} == names
-    assert load_scenario(str(folder / "scenario.toml"))[1] == scenario
+    assert load_scenario(str(folder / "scenario.toml"))[1] == resolve_scenario(plan)
 
 
 @pytest.mark.parametrize(
@@ -175,7 +176,7 @@ def test_no_text_of_a_run_is_markup_in_its_page(tmp_path: Path) -> None:
     copied = Path(shutil.copytree(folder, tmp_path / "theirs"))
     for name in ("manifest.json", "metrics.json"):
         document = json.loads((copied / name).read_text())
-        (copied / name).write_text(json.dumps(hostile(document)))
+        (copied / name).write_text(sealed(hostile(document)))
     theirs = Seen(view.stored_page(copied))
     assert "wbr" not in theirs.tags
     assert "onerror" not in theirs.attributes

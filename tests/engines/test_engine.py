@@ -56,7 +56,7 @@ def test_the_reference_comes_first_and_the_rest_in_order() -> None:
 
 
 def test_an_unknown_engine_is_refused_with_those_that_there_are() -> None:
-    with pytest.raises(ValueError, match=r"'warp' is not installed; there are reference, .*mujoco-native"):
+    with pytest.raises(ValueError, match=r"'warp' is not installed \(there are reference, .*mujoco-native"):
         load_engine("warp")
 
 

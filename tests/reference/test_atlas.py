@@ -41,9 +41,9 @@ def test_a_curve_of_the_atlas_is_the_traced_one(alpha: float, family: int) -> No
     (curve,) = (one for one in small().curves if (one.alpha, one.family) == (alpha, family))
     traced = trace(BICYCLE, Paraboloid(alpha), family, LONGEST)
     assert curve.ends == traced.ends
-    assert len(curve.seen.lean) == len(traced.points)
+    assert len(curve.samples.lean) == len(traced.points)
     # Both start at the same anchor to round-off; some 100 steps from there pass it on, each a little larger.
-    angles = np.array([curve.seen.lean, curve.seen.steer]).T
+    angles = np.array([curve.samples.lean, curve.samples.steer]).T
     expected = np.array([point.unknowns[[3, 5]] for point in traced.points])
     assert np.abs(angles - expected).max() < 1e-8
 
@@ -51,7 +51,7 @@ def test_a_curve_of_the_atlas_is_the_traced_one(alpha: float, family: int) -> No
 @pytest.mark.parametrize(("alpha", "family"), [(0.0, 2), (0.005, 4), (0.05, 1), (0.3, 3), (0.5, 2)])
 def test_a_point_of_the_atlas_is_a_motion_with_its_growth_rate(alpha: float, family: int) -> None:
     (curve,) = (one for one in small().curves if (one.alpha, one.family) == (alpha, family))
-    seen = curve.seen
+    seen = curve.samples
     for i in np.flatnonzero((seen.rear_rate > 5) & (seen.radius < 20))[::40]:
         near, surface = (float(seen.lean[i]), float(seen.steer[i])), Paraboloid(alpha)
         motion = find_motion(BICYCLE, surface, float(seen.rear_rate[i]), family, near)[1]

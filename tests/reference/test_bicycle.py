@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tests.literature import published
-from velodrome.reference.bicycle import BODIES, Bicycle
+from velodrome.reference.bicycle import BODIES, Bicycle, require_rigid_bodies
 from velodrome.reference.kinematics import constants
 
 TABLE = published("meijaard2007")["parameters"]
@@ -54,12 +54,11 @@ def test_assemblies_keep_mass_and_centre() -> None:
     ("change", "words"),
     [
         ({"rear_frame_mass": -85.0}, "rear_frame_mass"),
-        ({"front_wheel_mass": 0.0}, "front_wheel_mass"),
+        ({"front_wheel_mass": 0.0}, "front_wheel_I.*without mass"),
         ({"wheelbase": math.nan}, "wheelbase"),
         ({"trail": math.inf}, "trail"),
         ({"gravity": True}, "gravity"),
         ({"steer_axis_tilt": 1.6}, "steer_axis_tilt"),
-        ({"front_wheel_Iyy": 0.3}, "front_wheel_I"),  # more than twice Ixx: no rigid body
         ({"rear_frame_Ixz": 6.0}, "rear_frame_I"),  # not positive definite
     ],
 )
@@ -67,3 +66,23 @@ def test_impossible_parameters_are_refused(change: dict[str, float], words: str)
     with pytest.raises(ValueError, match=words) as caught:
         replace(Bicycle(), **change)
     assert "\n" not in str(caught.value)
+
+
+def test_a_broken_triangle_inequality_is_told_with_its_size() -> None:
+    ring = replace(Bicycle(), front_wheel_Iyy=2 * Bicycle().front_wheel_Ixx)
+    assert ring.warnings() == ()
+    measured = replace(Bicycle(), front_wheel_Iyy=1.03 * ring.front_wheel_Iyy)
+    (line,) = measured.warnings()
+    assert "front_wheel: " in line
+    assert "by 3 %" in line
+    require_rigid_bodies(measured)
+    with pytest.raises(ValueError, match=r"front_wheel_I.*by 6.76 %"):
+        require_rigid_bodies(replace(Bicycle(), front_wheel_Iyy=0.3))
+
+
+def test_bodies_may_be_points_and_wheels_may_have_no_mass() -> None:
+    none = {f"{body}_I{axes}": 0.0 for body in ("rear_frame", "front_frame") for axes in ("xx", "yy", "zz", "xz")}
+    none |= {f"{wheel}_{part}": 0.0 for wheel in ("rear_wheel", "front_wheel") for part in ("mass", "Ixx", "Iyy")}
+    assert replace(Bicycle(), **none).warnings() == ()
+    with pytest.raises(ValueError, match="at least one body must have mass"):
+        replace(Bicycle(), **none, rear_frame_mass=0.0, front_frame_mass=0.0)

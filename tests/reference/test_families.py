@@ -140,7 +140,7 @@ def test_a_further_curve_is_found_through_the_anchor_that_lies_on_it() -> None:
     start = anchor(BICYCLE, Paraboloid(1.0), 3, 20.0)
     own, further = (curve for curve in everything(1.0) if curve.number == 3)
     on_own, on_further = (
-        [u for u in crossings(curve.equations, curve.points, start.condition) if start.met_by(u)]
+        [u for u in crossings(curve.equations, curve.points, start.condition) if start.is_same_as(u)]
         for curve in (own, further)
     )
     assert (len(on_own), len(on_further)) == (0, 1)

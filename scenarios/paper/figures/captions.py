@@ -1,4 +1,4 @@
-"""What is said below each figure, from the data it shows."""
+"""Captions of the figures, made from the data that they show."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ....reference.kinematics import REAR_ANGLE
 from ....reports.figures import make_curves
 from .trajectories import FigureRide, leaves_at
 
-LEFT_CIRCLE_AT = 0.01  # of the radius: so far off its circle D has left it
-SETTLED_PART = 10.0  # last part of a ride, over which its mean rate is taken [s]
+LEFT_CIRCLE_AT = 0.01  # distance, relative to the radius, from which on D has left its circle
+SETTLED_PART = 10.0  # last part of a ride, over which the mean rate is taken [s]
 
 _AXES = (
     "Circular motions: (a) lean and (b) steer over the scaled speed of the front wheel; on families 2 and 4, whose "
@@ -22,16 +22,16 @@ _AXES = (
 
 
 def families_caption(document: Mapping[str, Any], front_radius: float) -> str:
-    """Of a figure of solution families: what its lines mean, and what is stable."""
+    """Write the caption of a figure of solution families: the meaning of its lines, and its stable sections."""
     drawn = make_curves(document["families"], front_radius)
-    words = [_AXES]
+    sentences = [_AXES]
     shared = [curve.families for curve in drawn if len(curve.families) > 1]
     if shared:
         pairs = " and ".join(f"{first} with {second}" for first, second in shared)
-        words.append(f"Families have joined: {pairs}, each pair on one curve, striped where a bicycle can ride it.")
+        sentences.append(f"Families have joined: {pairs}, each pair on one curve, striped where a bicycle can ride it.")
     if any(not pushed for curve in drawn for _, _, pushed in curve.pieces()):
-        words.append("Dashed: the ground would have to pull a wheel, so no bicycle can ride there.")
-    words.append("Open marks are limits: E and F lying flat at infinite speed, others on ever larger circles.")
+        sentences.append("Dashed: the ground would have to pull a wheel, so no bicycle can ride there.")
+    sentences.append("Open marks are limits: E and F lying flat at infinite speed, others on ever larger circles.")
     sections = []
     for family in document["families"]:
         for section in family["stable_sections"]:
@@ -42,20 +42,20 @@ def families_caption(document: Mapping[str, Any], front_radius: float) -> str:
         if sections
         else "No section is Lyapunov stable."
     )
-    return " ".join([*words, stable])
+    return " ".join([*sentences, stable])
 
 
 def configurations_caption(alpha: float) -> str:
-    """Of the bicycles in the bowl."""
+    """Write the caption of the bicycles in the bowl."""
     return (
         f"Four circular motions in the bowl α = {alpha:g} m⁻¹, one of each family, as marked in Figure 5; wheels, axes "
-        "and poses are computed, the tubes are for the eye. Grey: the steered part. Seen from outside, where the wall "
-        "would turn its back to the eye it is left out."
+        "and poses are computed, the tubes are schematic. Grey: the steered part. Seen from outside; parts of the wall "
+        "that would show their outer side are left out."
     )
 
 
 def departure_caption(ride: FigureRide, circle: CircularMotion, growth_rate: float) -> str:
-    """Of the ride that leaves Q1."""
+    """Write the caption of the ride that leaves Q1."""
     times = [leaves_at(motion, circle, LEFT_CIRCLE_AT) for motion in (ride.paper, ride.precise)]
     paper, precise = ("never" if time is None else f"after {time:.1f} s" for time in times)
     ends = [f"{motion.time[-1]:.1f} s" for motion in (ride.paper, ride.precise)]
@@ -71,11 +71,11 @@ def departure_caption(ride: FigureRide, circle: CircularMotion, growth_rate: flo
 def disturbed_caption(
     rides: Sequence[FigureRide], circle: CircularMotion, neighbours: Mapping[str, CircularMotion]
 ) -> str:
-    """Of the disturbed rides about Q2."""
-    words = []
+    """Write the caption of the disturbed rides about Q2."""
+    sentences = []
     for ride in rides:
         level = neighbours[ride.name].rear_rate
-        words.append(
+        sentences.append(
             f"with {ride.name} its mean over the last {SETTLED_PART:g} s is {settled_rate(ride):.4f} rad/s, and "
             f"{level:.4f} on the circle of equal energy (integrators apart after {ride.both[0][-1]:g} s: "
             f"{ride.apart[-1]:.2g} m)"
@@ -83,17 +83,17 @@ def disturbed_caption(
     return (
         "Rides from Q2, disturbed in the lean rate: (a) path of D in the first 20 s, (b) rate of the rear wheel, (c) "
         "distance of D between the two integrators. The rate does not return to "
-        f"{circle.rear_rate:g} rad/s: {'; '.join(words)}. "
+        f"{circle.rear_rate:g} rad/s: {'; '.join(sentences)}. "
         "The slowest disturbance, a drift of the circle's centre, still fades."
     )
 
 
 def settled_rate(ride: FigureRide) -> float:
-    """Mean rear-wheel rate at the end of a ride [rad/s]."""
+    """Return the mean rear-wheel rate at the end of a ride [rad/s]."""
     late = ride.precise.time > ride.precise.time[-1] - SETTLED_PART
     return float(np.mean(ride.precise.qd[late, REAR_ANGLE]))
 
 
 def captions_text(captions: Mapping[str, str]) -> str:
-    """All captions as Markdown: name of the figure's file to caption."""
+    """Write all captions as Markdown, by the names of the figures' files."""
     return "\n".join(f"## {name.replace('-', ' ').capitalize()}\n\n{text}\n" for name, text in captions.items())

@@ -19,14 +19,14 @@ from ....reports.drawing import STEEPEST, ball, body_meshes, ground_disc, lift_p
 from ....reports.figures import FAMILY_COLOURS, INK, WIDTH, new_figure
 from .picture import Picture, View
 
-_FRONT = "#8d939a"  # of the front assembly: a reversed handlebar is seen by it
+_FRONT = "#8d939a"  # of the front assembly, so that a reversed handlebar can be recognised
 _GROUND, _GRID, _EDGE = np.array([0.90, 0.925, 0.945]), (0.68, 0.73, 0.77), (0.45, 0.50, 0.55)
 _REAR_TRACK, _FRONT_TRACK, _PATH = (0.10, 0.10, 0.10), (0.45, 0.47, 0.50), (0.85, 0.60, 0.0)
-_MARGIN = 0.25  # of the bowl beyond the widest circle [m]
+_MARGIN = 0.25  # of the bowl beyond the largest circle [m]
 _ELEVATION, _ASIDE = np.radians(50.0), np.radians(30.0)
 _DOT = 0.03  # radius of the mark at a contact point [m]
-_COLUMNS = 900  # pixels of a panel
-_AHEAD = 0.7  # of the arrow before D, along the circle [rad]
+_COLUMNS = 900  # pixels of a panel's width
+_AHEAD = 0.7  # angle from D to the arrow along the circle [rad]
 _AROUND = np.linspace(0, 2 * np.pi, 361)
 
 
@@ -47,15 +47,15 @@ class Configuration:
 
 
 def configurations_figure(bicycle: Bicycle, surface: Surface, shown: Sequence[Configuration]) -> Figure:
-    """Draw each bicycle on its circle in its part of the bowl; call within `figure_style.style`."""
+    """Draw each bicycle on its circle in its part of the bowl; call within `use_style`."""
     rows = (len(shown) + 1) // 2
     figure = new_figure(2.95 * rows, WIDTH)
-    figure.set_layout_engine("compressed")  # pictures keep their shape: what is over goes outside, not between
+    figure.set_layout_engine("compressed")  # pictures keep their shape: excess space goes outside, not between them
     panels = figure.subplots(rows, 2, squeeze=False).ravel()
     for axes in panels[len(shown) :]:
         axes.remove()
     for axes, item, tag in zip(panels, shown, "abcdefgh", strict=False):
-        _panel(axes, bicycle, surface, item, tag)
+        _draw_panel(axes, bicycle, surface, item, tag)
     handles = [
         Line2D([], [], color=_REAR_TRACK, label="circle of the rear contact point"),
         Line2D([], [], color=_FRONT_TRACK, label="of the front contact point"),
@@ -65,11 +65,11 @@ def configurations_figure(bicycle: Bicycle, surface: Surface, shown: Sequence[Co
     return figure
 
 
-def _panel(axes: Axes, bicycle: Bicycle, surface: Surface, item: Configuration, tag: str) -> None:
+def _draw_panel(axes: Axes, bicycle: Bicycle, surface: Surface, item: Configuration, tag: str) -> None:
     motion = item.motion
     radius = float(np.hypot(*motion.contact[:, :2].T).max()) + _MARGIN
     rim = float(lift_points(surface, np.array([radius]), np.zeros(1))[0, 2])
-    view = _view(motion, radius, rim)
+    view = _make_view(motion, radius, rim)
     picture = Picture(view, _COLUMNS)
     _draw_ground(picture, view, surface, radius)
     _draw_circles(picture, surface, motion)
@@ -88,10 +88,10 @@ def _panel(axes: Axes, bicycle: Bicycle, surface: Surface, item: Configuration, 
     axes.text(0.5, -0.01, words.replace("-", "−"), transform=axes.transAxes, ha="center", va="top", fontsize=7.5)
 
 
-def _view(motion: CircularMotion, radius: float, rim: float) -> View:
-    """From outside, above and a little ahead: there a bicycle that leans inwards shows its side.
+def _make_view(motion: CircularMotion, radius: float, rim: float) -> View:
+    """Return a view from outside, above and a little ahead, from which a bicycle that leans inwards shows its side.
 
-    The bicycle heads along x, its circle's centre on the left of an anticlockwise motion.
+    The bicycle heads along x, with its circle's centre on the left for an anticlockwise motion.
     """
     azimuth = -float(np.sign(motion.yaw_rate)) * (np.pi / 2 - _ASIDE)
     centre = np.array([0.0, 0.0, rim])
@@ -102,7 +102,7 @@ def _draw_ground(picture: Picture, view: View, surface: Surface, radius: float) 
     ring = radius * np.column_stack([np.cos(_AROUND), np.sin(_AROUND)])
     ground = ground_disc(surface, ring, radius, STEEPEST)
     colours = np.tile(_GROUND, (len(ground.vertices), 1)) * (0.94 + 0.12 * ground.brightness[:, None])
-    # From outside the near wall would hide the bicycle: only what shows its inner side is drawn.
+    # The near wall would hide the bicycle: only what shows its inner side is drawn.
     picture.body(ground.vertices, ground.normals, ground.triangles, colours, cull=True)
     towards = view.axes[2]
     for line in ground.lines:
@@ -114,7 +114,7 @@ def _draw_ground(picture: Picture, view: View, surface: Surface, radius: float) 
 
 
 def _draw_circles(picture: Picture, surface: Surface, motion: CircularMotion) -> None:
-    """Circles of the two contact points on the ground, and the path of D with its direction."""
+    """Draw the circles of the two contact points on the ground, and the path of D with its direction."""
     for contact, colour in zip(motion.contact, (_REAR_TRACK, _FRONT_TRACK), strict=True):
         reach = float(np.hypot(*contact[:2]))
         track = lift_points(surface, reach * np.cos(_AROUND), reach * np.sin(_AROUND), 0.004)
@@ -132,7 +132,7 @@ def _draw_circles(picture: Picture, surface: Surface, motion: CircularMotion) ->
 
 
 def _draw_arrow(picture: Picture, tip: np.ndarray, heading: float) -> None:
-    """A flat arrow head that points along a heading [rad], its tip at a point [m]."""
+    """Draw a flat arrow head that points along a heading [rad], with its tip at a point [m]."""
     ahead, aside = (np.array([np.cos(a), np.sin(a), 0.0]) for a in (heading, heading + np.pi / 2))
     corners = tip + np.array([0 * ahead, -0.30 * ahead + 0.11 * aside, -0.22 * ahead, -0.30 * ahead - 0.11 * aside])
     colours = np.tile(np.array(_PATH) / 0.95, (4, 1))
@@ -141,10 +141,12 @@ def _draw_arrow(picture: Picture, tip: np.ndarray, heading: float) -> None:
 
 def _draw_bicycle(picture: Picture, bicycle: Bicycle, motion: CircularMotion, colour: str) -> None:
     q, _ = motion.state()
-    turned, placed = rotations(bicycle, q[None])[0], body_positions(bicycle, q[None])[0]
+    orientations, centres = rotations(bicycle, q[None])[0], body_positions(bicycle, q[None])[0]
     meshes = body_meshes(bicycle)
     for k, body in enumerate(BODIES):
         mesh = meshes[body]
         red, green, blue = (round(255 * part) for part in to_rgb(colour if body.startswith("rear") else _FRONT))
         tint = mesh.coloured((red, green, blue)) / 255
-        picture.body(mesh.vertices @ turned[k].T + placed[k], mesh.normals @ turned[k].T, mesh.triangles, tint)
+        picture.body(
+            mesh.vertices @ orientations[k].T + centres[k], mesh.normals @ orientations[k].T, mesh.triangles, tint
+        )

@@ -1,4 +1,4 @@
-"""Computes and draws the figures and tables of Xiong, Wang and Liu (2020)."""
+"""The folder of the paper's figures and tables (Xiong, Wang and Liu 2020)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ENDINGS = (".svg", ".png")
 ALPHAS = {"figure-2": 0.0, "figure-3": 1 / 200, "figure-4": 1 / 20, "figure-5": 1 / 5, "figure-7": 1.0}
 MARKS = {"figure-3": ("q1", "q2"), "figure-5": ("p1", "p2", "p3", "p4")}  # motions that the paper marks
 DISTURBED_SCENARIO = {"+0.1 rad/s": "q2-plus", "−0.1 rad/s": "q2-minus"}
-DEPARTURE, SETTLING = 100.0, 60.0  # simulated from Q1 and about Q2 [s]
+DEPARTURE, SETTLING = 100.0, 60.0  # durations simulated from Q1 and about Q2 [s]
 
 DrawnFigure = tuple[Figure, str]
 
@@ -44,21 +44,21 @@ def write_figures(out: Path, progress: RunWatch, endings: Iterable[str] = ENDING
     Parameters
     ----------
     out : Path
-        Folder, made if need be.
+        Folder, made if it does not exist.
     progress : callable
-        Called with what comes next, how many are done, and how many there are.
+        Called with the next figure, the number of figures done and the number of steps in all.
     endings : iterable of str
-        Formats to write each figure in.
+        Endings of the files to write each figure in.
 
     Returns
     -------
     list of Path
-        Files written, each whole or not at all.
+        Files written, each one completely or not at all.
     """
     out.mkdir(parents=True, exist_ok=True)
     written: list[Path] = []
     captions: dict[str, str] = {}
-    jobs = _jobs()
+    jobs = _drawing_functions()
     with use_style():
         for done, (name, draw) in enumerate(jobs.items()):
             progress(name, done, len(jobs) + 1)
@@ -88,38 +88,38 @@ def write_paper(out: Path, lines: Sequence[LedgerLine], progress: RunWatch) -> l
     return [out / "ledger.json", out / "ledger.md", *write_figures(out, progress)]
 
 
-def _jobs() -> dict[str, Callable[[], DrawnFigure]]:
-    """Name of a figure to what computes and draws it, in the paper's order."""
-    jobs: dict[str, Callable[[], DrawnFigure]] = {name: partial(_families, name) for name in ALPHAS}
-    jobs |= {"figure-6": _configurations, "figure-8": _departure, "figure-9": _disturbed}
+def _drawing_functions() -> dict[str, Callable[[], DrawnFigure]]:
+    """Return the functions that compute and draw the figures, by the figures' names, in the paper's order."""
+    jobs: dict[str, Callable[[], DrawnFigure]] = {name: partial(_draw_families, name) for name in ALPHAS}
+    jobs |= {"figure-6": _draw_configurations, "figure-8": _draw_departure, "figure-9": _draw_disturbed}
     return dict(sorted(jobs.items()))
 
 
-def _families(name: str) -> DrawnFigure:
+def _draw_families(name: str) -> DrawnFigure:
     alpha, marked = ALPHAS[name], {key.upper(): start_named(key) for key in MARKS.get(name, ())}
-    marks = {key: _figures(_motion(start)) for key, start in marked.items()}
+    marks = {key: _marked_values(_require_motion(start)) for key, start in marked.items()}
     document = families_document(alpha)
     return solution_figure(document, Bicycle().front_wheel_radius, marks), families_caption(
         document, Bicycle().front_wheel_radius
     )
 
 
-def _configurations() -> DrawnFigure:
+def _draw_configurations() -> DrawnFigure:
     starts = {name: start_named(name) for name in MARKS["figure-5"]}
-    shown = [Configuration(name.upper(), start.family or 0, _motion(start)) for name, start in starts.items()]
+    shown = [Configuration(name.upper(), start.family or 0, _require_motion(start)) for name, start in starts.items()]
     problem = starts["p1"].problem
     figure = configurations_figure(problem.bicycle, problem.surface, shown)
     return figure, configurations_caption(ALPHAS["figure-5"])
 
 
-def _departure() -> DrawnFigure:
+def _draw_departure() -> DrawnFigure:
     start = start_named("q1", DEPARTURE)
-    ride, motion = ride_from("Q1", start), _motion(start)
+    ride, motion = ride_from("Q1", start), _require_motion(start)
     return departure_figure(ride, motion, start.growth_rate), departure_caption(ride, motion, start.growth_rate)
 
 
-def _disturbed() -> DrawnFigure:
-    circle = _motion(start_named("q2"))
+def _draw_disturbed() -> DrawnFigure:
+    circle = _require_motion(start_named("q2"))
     starts = {words: start_named(name, SETTLING) for words, name in DISTURBED_SCENARIO.items()}
     rides = [ride_from(words, start) for words, start in starts.items()]
     neighbours = {words: circle_of_equal_energy(start, circle) for words, start in starts.items()}
@@ -127,7 +127,7 @@ def _disturbed() -> DrawnFigure:
 
 
 def ride_from(name: str, start: Start) -> FigureRide:
-    """Integrate a start precisely and by the paper's method, as far as both wheels are pushed."""
+    """Integrate a start precisely and by the paper's method, until the ground would have to pull a wheel."""
     problem = start.problem
     motions = [
         integrate(problem.bicycle, problem.surface, problem.q, problem.qd, problem.times)
@@ -137,34 +137,34 @@ def ride_from(name: str, start: Start) -> FigureRide:
 
 
 def circle_of_equal_energy(start: Start, circle: CircularMotion) -> CircularMotion:
-    """The circular motion of a start's energy, which the ride keeps, in the family of a circle."""
+    """Return the circular motion of a start's energy, which the ride conserves, in the family of a circle."""
     problem, number = start.problem, start.family
     if number is None:
-        raise ValueError("a ride that starts on no circle has no family of circles")
+        raise ValueError("a ride that does not start on a circle has no family of circles")
     seen = observe(problem.bicycle, problem.surface, problem.q[None], problem.qd[None])
     energy = float(seen.kinetic_energy[0] + seen.potential_energy[0])
     return motion_of_energy(trace(problem.bicycle, Paraboloid(ALPHAS["figure-3"]), number), energy, circle)
 
 
 def linearised_point(words: str, name: str) -> LinearisedPoint:
-    """The reduced linear system at a scenario's circular motion."""
+    """Return the reduced linear system at a scenario's circular motion."""
     start = start_named(name)
-    problem, motion = start.problem, _motion(start)
+    problem, motion = start.problem, _require_motion(start)
     state = motion.state()
     return LinearisedPoint(words, independent(*state), linearise(problem.bicycle, problem.surface, *state))
 
 
 def start_named(name: str, duration: float | None = None) -> Start:
-    """Start of a scenario of the library, its duration changed if one is given [s]."""
+    """Return the start of a scenario of the library, with another duration [s] if one is given."""
     changes = {} if duration is None else {"simulation.duration": duration}
     return make_start(load_scenario(name, changes)[1])
 
 
-def _motion(start: Start) -> CircularMotion:
+def _require_motion(start: Start) -> CircularMotion:
     if start.motion is None:
         raise ValueError("the paper's points are circular motions")
     return start.motion
 
 
-def _figures(motion: CircularMotion) -> dict[str, float]:
+def _marked_values(motion: CircularMotion) -> dict[str, float]:
     return {"lean": motion.lean, "steer": motion.steer, "front_rate": motion.front_rate}

@@ -1,4 +1,4 @@
-"""A picture of bodies and lines in space, seen from afar, with what is hidden hidden."""
+"""A picture of bodies and lines in space in parallel projection, with hidden parts removed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from . import raster
 
-_FINER = 2  # pixels drawn a pixel shown, each way: smooth edges
+_FINER = 2  # drawn pixels per shown pixel each way, for smooth edges
 _AMBIENT, _DIFFUSE = 0.45, 0.62
 
 
@@ -19,9 +19,9 @@ class View:
     Attributes
     ----------
     azimuth, elevation : float
-        Direction from which one looks [rad].
+        Direction of the eye [rad].
     centre : ndarray, shape (3,)
-        What stands in the middle of the picture [m].
+        Point in the middle of the picture [m].
     width, height : float
         Extent of the picture [m].
     """
@@ -34,13 +34,13 @@ class View:
 
     @property
     def axes(self) -> np.ndarray:
-        """Unit vectors to the right, upwards and towards the eye, rows of shape (3, 3)."""
+        """Unit vectors to the right, upwards and towards the eye, as rows, shape (3, 3)."""
         ca, sa = np.cos(self.azimuth), np.sin(self.azimuth)
         ce, se = np.cos(self.elevation), np.sin(self.elevation)
         return np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """Place in the picture, right and up from its middle, and depth, shape (n, 3) [m]."""
+        """Return the position in the picture, right and up from its middle, and the depth, shape (n, 3) [m]."""
         return (points - self.centre) @ self.axes.T * [1.0, 1.0, -1.0]
 
 
@@ -70,15 +70,15 @@ class Picture:
         raster.fill(self._screen(points), triangles.astype(np.int64), lit, cull, self._depth, self._image)
 
     def line(self, points: np.ndarray, width: float, colour: np.ndarray, lift: float = 0.02) -> None:
-        """Draw a line through points (n, 3) [m], its width in pixels, before what is less than ``lift`` [m] nearer."""
+        """Draw a line through points (n, 3) [m], its width in pixels, in front of all less than ``lift`` [m] nearer."""
         colour = np.asarray(colour, float)
         raster.stroke(self._screen(points), _FINER * width, lift, colour, self._depth, self._image)
 
     def pixels(self) -> np.ndarray:
-        """Red, green, blue, opacity, 0 to 1, shape (rows, columns, 4)."""
+        """Return red, green, blue and opacity, 0 to 1, shape (rows, columns, 4)."""
         steps = range(_FINER)
         samples = [self._image[i::_FINER, j::_FINER] for i in steps for j in steps]
         cover = sum(sample[..., 3:] for sample in samples) / len(samples)
-        # Colours of empty samples are zero: the sum weighs each by its coverage.
+        # Colours of empty samples are zero, so the sum weights each by its coverage.
         colour = sum(sample[..., :3] for sample in samples) / len(samples) / np.maximum(cover, 1e-6)
         return np.concatenate([colour, cover], axis=2)

@@ -1,9 +1,9 @@
-"""Triangles and lines to pixels with a depth buffer.
+"""Rasterisation of triangles and lines with a depth buffer.
 
 In vector form, for a triangle with corners p0, p1, p2 on the screen (x, y) and depth z:
 
     b = barycentric coordinates of the pixel's centre in (p0, p1, p2)
-    drawn where all b >= 0 and  z = b . (z0, z1, z2)  is nearer than what the buffer holds
+    drawn where all b >= 0 and  z = b . (z0, z1, z2)  is nearer than the buffer's value
     colour = b . (c0, c1, c2)
 """
 
@@ -26,7 +26,7 @@ def fill(points, triangles, colours, cull, depth, image):
     colours : ndarray, shape (n, 3)
         0 to 1.
     cull : bool
-        Leave out triangles that show their back: those that run anticlockwise on the screen.
+        Omit triangles that show their back: those that run anticlockwise on the screen.
     depth : ndarray, shape (h, w)
         Changed in place.
     image : ndarray, shape (h, w, 4)
@@ -63,7 +63,7 @@ def fill(points, triangles, colours, cull, depth, image):
 
 @jit
 def stroke(points, width, lift, colour, depth, image):
-    """Draw a line of a width [px], nearer to the eye by ``lift`` than its points, shape (n, 3)."""
+    """Draw a line of a width [px] through points of shape (n, 3), moved towards the eye by ``lift``."""
     height, across = depth.shape
     half = width / 2
     for k in range(len(points) - 1):

@@ -1,4 +1,4 @@
-"""The linearised system at Q1 and Q2 (Xiong et al. 2020, section 4.2), beside the printed eigenvalues."""
+"""The linearised system at Q1 and Q2 (Xiong et al. 2020, section 4.2), compared with the printed eigenvalues."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..printed import read_printed as printed_figures
 
 SYMBOLS = ("x̃", "ỹ", "θ", "δ", "θ̇", "δ̇", "φ̇r")
 
-# As printed in section 4.2; of a conjugate pair the paper prints both signs.
+# As printed in section 4.2, where both signs of a conjugate pair are printed.
 PRINTED = {
     name: tuple(real + (f"±{imaginary}i" if float(imaginary) else "") for real, imaginary in point["eigenvalues"])
     for name, point in printed_figures().items()
@@ -23,7 +23,7 @@ PRINTED = {
 
 @dataclass(frozen=True)
 class LinearisedPoint:
-    """A named circular motion, the seven variables of its reduced system, and that system.
+    """A named circular motion, the seven variables of its reduced system, and the system.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class LinearisedPoint:
 
 
 def linearisation_document(points: Sequence[LinearisedPoint]) -> dict[str, Any]:
-    """Everything in full precision, JSON values."""
+    """Return all points in full precision, as JSON values."""
     return {
         point.name: {
             "variables": list(VARIABLES),
@@ -54,7 +54,7 @@ def linearisation_document(points: Sequence[LinearisedPoint]) -> dict[str, Any]:
 
 
 def linearisation_tables(points: Sequence[LinearisedPoint]) -> str:
-    """The tables as Markdown: eigenvalues beside the printed ones, then the 7 x 7 to six digits."""
+    """Write the tables as Markdown: eigenvalues beside the printed ones, then the 7 x 7 matrix to six digits."""
     return "\n".join(line for point in points for line in (*_eigenvalue_table(point), *_jacobian_table(point)))
 
 
@@ -62,9 +62,9 @@ def _eigenvalue_table(point: LinearisedPoint) -> list[str]:
     place = ", ".join(f"{value:.6g}" for value in point.variables)
     lines = [f"## {point.name}", "", f"v = ({', '.join(SYMBOLS)}) = [{place}]", ""]
     lines += ["| eigenvalue [1/s] | computed | printed | rounds to the print |", "| --- | ---: | ---: | --- |"]
-    for k, (value, printed) in enumerate(_paired(point), start=1):
-        verdict = "yes" if _rounds(value, printed) else "no"
-        lines.append(f"| λ{k} | {_shown(value)} | {printed.replace('-', '−')} | {verdict} |")
+    for k, (value, printed) in enumerate(_pair_eigenvalues(point), start=1):
+        verdict = "yes" if _rounds_to(value, printed) else "no"
+        lines.append(f"| λ{k} | {_format_eigenvalue(value)} | {printed.replace('-', '−')} | {verdict} |")
     return [*lines, ""]
 
 
@@ -73,35 +73,35 @@ def _jacobian_table(point: LinearisedPoint) -> list[str]:
     lines += ["| | " + " | ".join(SYMBOLS) + " |", "| --- |" + " ---: |" * len(SYMBOLS)]
     largest = np.abs(point.system.jacobian).max()
     for symbol, row in zip(SYMBOLS, point.system.jacobian, strict=True):
-        # Round-off of the largest entry is a zero.
+        # Round-off of the largest entry counts as zero.
         cells = ("0" if abs(value) < 1e-13 * largest else f"{value:.6g}".replace("-", "−") for value in row)
         lines.append(f"| {symbol} | " + " | ".join(cells) + " |")
     return [*lines, ""]
 
 
-def _parsed(printed: str) -> complex:
+def _parse_printed(printed: str) -> complex:
     return complex(printed.replace("±", "+").replace("i", "j"))
 
 
-def _paired(point: LinearisedPoint) -> list[tuple[complex, str]]:
-    """Each printed eigenvalue with the nearest computed one, of a pair the one of positive imaginary part."""
+def _pair_eigenvalues(point: LinearisedPoint) -> list[tuple[complex, str]]:
+    """Pair each printed eigenvalue with the nearest computed one; of a conjugate pair, the one above the real axis."""
     rest = [complex(value) for value in point.system.eigenvalues if value.imag >= 0]
     pairs = []
     for printed in PRINTED[point.name]:
-        nearest = min(rest, key=lambda value: abs(value - _parsed(printed)))
+        nearest = min(rest, key=lambda value: abs(value - _parse_printed(printed)))
         rest.remove(nearest)
         pairs.append((nearest, printed))
     return pairs
 
 
-def _shown(value: complex) -> str:
-    # The zero of the family comes out as round-off of the fastest eigenvalue.
+def _format_eigenvalue(value: complex) -> str:
+    # The family's zero eigenvalue is computed as round-off of the fastest one.
     real = "0" if abs(value) < 1e-9 else f"{value.real:.8f}"
     return (real + (f" ± {value.imag:.8f}i" if value.imag > 0 else "")).replace("-", "−")
 
 
-def _rounds(value: complex, printed: str) -> bool:
-    """Whether both parts are within half a unit of the last printed digit."""
+def _rounds_to(value: complex, printed: str) -> bool:
+    """Return whether both parts are within half a unit of the last printed digit."""
     digits = len(printed.replace("i", "").partition("±")[0].partition(".")[2])
-    off = value - _parsed(printed)
+    off = value - _parse_printed(printed)
     return max(abs(off.real), abs(off.imag)) <= 0.5 * 10**-digits * (1 + 1e-9) or (printed == "0" and abs(value) < 1e-9)

@@ -1,4 +1,4 @@
-"""Figures 8 and 9 of Xiong et al. (2020): rides from Q1 and Q2, by the paper's integrator and by the precise one."""
+"""Figures 8 and 9 of Xiong et al. (2020): rides from Q1 and Q2 by the paper's integrator and by the precise one."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from ....reports.figures import FAMILY_COLOURS, GREY, INK, new_figure
 
 REAR, FRONT = FAMILY_COLOURS[1], FAMILY_COLOURS[2]
 DISTURBED_COLOURS = (FAMILY_COLOURS[1], FAMILY_COLOURS[2])
-_FIRST = 20.0  # the paths are drawn up to here [s]: later laps lie on one another
+_FIRST = 20.0  # end of the drawn paths [s]: later laps overlap
 _PRECISE: dict[str, Any] = {"lw": 2.4, "alpha": 0.55, "solid_capstyle": "butt", "gid": "precise"}
 _PAPER: dict[str, Any] = {"lw": 0.9, "color": INK, "dashes": (4, 2), "gid": "modified Euler"}
 
 
 @dataclass(frozen=True)
 class FigureRide:
-    """One start, integrated twice, as far as both wheels are pushed.
+    """One start, integrated twice, until the ground would have to pull a wheel.
 
     Attributes
     ----------
     name : str
-    precise, paper : Motion
+    precise, paper : PreciseMotion
         By the projected method of order 8, and by modified Euler at 1 ms.
     """
 
@@ -44,19 +44,19 @@ class FigureRide:
 
     @property
     def both(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Times (n,) [s] that both have, and D of each there, shape (n, 2) [m]."""
+        """Times (n,) [s] common to both, and D of each at these times, shape (n, 2) [m]."""
         n = min(len(self.precise.time), len(self.paper.time))
         return self.precise.time[:n], self.precise.q[:n, :2], self.paper.q[:n, :2]
 
     @property
     def apart(self) -> np.ndarray:
-        """Distance of D between the two integrations at the times that both have, shape (n,) [m]."""
+        """Distance of D between the two integrations at their common times, shape (n,) [m]."""
         _, precise, paper = self.both
         return np.hypot(*(precise - paper).T)
 
 
 def while_pushed(motion: PreciseMotion, bicycle: Bicycle, surface: Surface) -> PreciseMotion:
-    """A motion up to the first sample at which the ground would have to pull a wheel: there it is off the ground."""
+    """Cut a motion before the first sample where the ground would have to pull a wheel, which leaves the ground."""
     seen = observe(bicycle, surface, motion.q, motion.qd)
     normal = np.einsum("nwi,nwi->nw", motion.force, seen.normal)
     pulled = np.flatnonzero(~np.all(normal > 0, axis=1))
@@ -64,17 +64,17 @@ def while_pushed(motion: PreciseMotion, bicycle: Bicycle, surface: Surface) -> P
         return motion
     n = int(pulled[0])
     ended = f"a wheel leaves the ground at t = {motion.time[n]:.6g} s"
-    kept: dict[str, Any] = {name: getattr(motion, name)[:n] for name in ("time", "q", "qd", "contact", "force")}
-    return replace(motion, ended=ended, **kept)
+    rows: dict[str, Any] = {name: getattr(motion, name)[:n] for name in ("time", "q", "qd", "contact", "force")}
+    return replace(motion, ended=ended, **rows)
 
 
 def radius_change(motion: PreciseMotion, circle: CircularMotion) -> np.ndarray:
-    """How far D is off its circle, shape (n,) [m]."""
+    """Return the distance of D from its circle, shape (n,) [m]."""
     return np.abs(np.hypot(*motion.q[:, :2].T) - np.hypot(*circle.position[:2]))
 
 
 def leaves_at(motion: PreciseMotion, circle: CircularMotion, share: float) -> float | None:
-    """First time at which D is off its circle by a share of the radius [s], or None."""
+    """Return the first time at which D is off its circle by a share of the radius [s], or None."""
     off = np.flatnonzero(radius_change(motion, circle) > share * np.hypot(*circle.position[:2]))
     return float(motion.time[off[0]]) if len(off) else None
 
@@ -84,43 +84,43 @@ def departure_figure(ride: FigureRide, circle: CircularMotion, growth_rate: floa
 
     Parameters
     ----------
-    ride : Ride
+    ride : FigureRide
     circle : CircularMotion
-        Where it starts.
+        Circle at the start.
     growth_rate : float
-        Of the linear theory [1/s].
+        Growth rate of the linear theory [1/s].
 
     Returns
     -------
     Figure
     """
-    figure, path, rates, growth = _panels("off the circle [m]", "wheel rates [rad/s]")
-    _circle(path, circle)
-    for motion, look in ((ride.precise, _with(_PRECISE, color=REAR)), (ride.paper, _PAPER)):
+    figure, path, rates, growth = _make_panels("off the circle [m]", "wheel rates [rad/s]")
+    _draw_circle(path, circle)
+    for motion, look in ((ride.precise, _change_style(_PRECISE, color=REAR)), (ride.paper, _PAPER)):
         path.plot(motion.q[:, 0], motion.q[:, 1], **look)
         path.plot(motion.q[-1, 0], motion.q[-1, 1], "x", color=look["color"], ms=6, mew=1.6, gid="end")
         rates.plot(motion.time, motion.qd[:, REAR_ANGLE], **look)
-        front = _with(look, color=FRONT) if motion is ride.precise else look
+        front = _change_style(look, color=FRONT) if motion is ride.precise else look
         rates.plot(motion.time, motion.qd[:, FRONT_ANGLE], **front)
         growth.plot(motion.time, np.maximum(radius_change(motion, circle), 1e-16), **look)
-    for wheel, words in ((REAR_ANGLE, "rear"), (FRONT_ANGLE, "front")):
+    for wheel, name in ((REAR_ANGLE, "rear"), (FRONT_ANGLE, "front")):
         rate = ride.precise.qd[0, wheel]
-        rates.annotate(words, (0, rate), (3, 5), textcoords="offset points", color=(REAR, FRONT)[wheel - REAR_ANGLE])
-    _guide(growth, ride.precise, circle, growth_rate)
+        rates.annotate(name, (0, rate), (3, 5), textcoords="offset points", color=(REAR, FRONT)[wheel - REAR_ANGLE])
+    _draw_theory(growth, ride.precise, circle, growth_rate)
     growth.set_ylim(1e-15, 1e2)
-    _legend(figure, [Line2D([], [], color=REAR, **_without_id(_PRECISE), label="precise, projected, order 8")])
+    _draw_legend(figure, [Line2D([], [], color=REAR, **_without_id(_PRECISE), label="precise, projected, order 8")])
     return figure
 
 
-def _guide(axes: Axes, motion: PreciseMotion, circle: CircularMotion, growth_rate: float) -> None:
-    """The linear theory's slope, below the precise curve."""
+def _draw_theory(axes: Axes, motion: PreciseMotion, circle: CircularMotion, growth_rate: float) -> None:
+    """Draw the slope of the linear theory below the precise curve."""
     off = radius_change(motion, circle)
     middle = int(np.argmin(np.abs(np.log(np.maximum(off, 1e-300)) - np.log(1e-7))))
     times = motion.time[middle] + np.array([-12.0, 12.0])
     values = off[middle] * np.exp(growth_rate * (times - motion.time[middle])) / 20
     axes.plot(times, values, color=GREY, lw=0.9, gid="theory")
-    words = f"exp({growth_rate:.3f} t)"
-    axes.annotate(words, (times[0], values[0]), (14, 0), textcoords="offset points", va="center")
+    text = f"exp({growth_rate:.3f} t)"
+    axes.annotate(text, (times[0], values[0]), (14, 0), textcoords="offset points", va="center")
 
 
 def disturbed_figure(
@@ -130,26 +130,26 @@ def disturbed_figure(
 
     Parameters
     ----------
-    rides : sequence of Ride
+    rides : sequence of FigureRide
         At most two.
     circle : CircularMotion
         The undisturbed motion.
     neighbours : mapping
-        Ride's name to the circular motion of its energy, to which it tends.
+        Circular motion of each ride's energy, to which the ride tends, by the ride's name.
 
     Returns
     -------
     Figure
     """
-    figure, path, rates, apart = _panels("integrators apart [m]", "rear-wheel rate [rad/s]")
+    figure, path, rates, apart = _make_panels("integrators apart [m]", "rear-wheel rate [rad/s]")
     lens = path.inset_axes((0.27, 0.27, 0.46, 0.46), xticks=[], yticks=[], aspect="equal")
     handles = []
     for ride, colour in zip(rides, DISTURBED_COLOURS, strict=False):
-        look, thin = _with(_PRECISE, color=colour, lw=1.6), _with(_PAPER, lw=0.55)
+        look, thin = _change_style(_PRECISE, color=colour, lw=1.6), _change_style(_PAPER, lw=0.55)
         early = ride.precise.time <= _FIRST
         for axes in (path, lens):
             x, y = ride.precise.q[early, :2].T
-            axes.plot(x, y, **_with(look, lw=0.7 if axes is path else 1.6))
+            axes.plot(x, y, **_change_style(look, lw=0.7 if axes is path else 1.6))
         x, y = ride.paper.q[: early.sum(), :2].T
         lens.plot(x, y, **thin)
         for motion, line in ((ride.precise, look), (ride.paper, thin)):
@@ -159,19 +159,19 @@ def disturbed_figure(
         apart.plot(ride.both[0][1:], ride.apart[1:], color=colour, lw=1.2, gid="apart")
         handles.append(Line2D([], [], color=colour, **_without_id(_PRECISE), label=f"{ride.name}, precise"))
     for axes in (path, lens):
-        _circle(axes, circle)
+        _draw_circle(axes, circle)
     reach = float(np.hypot(*circle.position[:2]))
     lens.set(xlim=(-1.11 * reach, -0.91 * reach), ylim=(-0.10 * reach, 0.10 * reach))
     path.indicate_inset_zoom(lens, edgecolor=GREY, lw=0.6)
     rates.axhline(circle.rear_rate, color=GREY, lw=0.9, gid="undisturbed")
     handles.append(Line2D([], [], color=GREY, lw=0.9, label="undisturbed"))
     handles.append(Line2D([], [], color=GREY, lw=0.9, ls=":", label="circle of equal energy"))
-    _legend(figure, handles)
+    _draw_legend(figure, handles)
     return figure
 
 
-def _panels(lower: str, upper: str) -> tuple[Figure, Axes, Axes, Axes]:
-    """A figure with a square panel for the path, and two above one another over time."""
+def _make_panels(lower: str, upper: str) -> tuple[Figure, Axes, Axes, Axes]:
+    """Make a figure with a square panel for the path, and two panels above one another over time."""
     figure = new_figure(3.9)
     panels = figure.subplot_mosaic([["path", "rates"], ["path", "lower"]], width_ratios=[1.0, 1.12])
     path, rates, last = panels["path"], panels["rates"], panels["lower"]
@@ -188,13 +188,13 @@ def _panels(lower: str, upper: str) -> tuple[Figure, Axes, Axes, Axes]:
     return figure, path, rates, last
 
 
-def _circle(axes: Axes, circle: CircularMotion) -> None:
+def _draw_circle(axes: Axes, circle: CircularMotion) -> None:
     around = np.linspace(0, 2 * np.pi, 361)
     reach = float(np.hypot(*circle.position[:2]))
     axes.plot(reach * np.cos(around), reach * np.sin(around), color=GREY, lw=0.9, gid="undisturbed")
 
 
-def _with(look: Mapping[str, Any], **changes: Any) -> dict[str, Any]:
+def _change_style(look: Mapping[str, Any], **changes: Any) -> dict[str, Any]:
     return {**look, **changes}
 
 
@@ -202,6 +202,6 @@ def _without_id(look: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in look.items() if name != "gid"}
 
 
-def _legend(figure: Figure, handles: list[Line2D]) -> None:
+def _draw_legend(figure: Figure, handles: list[Line2D]) -> None:
     handles = [*handles, Line2D([], [], **_without_id(_PAPER), label="modified Euler, 1 ms")]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))

@@ -17,6 +17,7 @@ import pytest
 from altered import Altered, pressing_ctrl_c, raising
 
 from tests.literature import published, rounds_to
+from tests.sealing import contents
 from velodrome.engines import engine as registry
 from velodrome.engines.engine import Engine, EngineError, Settings, Trajectory, engine_names, load_engine
 from velodrome.reference.bicycle import Bicycle
@@ -123,7 +124,7 @@ def test_run_as_json_is_one_document_and_the_rest_goes_to_stderr(velodrome, tmp_
     for entry in found["runs"]:
         assert set(entry) == {"scenario", "folder", "complete", "engines", "failures", "left_out", "verdicts"}
         folder = tmp_path / entry["folder"]
-        assert entry["engines"] == json.loads((folder / "metrics.json").read_text())
+        assert entry["engines"] == contents(folder / "metrics.json")
         assert "lean_rate = 0.2" in (folder / "scenario.toml").read_text()
     assert "reference" in result.stderr
     # Status 1 if and only if a verdict falls short.

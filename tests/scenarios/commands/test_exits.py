@@ -14,8 +14,8 @@ from altered import Altered
 from quitting import LINE, NAME, announce
 
 from velodrome.engines.engine import Engine, Settings, Trajectory
+from velodrome.scenarios import gate
 from velodrome.scenarios.commands import options
-from velodrome.scenarios.gate import checks as gate
 from velodrome.scenarios.gate.verdict import CHANGES, Verdict
 from velodrome.scenarios.run import runner
 from velodrome.scenarios.run.runner import configure_engine

@@ -16,6 +16,7 @@ import tomli_w
 from rerun.chunk import RrdReader
 from rich.console import Console
 
+from tests.sealing import age_folder, contents, sealed
 from velodrome.engines.storage import read_trajectory, write_trajectory
 from velodrome.scenarios.commands.present_diff import show_diff
 from velodrome.scenarios.compare.folders import diff_runs, read_pair, write_diff
@@ -95,7 +96,7 @@ def test_document_page_and_recording_are_written(folder: Path, halved: Path, tmp
     found = diff_runs(pair)
     paths = write_diff(pair, found, tmp_path / "out")
     assert [path.name for path in paths] == ["diff.json", "diff.md", "diff.rrd"]
-    assert json.loads(paths[0].read_text()) == found
+    assert contents(paths[0]) == found
     assert f"## {NATIVE}: differs" in paths[1].read_text()
     entities = {chunk.entity_path for chunk in RrdReader(str(paths[2])).stream()}
     roots = {re.split(r"(?<!\\)/", entity)[2] for entity in entities if entity.startswith("/world/")}
@@ -110,7 +111,7 @@ def test_document_page_and_recording_are_written(folder: Path, halved: Path, tmp
 
 def test_one_engine_beside_the_reference(folder: Path, halved: Path) -> None:
     assert list(diff_runs(read_pair(folder, halved, [NATIVE]))["engines"]) == ["reference", NATIVE]
-    with pytest.raises(ScenarioError, match="engine 'exudyn' is not in both runs; there are reference"):
+    with pytest.raises(ScenarioError, match=r"engine 'exudyn' is not in both runs \(there are reference"):
         read_pair(folder, halved, ["exudyn"])
 
 
@@ -119,7 +120,7 @@ def test_an_engine_that_is_gone_is_held_to_round_off(folder: Path, copy: Path) -
         manifest = json.loads((path / "manifest.json").read_text())
         assert NATIVE in manifest["engines"]
     manifest["engines"][NATIVE]["settings"]["unheard_of"] = 1
-    (copy / "manifest.json").write_text(json.dumps(manifest))
+    (copy / "manifest.json").write_text(sealed(manifest))
     found = diff_runs(read_pair(folder, copy))
     assert found["notes"] == [
         f"{NATIVE} is not installed here with such settings; its steps are allowed round-off only"
@@ -149,11 +150,28 @@ def test_another_start_is_refused(folder: Path, copy: Path) -> None:
     manifest = json.loads((copy / "manifest.json").read_text())
     # The root's own error is 1e-11 at the most.
     manifest["start"]["q"][0] += 5e-12
-    (copy / "manifest.json").write_text(json.dumps(manifest))
+    (copy / "manifest.json").write_text(sealed(manifest))
     assert diff_runs(read_pair(folder, copy))["same"]
     manifest["start"]["q"][0] += 1e-9
-    (copy / "manifest.json").write_text(json.dumps(manifest))
+    (copy / "manifest.json").write_text(sealed(manifest))
     with pytest.raises(ScenarioError, match="different starts: coordinates differ by up to 1e-09"):
+        read_pair(folder, copy)
+
+
+def test_a_folder_of_before_there_were_versions_is_compared(folder: Path, copy: Path) -> None:
+    age_folder(copy)
+    for pair in (read_pair(copy, folder), read_pair(folder, copy)):
+        found = diff_runs(pair)
+        assert found["same"]
+        # What the older one does not say is not taken for a difference of the rides.
+        assert "processor" in found["differs"]["platform"]
+
+
+def test_another_bicycle_is_told_by_its_parameter(folder: Path, copy: Path) -> None:
+    age_folder(copy)
+    scenario = tomllib.loads((copy / "scenario.toml").read_text())
+    (copy / "scenario.toml").write_text(tomli_w.dumps(scenario | {"bicycle": {"trail": 0.07}}))
+    with pytest.raises(ScenarioError, match=r"different scenarios: bicycle\.trail 0\.08 against 0\.07$"):
         read_pair(folder, copy)
 
 
@@ -191,6 +209,6 @@ def test_a_manifest_without_its_parts_gets_one_line(folder: Path, copy: Path, ma
 def test_a_damaged_start_is_told_in_words(folder: Path, copy: Path) -> None:
     manifest = json.loads((copy / "manifest.json").read_text())
     manifest["start"]["q"] = [0.0]
-    (copy / "manifest.json").write_text(json.dumps(manifest))
+    (copy / "manifest.json").write_text(sealed(manifest))
     with pytest.raises(ScenarioError, match=r"not the files of one run: a start has nine coordinates and nine rates$"):
         read_pair(folder, copy)

@@ -377,7 +377,7 @@ def test_an_engine_of_the_baseline_that_is_gone_fails(tmp_path: Path) -> None:
 
 
 def test_an_engine_that_is_nowhere_is_refused() -> None:
-    with pytest.raises(ScenarioError, match=r"'warp' is not installed; there are reference"):
+    with pytest.raises(ScenarioError, match=r"'warp' is not installed \(there are reference"):
         gate.check_gate(lambda *_: None, ["q2"], ["warp"])
 
 

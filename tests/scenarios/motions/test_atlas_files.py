@@ -7,6 +7,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from tests.sealing import contents
 from velodrome.engines.storage import METADATA_KEY
 from velodrome.reference.bicycle import Bicycle
 from velodrome.scenarios.error import ScenarioError
@@ -25,7 +26,7 @@ def test_an_atlas_is_written_whole(tmp_path: Path) -> None:
         "growth.png",
         "stable.png",
     ]
-    assert json.loads((out / "boundaries.json").read_text()) == document
+    assert contents(out / "boundaries.json") == document
     table = pq.read_table(out / "atlas.parquet")
     assert table.num_rows == document["motions"]
     for name, unit in UNITS.items():

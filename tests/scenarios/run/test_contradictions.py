@@ -13,6 +13,7 @@ import pytest
 from altered import CONTRADICTIONS, Altered, raising
 from typer.testing import CliRunner
 
+from tests.sealing import contents
 from velodrome.engines import engine as registry
 from velodrome.engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory, engine_names
 from velodrome.reports.drawing.summary import make_remarks
@@ -47,7 +48,7 @@ def test_a_run_names_every_report_that_contradicts_the_coordinates(what: str, tm
     inner, _ = configure_engine(REFERENCE, {})
     outcome = run_plan(plan_with(Altered(inner, after=after, called=OWN)), tmp_path, lambda *_: None, lambda _: None)
     assert not outcome.failures
-    measured = json.loads((outcome.folder / "metrics.json").read_text())
+    measured = contents(outcome.folder / "metrics.json")
     assert measured[REFERENCE]["inconsistent_reports"] == []
     found = measured[OWN]["inconsistent_reports"]
     assert {report["quantity"] for report in found} == named

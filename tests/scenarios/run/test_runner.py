@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from datetime import date
 from functools import cache
 from pathlib import Path
@@ -12,14 +13,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tomli_w
 from altered import RAISED_AT, Altered, pressing_ctrl_c, raising
 
+from tests.sealing import contents
 from velodrome.engines.engine import REFERENCE, EngineError, Trajectory
 from velodrome.engines.storage import read_trajectory
 from velodrome.scenarios.error import ScenarioError
-from velodrome.scenarios.run.folder import LIBRARIES, RunPlan
+from velodrome.scenarios.run.folder import LIBRARIES, RunPlan, resolve_scenario
+from velodrome.scenarios.run.machine import describe_machine, find_commit
 from velodrome.scenarios.run.runner import RunOutcome, configure_engine, plan_run, run_plan
-from velodrome.scenarios.scenario.schema import load_scenario
+from velodrome.scenarios.scenario.schema import Perturbation, load_scenario
 
 NATIVE = "mujoco-native"
 METRICS = {
@@ -95,7 +99,7 @@ def test_a_run_folder_has_all_its_files(tmp_path: Path) -> None:
 
 def test_metrics_have_every_quantity_and_are_those_of_the_outcome(tmp_path: Path) -> None:
     outcome, _ = ridden(plain(), tmp_path)
-    measured = read(outcome, "metrics.json")
+    measured = contents(outcome.folder / "metrics.json")
     assert measured == outcome.metrics
     assert list(measured) == [REFERENCE, NATIVE]
     assert set(measured[REFERENCE]) == set(measured[NATIVE]) == METRICS
@@ -115,10 +119,48 @@ def test_the_manifest_says_what_ran_where_and_from_what(tmp_path: Path) -> None:
         assert type(settings).model_validate(entry["settings"]) == settings
         assert entry["cpu_time"] == outcome.metrics[name]["cpu_time"]
     assert set(manifest["libraries"]) == set(LIBRARIES)
+    assert manifest["suite"] == find_commit()
+    assert manifest["platform"] == describe_machine()
     assert manifest["start"]["family"] == 2
     # Full precision: the state comes back to the bit.
     assert np.array_equal(manifest["start"]["q"], what.start.problem.q)
     assert np.array_equal(manifest["start"]["qd"], what.start.problem.qd)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        (
+            "q2-plus",
+            {"engines.mujoco-native.step": 0.005, "engines.mujoco-native.impedance": [0.9, 0.95, 0.002, 0.5, 2.0]},
+        ),
+        ("other-bicycle", {}),
+        ("waves-pushed", {"bicycle.trail": 0.07, "perturbation.x": 1 / 3}),
+        ("iftomm-2", {"engines.exudyn.step": 0.002}),
+    ],
+)
+def test_the_stored_scenario_is_resolved_and_the_same_problem_to_the_bit(
+    name: str, changes: dict[str, Any], tmp_path: Path
+) -> None:
+    first = plan(name, changes)
+    path = tmp_path / f"{name}.toml"
+    path.write_text(tomli_w.dumps(resolve_scenario(first).model_dump(exclude_none=True)))
+    stated = tomllib.loads(path.read_text())
+    assert stated["bicycle"] == asdict(first.start.problem.bicycle)
+    assert set(stated["perturbation"]) == set(Perturbation.model_fields)
+    again = plan_run(*load_scenario(str(path)), [NATIVE])
+    a, b = first.start.problem, again.start.problem
+    assert (a.bicycle, a.surface) == (b.bicycle, b.surface)
+    for x, y in ((a.q, b.q), (a.qd, b.qd), (a.times, b.times)):
+        assert x.tobytes() == y.tobytes()
+    assert {engine: settings for engine, (_, settings) in again.engines.items()} == {
+        engine: settings for engine, (_, settings) in first.engines.items()
+    }
+    for engine, (_, settings) in first.engines.items():
+        given = settings.model_dump(mode="json", exclude_none=True)
+        assert stated["engines"][engine] == given
+    # Settings of an engine that does not ride stay as they are.
+    assert stated["engines"].get("exudyn", {}) == first.scenario.engines.get("exudyn", {})
 
 
 def test_the_stored_scenario_runs_again_to_the_same_bits(tmp_path: Path) -> None:
@@ -173,7 +215,7 @@ def test_when_all_break_the_folder_says_why(tmp_path: Path) -> None:
     outcome, _ = ridden(with_engine(broken, NATIVE, raising(EngineError("two"))), tmp_path)
     assert outcome.failures == {REFERENCE: "one", NATIVE: "two"}
     assert names(outcome.folder) == {"scenario.toml", "manifest.json", "metrics.json", "report.html"}
-    assert read(outcome, "metrics.json") == {}
+    assert contents(outcome.folder / "metrics.json") == {}
 
 
 def test_ctrl_c_keeps_the_finished_engines_whole(tmp_path: Path) -> None:
@@ -184,7 +226,7 @@ def test_ctrl_c_keeps_the_finished_engines_whole(tmp_path: Path) -> None:
         *("scenario.toml", "manifest.json", "metrics.json", "report.html", "comparison.rrd", "reference.parquet")
     }
     assert len(read_trajectory(outcome.folder / "reference.parquet").time) == 11
-    assert set(read(outcome, "metrics.json")) == {REFERENCE}
+    assert set(contents(outcome.folder / "metrics.json")) == {REFERENCE}
     manifest = read(outcome, "manifest.json")
     assert not manifest["complete"]
     assert "cpu_time" in manifest["engines"][REFERENCE]
@@ -270,8 +312,8 @@ def test_the_criterion_is_the_energys_variation(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"engines.warp.step": 0.1}, "engine 'warp' is not installed; there are reference"),
-        ({"engines.mujoco-native.speed": 1}, "engines.mujoco-native: unknown key 'speed'; there are step"),
+        ({"engines.warp.step": 0.1}, r"engine 'warp' is not installed \(there are reference"),
+        ({"engines.mujoco-native.speed": 1}, r"engines.mujoco-native: unknown key 'speed' \(there are step"),
         ({"engines.mujoco-native.step": "0.002"}, "engines.mujoco-native.step: .* number"),
         ({"engines.mujoco-native.step": True}, "engines.mujoco-native.step: .* number"),
         ({"engines.mujoco-native.step": 0.003}, "engines.mujoco-native: step is 0.003; .* 0.0025"),
@@ -280,6 +322,27 @@ def test_the_criterion_is_the_energys_variation(tmp_path: Path) -> None:
 def test_a_bad_engine_table_never_reaches_the_engine(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(ScenarioError, match=words):
         plan(changes=changes)
+
+
+def test_all_that_is_wrong_with_engines_is_said_whether_they_ride_or_not() -> None:
+    changes = {
+        "engines.mujoco-default.stepp": 0.1,
+        "engines.exudyn.step": -1.0,
+        "engines.exudyn.solvr": "x",
+        "engines.reference.tolerance": 2,
+    }
+    with pytest.raises(ScenarioError) as caught:
+        plan_run(*load_scenario("q2", changes), ["exudin", NATIVE])
+    line = str(caught.value)
+    for words in (
+        "engine 'exudin' is not installed (did you mean 'exudyn'?)",
+        "engines.reference.tolerance: Input should be less",
+        "engines.mujoco-default: unknown key 'stepp' (did you mean 'step'?)",
+        "engines.exudyn.step: Input should be greater",
+        "engines.exudyn: unknown key 'solvr' (did you mean 'solver'?)",
+    ):
+        assert words in line
+    assert line.count("; ") == 4
 
 
 def test_only_wanted_engines_run_beside_the_reference() -> None:

@@ -152,7 +152,7 @@ def test_an_override_reaches_the_bicycle() -> None:
         ({"simulation__duration": 1e5}, ["samples", "5e6"]),
         # Bicycles.
         ({"bicycle__wheels": 3.0}, ["'wheels'", "wheelbase"]),
-        ({"bicycle__rear_frame_mass": -1.0}, ["rear_frame_mass", "-1.0", "positive"]),
+        ({"bicycle__rear_frame_mass": -1.0}, ["rear_frame_mass", "-1.0", "not be negative"]),
         ({"bicycle__rear_frame_mass": True}, ["bicycle.rear_frame_mass", "number"]),
         ({"bicycle__rear_frame_mass": 1e300}, ["bicycle.rear_frame_mass", "1e+300"]),
         ({"bicycle__front_wheel_Iyy": 0.3}, ["front_wheel_I", "rigid body"]),
@@ -172,8 +172,61 @@ def test_what_is_wrong_is_said_where_it_is(changes: dict[str, Any], words: list[
     assert "np.float64" not in line
 
 
-def test_of_several_faults_the_first_is_said_and_the_rest_counted() -> None:
-    assert complaint({}).startswith("a.toml: title: is missing; and 3 more")
+def test_all_faults_are_said() -> None:
+    missing = [f"{name}: is missing" for name in ("title", "surface", "motion", "simulation")]
+    assert complaint({}) == f"a.toml: {'; '.join(missing)}"
+
+
+def test_of_very_many_faults_twenty_are_said_and_the_rest_counted() -> None:
+    line = complaint(data(tags=list(range(30))))
+    assert line.count("; ") == 20
+    assert line.endswith("; and 10 more")
+
+
+NEWCOMER = [
+    "unknown key 'simulaton' (did you mean 'simulation'?)",
+    "surface.kind: unknown kind 'parabola' (did you mean 'paraboloid'?)",
+    "motion.rear_rate: Input should be a valid number (it is '18')",
+    "perturbation.lean_rate: Input should be less than or equal to 1000000 (it is 10000000.0)",
+    "engines.mujoco-native: unknown key 'stepp' (did you mean 'step'?)",
+]
+
+
+def test_a_newcomer_is_told_five_mistakes_at_once() -> None:
+    path = Path(__file__).parents[2] / "cases" / "newcomer.toml"
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(str(path))
+    assert str(caught.value) == f"{path}: {'; '.join(NEWCOMER)}"
+
+
+def test_what_a_misspelt_table_holds_is_checked_too() -> None:
+    tables = data()
+    tables["simulaton"] = tables.pop("simulation") | {"duration": -1.0}
+    line = complaint(tables)
+    assert "'simulaton' (did you mean 'simulation'?); simulation.duration: " in line
+    # It is not missing besides.
+    assert "missing" not in line
+
+
+def test_all_parameters_that_no_bicycle_has_are_said() -> None:
+    line = complaint(data(bicycle={"trial": 0.1, "wheelbase": -1.0, "gravity": 0.0}))
+    for words in ("'trial' is unknown (did you mean 'trail'?)", "wheelbase is -1.0", "gravity is 0.0"):
+        assert words in line
+
+
+def test_all_changes_are_checked_at_once() -> None:
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario("q2", {"title.x": 1, "surface.alpa": 2, "tags.y.z": 3})
+    assert str(caught.value) == (
+        "--set title.x: title is no table; --set tags.y.z: tags is no table; "
+        "q2: surface: unknown key 'alpa' (did you mean 'alpha'?)"
+    )
+
+
+@pytest.mark.parametrize(("source", "meant"), [("q2-pluss", "q2-plus"), ("Sphere", "sphere"), ("planecircle", "plane")])
+def test_a_scenario_that_is_meant_is_named(source: str, meant: str) -> None:
+    with pytest.raises(ScenarioError, match=f"did you mean '{meant}"):
+        load_scenario(source)
 
 
 @given(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.sealing import contents
 from velodrome.engines.admission import ride_engine
 from velodrome.engines.engine import REFERENCE, load_engine
 from velodrome.reports.measure.metrics import position_errors
@@ -131,7 +132,7 @@ def test_steps_that_share_no_output_interval_are_refused_in_one_line() -> None:
 def test_document_and_figure_are_written(tmp_path: Path) -> None:
     written = write_precision(soft(), tmp_path / "found")
     assert [path.name for path in written] == ["precision-q1.json", "precision-q1.png"]
-    assert json.loads(written[0].read_text()) == soft()
+    assert contents(written[0]) == soft()
     assert written[1].read_bytes().startswith(b"\x89PNG")
     assert sorted(tmp_path.rglob("*.*")) == sorted(written)
     blocked = tmp_path / "file"

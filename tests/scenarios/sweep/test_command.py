@@ -53,7 +53,7 @@ def test_workers_belong_to_this_machine(in_process: Path) -> None:
     ("retry", "resume", "said"),
     [
         (["timeout"], False, "--retry: it belongs to --resume"),
-        (["timeout", "late"], True, "--retry late: no row has such a status; there are done, fell, ended, no-motion"),
+        (["timeout", "late"], True, r"--retry late: no row has such a status \(there are done, fell, ended, no-motion"),
     ],
 )
 def test_what_is_to_be_tried_again_must_be_a_status(
@@ -79,7 +79,7 @@ def test_a_stopped_retry_says_how_to_go_on(
     assert command.run_sweep_command(path, None, None, None, resume=True, as_json=False, retry=["done", "fell"]) == 130
     said = " ".join(capsys.readouterr().out.split())
     assert "--resume --retry done --retry fell" in said
-    assert "3 of 3 runs are missing, what is done is kept" in said
+    assert "3 of 3 runs are missing, finished runs are kept" in said
 
 
 def test_the_live_view_counts_and_says_what_failed_and_why(tmp_path: Path) -> None:

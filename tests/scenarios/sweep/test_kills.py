@@ -109,7 +109,7 @@ def test_a_disk_without_room_stops_the_sweep_and_loses_nothing(tmp_path: Path) -
     assert "cannot write: File too large" in text
     assert (out / JOURNAL).stat().st_size <= 100_000
     kept = lines(out)
-    assert f"{1500 - kept} of 1500 runs are missing, what is done is kept" in text
+    assert f"{1500 - kept} of 1500 runs are missing, finished runs are kept" in text
     process = started(path, out, resume=True)
     text, _ = process.communicate(timeout=120)
     assert process.returncode == 0, text

@@ -15,6 +15,7 @@ import pytest
 from sweeping import UPRIGHT, data_set, here, planned, rows, swept
 
 from velodrome.engines.admission import ride_engine
+from velodrome.engines.storage import METADATA_KEY
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reports.measure import flatten_metrics
 from velodrome.scenarios.error import ScenarioError
@@ -25,7 +26,7 @@ from velodrome.scenarios.sweep.journal import finished_rows
 from velodrome.scenarios.sweep.plan import Task, plan_sweep
 from velodrome.scenarios.sweep.pool import Done
 from velodrome.scenarios.sweep.run import Work, run_sweep
-from velodrome.scenarios.sweep.store import JOURNAL, MANIFEST, RESULTS, TIMINGS
+from velodrome.scenarios.sweep.store import JOURNAL, MANIFEST, RESULTS, TIMINGS, part_of
 from velodrome.scenarios.sweep.summary import status_of, summarise_sweep
 from velodrome.scenarios.sweep.task import Tasks
 from velodrome.scenarios.sweep.worker import Setup
@@ -206,11 +207,25 @@ def test_rows_of_another_sweep_are_refused_and_kept(tmp_path: Path) -> None:
         swept(other, tmp_path / "other", resume=True)
 
 
+def test_every_part_of_the_data_set_says_its_format(tmp_path: Path) -> None:
+    plan, out = planned(tmp_path, LEANING), tmp_path / "out"
+    swept(plan, out)
+    for path in (part_of(out, "reference"), out / TIMINGS):
+        found = json.loads((pq.read_schema(path).metadata or {})[METADATA_KEY])
+        assert found == {"schema_version": 1}
+
+
 def test_a_sweep_of_an_earlier_version_is_refused_with_what_to_do(tmp_path: Path) -> None:
     plan, out = planned(tmp_path, LEANING), tmp_path / "out"
     swept(plan, out)
     manifest = json.loads((out / MANIFEST).read_text())
-    del manifest["format"]
+    assert manifest.pop("schema_version") == 2
+    # As it was called before.
+    (out / MANIFEST).write_text(json.dumps(manifest | {"format": 2}))
+    assert swept(plan, out, resume=True).missing == 0
+    (out / MANIFEST).write_text(json.dumps(manifest | {"schema_version": 3}))
+    with pytest.raises(ScenarioError, match="its schema_version is 3, and this velodrome reads up to 2"):
+        swept(plan, out, resume=True)
     (out / MANIFEST).write_text(json.dumps(manifest))
     with pytest.raises(ScenarioError, match=r"begun by another version of velodrome.* in another folder by --out"):
         swept(plan, out, resume=True)
@@ -248,7 +263,7 @@ def test_another_time_limit_asks_for_the_rows_that_it_ended(tmp_path: Path) -> N
     out = tmp_path / "out"
     swept(planned(tmp_path, LEANING), out, slow(1))
     longer = planned(tmp_path, LEANING.replace("60.0", "600.0"))
-    with pytest.raises(ScenarioError, match=r"status timeout that are of time_limit 60\.0, .* by --retry timeout"):
+    with pytest.raises(ScenarioError, match=r"status timeout under time_limit 60\.0, .* with --retry timeout"):
         swept(longer, out, resume=True)
     assert run_sweep(longer, out, here, True, lambda *_: None, ["timeout"]).counts == {"reference": {"done": 4}}
     assert swept(longer, out, resume=True).stopped is None

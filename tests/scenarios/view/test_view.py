@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -18,6 +19,7 @@ from typing import Any
 
 import pytest
 
+from tests.sealing import age_folder, change_document
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run.runner import plan_run, run_plan
 from velodrome.scenarios.scenario.schema import load_scenario
@@ -232,11 +234,19 @@ def test_broken_files_are_refused_in_one_line(name: str, content: str, copy: Pat
 
 
 def test_a_manifest_without_versions_is_refused(copy: Path):
-    manifest = json.loads((copy / "manifest.json").read_text())
-    del manifest["libraries"]
-    (copy / "manifest.json").write_text(json.dumps(manifest))
+    change_document(copy / "manifest.json", lambda manifest: manifest.pop("libraries"))
     with pytest.raises(ScenarioError, match="libraries"):
         view.stored_page(copy)
+
+
+def test_the_page_of_a_folder_of_before_there_were_versions(copy: Path):
+    page = view.stored_page(copy)
+    assert page == (copy / "report.html").read_text(encoding="utf-8")
+    age_folder(copy)
+    # It says less of the machine, and everything else as before.
+    rows = set(page.splitlines()) - set(view.stored_page(copy).splitlines())
+    assert rows
+    assert all(re.search(r'<th scope="row">(processor|blas_\w+|openblas_coretype)</th>', row) for row in rows)
 
 
 def test_what_is_asked_of_a_folder_without_a_recording(tmp_path: Path):

@@ -1,0 +1,93 @@
+"""Settings of engines as a scenario file states them, each checked by its engine."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from ...engines.engine import Engine, Settings, engine_names, load_engine, why_failed
+from ...engines.guard import call_engine
+from ...engines.names import suggest_name
+from ..error import ScenarioError
+from .table import UnknownName, join_complaints, list_complaints, list_unknown, show_value
+
+
+def configure_engine(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
+    """Load an engine and validate its settings.
+
+    Raises
+    ------
+    ScenarioError
+        If it is no engine, or settings are unknown or out of range: all of them in one line.
+    """
+    try:
+        engine = load_engine(name)
+    except ValueError as error:
+        raise ScenarioError(" ".join(str(error).split())) from error
+    where = f"engines.{name}"
+    known = engine.settings.model_fields
+    complaints = [f"{where}: {line}" for line in list_unknown(values, known)]
+    cause: Exception | None = UnknownName(complaints[0]) if complaints else None
+    try:
+        # As JSON: strictness would refuse a TOML array where a setting is a tuple.
+        text = json.dumps({key: value for key, value in values.items() if key in known}, default=str)
+        settings = call_engine(engine.settings.model_validate_json, text, strict=True)
+    except ValidationError as error:
+        cause = cause or error
+        complaints += [f"{where}.{line}" for line in list_complaints(error)]
+    except ValueError as error:
+        cause = cause or error
+        complaints.append(f"{where}: {error}")
+    except Exception as error:  # settings may have code of their own
+        raise ScenarioError(f"{where}: its settings failed: {why_failed(error)}") from error
+    else:
+        if not complaints:
+            return engine, settings
+    raise ScenarioError(join_complaints(complaints)) from cause
+
+
+def list_engine_faults(engines: Any, skipped: Collection[str] = ()) -> list[str]:
+    """Say everything wrong with the tables ``[engines.NAME]`` of a scenario, whether the engines ride or not.
+
+    Parameters
+    ----------
+    engines : Any
+        Settings by engine. What is no table is left to the schema, and an engine that is installed and cannot be
+        loaded to the run that needs it.
+    skipped : collection of str
+        Engines that are not looked at.
+    """
+    if not isinstance(engines, Mapping):
+        return []
+    try:
+        there = engine_names()
+    except ValueError:  # two packages announce one engine: no fault of the scenario
+        return []
+    faults = []
+    for name, values in engines.items():
+        if name in skipped:
+            continue
+        if name not in there:
+            faults.append(refuse_engine(name, there))
+        elif isinstance(values, Mapping) and _loads(name):
+            try:
+                configure_engine(name, values)
+            except ScenarioError as error:
+                faults.append(str(error))
+    return faults
+
+
+def refuse_engine(name: str, there: Collection[str]) -> str:
+    """Say that an engine is not installed, and which may be meant."""
+    return f"engine {show_value(repr(name))} is not installed ({suggest_name(name, there)})"
+
+
+def _loads(name: str) -> bool:
+    try:
+        load_engine(name)
+    except ValueError:
+        return False
+    return True

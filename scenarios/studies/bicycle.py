@@ -1,0 +1,172 @@
+"""A bicycle by itself: its parameters, canonical matrices, and eigenvalues of upright motion over speed."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...reference.bicycle import Bicycle
+from ...reference.upright import (
+    CanonicalMatrices,
+    StabilityChange,
+    canonical_matrices,
+    capsize_speed,
+    name_modes,
+    speed_deviations,
+    stability_changes,
+    stable_speeds,
+    weave_speed,
+)
+from ..error import ScenarioError
+from ..files import make_folder, write_json
+from ..scenario import BicycleFile, load_scenario, read_bicycle_file, read_toml
+
+BENCHMARK = "benchmark"
+
+
+@dataclass(frozen=True)
+class BicycleStudy:
+    """What the linearised equations of upright straight motion say of a bicycle.
+
+    Attributes
+    ----------
+    source : BicycleFile
+        The bicycle, with the deviations of its parameters.
+    matrices : CanonicalMatrices
+    speeds : ndarray, shape (n,)
+        Forward speeds [m/s].
+    eigenvalues : ndarray, shape (n, 4), complex
+        Sorted by real part, then imaginary part [1/s].
+    followed : ndarray, shape (n, 4), complex
+        The same eigenvalues, a column for each mode that ``modes`` names [1/s].
+    modes : tuple of str
+    weave_speed, capsize_speed : float or None
+        [m/s].
+    deviations : dict
+        Standard deviations of both speeds from those of the parameters [m/s]; empty if the parameters have none.
+    changes : list of StabilityChange
+        Every speed at which a mode becomes stable or unstable.
+    stable_speeds : list of (float, float)
+        Ranges of speed with all real parts negative [m/s]; the last may end at infinity.
+    """
+
+    source: BicycleFile
+    matrices: CanonicalMatrices
+    speeds: np.ndarray
+    eigenvalues: np.ndarray
+    followed: np.ndarray
+    modes: tuple[str, ...]
+    weave_speed: float | None
+    capsize_speed: float | None
+    deviations: dict[str, float | None]
+    changes: list[StabilityChange]
+    stable_speeds: list[tuple[float, float]]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the JSON document of `velodrome bicycle`; a range without end has null there."""
+        m = self.matrices
+        return {
+            "name": self.source.name,
+            "convention": self.source.convention,
+            "parameters": asdict(self.source.bicycle),
+            "uncertainties": self.source.uncertainties,
+            "ignored": list(self.source.ignored),
+            "warnings": list(self.source.bicycle.warnings()),
+            "canonical": {name: getattr(m, name).tolist() for name in ("M", "C1", "K0", "K2")},
+            "speeds": self.speeds.tolist(),
+            "eigenvalues": _pairs(self.eigenvalues),
+            "modes": {"names": list(self.modes), "eigenvalues": _pairs(self.followed)},
+            "weave_speed": self.weave_speed,
+            "capsize_speed": self.capsize_speed,
+            "speed_deviations": self.deviations,
+            "stability_changes": [asdict(change) for change in self.changes],
+            "stable_speeds": [[start, None if end == inf else end] for start, end in self.stable_speeds],
+        }
+
+
+def _pairs(values: np.ndarray) -> list[list[list[float]]]:
+    return [[[value.real, value.imag] for value in row] for row in values.tolist()]
+
+
+def find_bicycle(source: str) -> BicycleFile:
+    """Read a bicycle from wherever it is described.
+
+    Parameters
+    ----------
+    source : str
+        ``benchmark``, a bicycle file (see `read_bicycle_file`), or a scenario by library name or path.
+
+    Raises
+    ------
+    ScenarioError
+        If there is none.
+    """
+    if source == BENCHMARK:
+        return BicycleFile(BENCHMARK, Bicycle(), convention="the suite's names, z up")
+    path = Path(source)
+    if path.suffix == ".toml" and path.is_file():
+        try:
+            is_scenario = bool({"motion", "simulation"} & set(read_toml(path.read_text(encoding="utf-8-sig"))))
+        except (OSError, ValueError):
+            is_scenario = False  # the reader of bicycle files says what is wrong
+        if not is_scenario:
+            return read_bicycle_file(path)
+    elif path.suffix or path.exists():
+        return read_bicycle_file(path)
+    name, scenario = load_scenario(source)
+    return BicycleFile(name, scenario.make_bicycle(), convention="the suite's names, z up")
+
+
+def study_bicycle(source: BicycleFile, speeds: np.ndarray) -> BicycleStudy:
+    """Compute a bicycle's canonical matrices, its eigenvalues over speed, and where its stability changes.
+
+    Parameters
+    ----------
+    source : BicycleFile
+    speeds : ndarray, shape (n,)
+        Not negative [m/s].
+
+    Returns
+    -------
+    BicycleStudy
+
+    Raises
+    ------
+    ScenarioError
+        If the equations of lean and steer are singular.
+    """
+    matrices = canonical_matrices(source.bicycle)
+    try:
+        eigenvalues = matrices.eigenvalues(speeds)
+        followed, modes = name_modes(matrices, speeds)
+    except ValueError as error:
+        raise ScenarioError(f"bicycle {source.name}: {error}") from error
+    return BicycleStudy(
+        source=source,
+        matrices=matrices,
+        speeds=speeds,
+        eigenvalues=eigenvalues,
+        followed=followed,
+        modes=tuple(str(mode) for mode in modes),
+        weave_speed=weave_speed(matrices),
+        capsize_speed=capsize_speed(matrices),
+        deviations=speed_deviations(source.bicycle, source.uncertainties) if source.uncertainties else {},
+        changes=stability_changes(matrices),
+        stable_speeds=stable_speeds(matrices),
+    )
+
+
+def write_bicycle(study: BicycleStudy, out: Path) -> list[Path]:
+    """Write the document and the figure of a study into a folder, and return their paths."""
+    # matplotlib, which the document does not need.
+    from ...reports.figures import eigenvalue_figure
+
+    make_folder(out)
+    document, figure = out / "bicycle.json", out / "eigenvalues.png"
+    write_json(document, study.as_json())
+    eigenvalue_figure(figure, study.source.name, study.speeds, study.followed, study.modes, study.stable_speeds)
+    return [document, figure]

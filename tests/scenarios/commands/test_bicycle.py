@@ -1,0 +1,55 @@
+"""`velodrome bicycle`: a bicycle by itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+CASES = Path(__file__).parents[2] / "cases"
+
+
+def test_the_document_is_complete(velodrome) -> None:
+    found = velodrome("bicycle", "--speeds", "0,5,8", "--json").json()
+    assert found["weave_speed"] == pytest.approx(4.29238253634111, abs=1e-13)
+    assert found["capsize_speed"] == pytest.approx(6.02426201538837, abs=1e-13)
+    assert found["stable_speeds"] == [[found["weave_speed"], found["capsize_speed"]]]
+    assert found["speeds"] == [0.0, 5.0, 8.0]
+    assert np.shape(found["eigenvalues"]) == (3, 4, 2)
+    assert found["modes"]["names"] == ["weave", "weave", "capsize", "castering"]
+    assert (found["uncertainties"], found["warnings"], found["speed_deviations"]) == ({}, [], {})
+    assert found["parameters"]["rear_frame_Ixz"] == -2.4
+    assert {name: np.shape(matrix) for name, matrix in found["canonical"].items()} == dict.fromkeys(
+        ("M", "C1", "K0", "K2"), (2, 2)
+    )
+
+
+def test_the_two_mass_skate_is_stable_without_gyroscopes_and_trail(velodrome) -> None:
+    """Kooijman et al. (2011): massless wheels, point masses, no trail; the speed from Meijaard's matrices."""
+    found = velodrome("bicycle", str(CASES / "tms-exact.toml"), "--json").json()
+    assert found["weave_speed"] == pytest.approx(2.841008323, abs=5e-10)
+    assert found["stable_speeds"] == [[found["weave_speed"], None]]
+
+
+def test_the_table_and_files_are_written(velodrome, tmp_path: Path) -> None:
+    result = velodrome("bicycle", "--out", str(tmp_path / "found"))
+    assert "weave speed: 4.29238253634 m/s" in result.stdout
+    assert {path.name for path in (tmp_path / "found").iterdir()} == {"bicycle.json", "eigenvalues.png"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["bicycle", "--speeds", "5:1"], "--speeds '5:1': must be a range FROM:TO"),
+        (["bicycle", "--speeds", "fast"], "--speeds 'fast'"),
+        (["bicycle", "--speeds", "-1:3"], "--speeds '-1:3'"),
+        (["bicycle", "nowhere.txt"], "nowhere.txt: there is no such file"),
+        (["bicycle", "nothing"], "no scenario 'nothing' in the library"),
+    ],
+)
+def test_bad_input_is_one_line(velodrome, arguments: list[str], said: str) -> None:
+    result = velodrome(*arguments)
+    assert (result.status, result.stdout) == (2, "")
+    assert said in result.stderr
+    assert result.stderr.count("\n") == 1
