@@ -49,5 +49,5 @@ $(STAMP): pyproject.toml constraints.txt
 
 $(LOWEST_STAMP): pyproject.toml constraints-lowest.txt
 	$(PYTHON) -m venv $(LOWEST)
-	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints-lowest.txt --editable '.[benchmark,cluster]' hypothesis pillow pytest pytest-xdist
+	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints-lowest.txt --editable '.[benchmark,cluster]' hypothesis jsonschema pillow pytest pytest-xdist
 	touch $@

@@ -214,7 +214,10 @@ class Settings(BaseModel):
 
 
 class Engine(Protocol):
-    """A multibody engine that rides the bicycle."""
+    """A multibody engine that rides the bicycle.
+
+    It may have a ``description`` besides: what it is, one line of text, which `velodrome show` tells.
+    """
 
     @property
     def name(self) -> str:
@@ -353,6 +356,15 @@ def load_engine(name: str) -> Engine:
     return GuardedEngine(engine, **{fact: members[fact] for fact in _FACTS})
 
 
+def describe_engine(engine: Engine) -> str:
+    """Say in a line what an engine is: its ``description`` if it has one, else the first line of its docstring."""
+    own = engine.inner if isinstance(engine, GuardedEngine) else engine
+    text = getattr(own, "description", None)
+    if not isinstance(text, str) or not text.strip():
+        text = next(iter((type(own).__doc__ or "").strip().splitlines()), "")
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+
+
 def why_failed(error: Exception) -> str:
     """Say in one line why an engine failed: its own words where it chose them, else what broke in which line."""
     if isinstance(error, EngineError):
@@ -360,6 +372,18 @@ def why_failed(error: Exception) -> str:
     place = None if isinstance(error, UnsuitableProblem) else where_raised(error)
     words = f"{type(error).__name__}: {error}" + (f" ({place})" if place else "")
     return " ".join(words.split())
+
+
+def package_of(name: str) -> str | None:
+    """Return the distribution that announces an installed engine; None where the entry point does not say.
+
+    Raises
+    ------
+    KeyError
+        If no engine of that name is installed.
+    """
+    distribution = _announced()[name].dist
+    return None if distribution is None else distribution.name
 
 
 @cache

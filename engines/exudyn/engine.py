@@ -33,6 +33,8 @@ class ExudynEngine:
     name : str
     settings : type
         Model of its settings.
+    description : str
+        What it is, in a line.
     put_on_ground : callable
         Imports and returns its way to put the wheels on the ground.
     level_only : bool
@@ -41,6 +43,7 @@ class ExudynEngine:
 
     name: str
     settings: type[SolverSettings]
+    description: str
     put_on_ground: Callable[[], PutOnGround]
     level_only: bool = False
     gives = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
@@ -158,6 +161,17 @@ def _roll_discs() -> PutOnGround:
     return roll_discs
 
 
-ENGINE = ExudynEngine("exudyn", ExudynSettings, _constrain)
-PLANE_NORMAL = ExudynEngine("exudyn-plane-normal", SolverSettings, _roll_discs_on_tangents)
-BUILTIN = ExudynEngine("exudyn-builtin", SolverSettings, _roll_discs, level_only=True)
+ENGINE = ExudynEngine("exudyn", ExudynSettings, "Exudyn with true knife-edge rolling joints on any surface", _constrain)
+PLANE_NORMAL = ExudynEngine(
+    "exudyn-plane-normal",
+    SolverSettings,
+    "Exudyn with its own rolling discs on moving tangent planes",
+    _roll_discs_on_tangents,
+)
+BUILTIN = ExudynEngine(
+    "exudyn-builtin",
+    SolverSettings,
+    "Exudyn with its own rolling discs on the level plane, as it is",
+    _roll_discs,
+    level_only=True,
+)

@@ -13,7 +13,11 @@ class SolverSettings(Settings):
     """What every model in Exudyn is solved with."""
 
     step: float = Field(
-        default=1e-3, ge=1e-6, le=0.05, description="Step size [s]; the output interval is a multiple of it."
+        default=1e-3,
+        ge=1e-6,
+        le=0.05,
+        description="Step size [s]; the output interval is a multiple of it.",
+        json_schema_extra={"unit": "s"},
     )
     solver: Literal["generalized-alpha", "trapezoidal-index2"] = Field(
         default="generalized-alpha",
@@ -26,6 +30,7 @@ class SolverSettings(Settings):
         lt=1,
         description="Generalized alpha's spectral radius at infinite frequency: below 1, or errors of the contact "
         "forces never die out. The trapezoidal rule has none.",
+        json_schema_extra={"unit": "1"},
     )
     jacobian: Literal["iteration", "step", "reuse"] = Field(
         default="step",
@@ -40,9 +45,14 @@ class SolverSettings(Settings):
         "the forces' imbalance [kN] and of the constraints' violation [m; of slip, m in a step]. The library starts "
         "every step without constraint forces, so it falls from the bodies' weights, 0.84 kN for the benchmark "
         "bicycle: 1e-11 lets go of 8e-12 m, and of a slip of some 2e-8 m/s at a step of 1 ms.",
+        json_schema_extra={"unit": "1"},
     )
     newton_absolute_tolerance: float = Field(
-        default=1e-12, gt=0, le=1e-4, description="Newton's method stops below this residual [kN and m, one norm]."
+        default=1e-12,
+        gt=0,
+        le=1e-4,
+        description="Newton's method stops below this residual [kN and m, one norm].",
+        json_schema_extra={"unit": "kN, m"},
     )
 
 

@@ -13,4 +13,9 @@ from __future__ import annotations
 from .engine import MujocoEngine
 from .settings import DefaultSettings
 
-ENGINE = MujocoEngine("mujoco-default", DefaultSettings, "velodrome.engines.mujoco.planes:build_planes")
+ENGINE = MujocoEngine(
+    "mujoco-default",
+    DefaultSettings,
+    "velodrome.engines.mujoco.planes:build_planes",
+    description="MuJoCo with the options that it has when nobody sets any: soft contacts on tangent planes",
+)

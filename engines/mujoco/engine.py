@@ -52,12 +52,15 @@ class MujocoEngine(Generic[S]):
     builder : str
         Module and name of the function that makes a `Rig` of a problem and settings. It is imported when
         something runs, so that listing the engines does not load the library.
+    description : str
+        What it is, in a line.
     gives : tuple of str
     """
 
     name: str
     settings: type[S]
     builder: str
+    description: str
     gives: tuple[str, ...] = GIVES
 
     @property

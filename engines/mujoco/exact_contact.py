@@ -11,4 +11,9 @@ from __future__ import annotations
 from .engine import MujocoEngine
 from .settings import ExactContactSettings
 
-ENGINE = MujocoEngine("mujoco-exact-contact", ExactContactSettings, "velodrome.engines.mujoco.edges:build_contacts")
+ENGINE = MujocoEngine(
+    "mujoco-exact-contact",
+    ExactContactSettings,
+    "velodrome.engines.mujoco.edges:build_contacts",
+    description="MuJoCo's contact solver on exact knife-edge contacts, with nearly rigid rows",
+)

@@ -11,4 +11,9 @@ from __future__ import annotations
 from .engine import MujocoEngine
 from .settings import MultiplierSettings
 
-ENGINE = MujocoEngine("mujoco-multipliers", MultiplierSettings, "velodrome.engines.mujoco.edges:build_multipliers")
+ENGINE = MujocoEngine(
+    "mujoco-multipliers",
+    MultiplierSettings,
+    "velodrome.engines.mujoco.edges:build_multipliers",
+    description="MuJoCo's tree and integrator under the exact forces of rolling, without its contacts",
+)

@@ -18,4 +18,9 @@ from __future__ import annotations
 from .engine import MujocoEngine
 from .settings import NativeSettings
 
-ENGINE = MujocoEngine("mujoco-native", NativeSettings, "velodrome.engines.mujoco.planes:build_planes")
+ENGINE = MujocoEngine(
+    "mujoco-native",
+    NativeSettings,
+    "velodrome.engines.mujoco.planes:build_planes",
+    description="MuJoCo as a careful user sets it: stiff contacts on tangent planes, hard friction",
+)

@@ -35,7 +35,13 @@ Integrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
 class StepSettings(Settings):
     """How MuJoCo steps through time."""
 
-    step: float = Field(default=0.002, ge=1e-6, le=0.02, description="time step [s]; must divide the output interval")
+    step: float = Field(
+        default=0.002,
+        ge=1e-6,
+        le=0.02,
+        description="time step [s]; must divide the output interval",
+        json_schema_extra={"unit": "s"},
+    )
     integrator: Integrator = Field(
         default="RK4", description="MuJoCo's integrator; RK4 is of order 4, the others are of order 1"
     )
@@ -59,27 +65,44 @@ class ContactSettings(StepSettings):
         gt=0,
         le=1,
         description="time constant of the contacts (solref) [s], at least twice the step; twice the step if not given",
+        json_schema_extra={"unit": "s"},
     )
-    damping_ratio: float = Field(default=1.0, gt=0, le=100, description="damping ratio of the contacts (solref)")
+    damping_ratio: float = Field(
+        default=1.0, gt=0, le=100, description="damping ratio of the contacts (solref)", json_schema_extra={"unit": "1"}
+    )
     impedance: Impedances = Field(
         default=IMPEDANCES,
         description="impedance of the contacts (solimp): least, largest, width of the way between [m], midpoint, power",
+        json_schema_extra={"unit": "1, 1, m, 1, 1"},
     )
     impratio: float = Field(
         default=10.0,
         gt=0,
         le=1e6,
         description="how much harder friction is than the normal direction; from 10 on it hardly matters",
+        json_schema_extra={"unit": "1"},
     )
     cone: Literal["elliptic", "pyramidal"] = Field(default="elliptic", description="friction cone")
     friction: float = Field(
-        default=2.0, gt=0, le=100, description="coefficient of sliding friction, the same in all directions"
+        default=2.0,
+        gt=0,
+        le=100,
+        description="coefficient of sliding friction, the same in all directions",
+        json_schema_extra={"unit": "1"},
     )
     noslip_iterations: int = Field(
-        default=0, ge=0, le=1000, description="iterations of the pass that makes friction hard after the solver"
+        default=0,
+        ge=0,
+        le=1000,
+        description="iterations of the pass that makes friction hard after the solver",
+        json_schema_extra={"unit": "1"},
     )
     tolerance: float = Field(
-        default=1e-8, gt=0, le=1e-2, description="relative tolerance at which MuJoCo's contact solver stops"
+        default=1e-8,
+        gt=0,
+        le=1e-2,
+        description="relative tolerance at which MuJoCo's contact solver stops",
+        json_schema_extra={"unit": "1"},
     )
 
     @property
@@ -149,14 +172,26 @@ class DefaultSettings(ContactSettings):
 
     integrator: Integrator = Field(default="Euler", description=_ON_PLANES)
     time_constant: float | None = Field(
-        default=0.02, gt=0, le=1, description="time constant of the contacts (solref) [s], at least twice the step"
+        default=0.02,
+        gt=0,
+        le=1,
+        description="time constant of the contacts (solref) [s], at least twice the step",
+        json_schema_extra={"unit": "s"},
     )
     impratio: float = Field(
-        default=1.0, gt=0, le=1e6, description="how much harder friction is than the normal direction"
+        default=1.0,
+        gt=0,
+        le=1e6,
+        description="how much harder friction is than the normal direction",
+        json_schema_extra={"unit": "1"},
     )
     cone: Literal["elliptic", "pyramidal"] = Field(default="pyramidal", description="friction cone")
     friction: float = Field(
-        default=1.0, gt=0, le=100, description="coefficient of sliding friction, the same in all directions"
+        default=1.0,
+        gt=0,
+        le=100,
+        description="coefficient of sliding friction, the same in all directions",
+        json_schema_extra={"unit": "1"},
     )
 
 
@@ -165,26 +200,37 @@ class ExactContactSettings(ContactSettings):
 
     # A row's error decays at 2 / time_constant, which the integrator must resolve; it adds no creep any more.
     time_constant: float | None = Field(
-        default=0.05, gt=0, le=1, description="time constant of the contacts (solref) [s], at least twice the step"
+        default=0.05,
+        gt=0,
+        le=1,
+        description="time constant of the contacts (solref) [s], at least twice the step",
+        json_schema_extra={"unit": "s"},
     )
     impedance: Impedances = Field(
         default=(LARGEST_IMPEDANCE, LARGEST_IMPEDANCE, 0.001, 0.5, 2.0),
         description="impedance of the contacts (solimp): least, largest, width of the way between [m], midpoint, power",
+        json_schema_extra={"unit": "1, 1, m, 1, 1"},
     )
     impratio: float = Field(
         default=1.0,
         gt=0,
         le=1e6,
         description="how much harder friction is than the normal direction; softness does as much for both",
+        json_schema_extra={"unit": "1"},
     )
     softness: float = Field(
         default=1e-5,
         ge=1e-9,
         le=1,
         description="factor on the softness that MuJoCo gives a contact row; what is left of it makes wheels slip",
+        json_schema_extra={"unit": "1"},
     )
     tolerance: float = Field(
-        default=1e-22, gt=0, le=1e-2, description="relative tolerance at which MuJoCo's contact solver stops"
+        default=1e-22,
+        gt=0,
+        le=1e-2,
+        description="relative tolerance at which MuJoCo's contact solver stops",
+        json_schema_extra={"unit": "1"},
     )
 
     @property
@@ -220,5 +266,9 @@ class MultiplierSettings(StepSettings):
     """MuJoCo's tree and integrator, without its contacts."""
 
     stabilisation: float = Field(
-        default=20.0, ge=0, le=1000, description="rate at which gaps and slip are brought back to zero [1/s]"
+        default=20.0,
+        ge=0,
+        le=1000,
+        description="rate at which gaps and slip are brought back to zero [1/s]",
+        json_schema_extra={"unit": "1/s"},
     )

@@ -25,7 +25,11 @@ class SymbrimSettings(Settings):
     """Settings of the engine."""
 
     tolerance: float = Field(
-        default=1e-10, ge=2.5e-14, le=1e-3, description="error of a step of dop853, relative to 1 + |state|"
+        default=1e-10,
+        ge=2.5e-14,
+        le=1e-3,
+        description="error of a step of dop853, relative to 1 + |state|",
+        json_schema_extra={"unit": "1"},
     )
 
     def refined(self, factor: float) -> Self:
