@@ -21,7 +21,7 @@ from ...reference.contact import observe
 from ...reference.kinematics import COORDINATES, FRONT_ANGLE, LEAN, PITCH, REAR_ANGLE, STEER, YAW
 from .explain import EXPLAINED, rate_names
 from .motions import Motion
-from .report import Check, judge
+from .report import Check, judge, skip
 from .rides import Ride
 
 _HALF = 0.5
@@ -101,6 +101,8 @@ def violation(motion: Motion, q: np.ndarray, qd: np.ndarray) -> float:
 def check_maps(ride: Ride) -> Check:
     """Check that a ride speaks of no wrong map."""
     motion, trajectory = ride.motion, ride.trajectory
+    if len(trajectory.q) < 2:
+        return skip(f"maps on {motion.name}", CLAIM, "it has no sample but the start")
     told = f"wheels are off rolling by {violation(motion, trajectory.q, trajectory.qd):.2g} of their speed"
     wrong = []
     best = best_map(motion, trajectory)
@@ -115,6 +117,8 @@ def best_map(motion: Motion, trajectory: Trajectory) -> tuple[CoordinateMap, flo
 
     A pair of mirrored coordinates is named only if it explains what no single one does.
     """
+    if len(trajectory.q) < 2:
+        return None
     own = violation(motion, trajectory.q, trajectory.qd)
     maps = coordinate_maps()
     left = [violation(motion, trajectory.q @ one.positions.T, trajectory.qd @ one.rates.T) for one in maps]

@@ -4,60 +4,80 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
+from ...engines.engine import why_failed
 from ..measure import SAME_BITS, extrapolate, observed_orders, order_limit
 from .explain import EXPLAINED
 from .maps import scaled_rate, violation
 from .report import Check, judge, skip
 from .rides import Ride
 
-FACTORS = (4.0, 2.0, 1.0)
+# Factors on the step; the second for a method that chooses its steps and whose noise hides the order of the first.
+LADDERS = ((4.0, 2.0, 1.0), (16.0, 8.0, 4.0))
 CLAIM = "its rides converge as the step is halved, to the reference's where its wheels are bound to roll"
 _LIMIT = "the order must be 1/2 or more; the extrapolated ride may be off by its noise and four times its uncertainty"
 _LEAST_ORDER = 0.5  # a sequence that converges more slowly does not, or not yet
 _ROOM = 4.0  # of the change by the last extrapolation, which the next powers of the step may leave
 
 
-def check_order(name: str, ride_at: Callable[[float], Ride]) -> Check:
+def check_order(name: str, refine: Callable[[float], Any], ride_with: Callable[[Any], Ride]) -> Check:
     """Check the order that rides with halved steps show, and what they converge to.
 
     Parameters
     ----------
     name : str
         Of the ground.
-    ride_at : callable
-        Rides with a factor on the step; ValueError where the settings allow no such step.
+    refine : callable
+        Gives settings with a factor on the step; ValueError where the engine takes no such step.
+    ride_with : callable
+        Rides with settings.
     """
-    name = f"order on {name}"
-    try:
-        rides = [ride_at(factor) for factor in FACTORS]
-    except ValueError as error:
-        return skip(name, CLAIM, " ".join(str(error).split()))
-    if any(np.array_equal(one.q, other.q) for one, other in pairwise(rides)):
-        return judge(name, CLAIM, [SAME_BITS])
-    finest = rides[-1]
-    sizes = np.array([*3 * [finest.motion.size], *6 * [1.0]])
+    name, told = f"order on {name}", ""
+    for ladder in LADDERS:
+        try:
+            chosen = [refine(factor) for factor in ladder]
+        except ValueError as error:
+            told = told or " ".join(str(error).split())
+            continue
+        try:
+            rides = [ride_with(settings) for settings in chosen]
+        except Exception as error:  # another package's code may break in any way
+            return judge(name, CLAIM, [f"with another step it fails: {why_failed(error)}"])
+        if any(np.array_equal(one.q, other.q) for one, other in pairwise(rides)):
+            return judge(name, CLAIM, [SAME_BITS])
+        first, second = (float(np.abs(b - a).max()) for a, b in pairwise(_paths(rides)))
+        if order_limit(rides[-1].noise, (first, second)) is not None:
+            return _judge_order(name, rides)
+        told = f"its order cannot be seen: halving its steps changes {second:.2g}, its noise is {rides[-1].noise:.2g}"
+    return skip(name, CLAIM, told)
+
+
+def _paths(rides: Sequence[Ride]) -> list[np.ndarray]:
+    """Coordinates of rides relative to the motion's sizes, as long as the shortest ride."""
+    sizes = np.array([*3 * [rides[-1].motion.size], *6 * [1.0]])
     samples = min(len(ride.q) for ride in rides)
-    paths, exact = [ride.q[:samples] / sizes for ride in rides], finest.exact.q[:samples] / sizes
-    first, second = (float(np.abs(b - a).max()) for a, b in pairwise(paths))
-    if order_limit(finest.noise, (first, second)) is None:
-        seen = f"its order cannot be seen: halving its steps changes {second:.2g}, and its noise is {finest.noise:.2g}"
-        # What the coarser steps change is still an error of the method.
-        value, uncertain = paths[-1], first
-    else:
-        order = observed_orders(paths)[-1]
-        seen = f"an order of {order:.3g} is seen"
-        if not order >= _LEAST_ORDER:
-            return judge(name, CLAIM, [f"{seen}; it does not converge"], tolerance=_LIMIT)
-        found = extrapolate(paths)
-        value, uncertain = found.value, found.uncertainty
+    return [ride.q[:samples] / sizes for ride in rides]
+
+
+def _judge_order(name: str, rides: Sequence[Ride]) -> Check:
+    """Judge rides whose steps change more than their noise."""
+    paths, finest = _paths(rides), rides[-1]
+    order = observed_orders(paths)[-1]
+    seen = f"an order of {order:.3g} is seen"
+    if not order >= _LEAST_ORDER:
+        return judge(name, CLAIM, [f"{seen}: it does not converge"], tolerance=_LIMIT)
     if finest.trajectory.friction is not None:
         return judge(
             name, CLAIM, [], [seen, "its contacts have friction: what it converges to is its own model's ride"]
         )
-    off, allowed = float(np.abs(value - exact).max()), finest.noise + _ROOM * uncertain
+    found, exact = extrapolate(paths), _paths([Ride(finest.motion, finest.exact, 0.0)])[0]
+    off, allowed = (
+        float(np.abs(found.value - exact[: len(found.value)]).max()),
+        finest.noise + _ROOM * found.uncertainty,
+    )
     if off <= allowed:
         return judge(name, CLAIM, [], [seen, f"what it converges to is {off:.2g} from the reference"])
     wrong = f"what it converges to is {off:.2g} of the motion's size from the reference, limit {allowed:.2g}"
