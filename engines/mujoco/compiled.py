@@ -7,7 +7,7 @@ closest approach of the two (`velodrome.reference.kernels.contact`), and a mater
     acceleration  Jp q'' + gamma,    gamma = Jp' q' + w x (r a' t)
 
 where Jp' follows the material point and a' t r is how the contact runs along the rim. MuJoCo's contact rows
-prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `correct` subtracts it.
+prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `correct_reference` subtracts it.
 
 `press` leaves the contacts to itself: it solves, for the six forces on two wheels,
 
@@ -15,8 +15,9 @@ prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `correct`
 
 and applies Jp^T F; s is a rate of stabilisation, which on the constraints adds nothing.
 
-`watch` looks on: what MuJoCo's solver makes of one evaluation is judged when the next one begins, which is the first
-moment after it that a callback sees (`convergence` says what it is judged by). `correct` does so too.
+`watch_iterations` looks on: what MuJoCo's solver makes of one evaluation is judged when the next one begins, which is
+the first moment after it that a callback sees (`convergence` says what it is judged by). `correct_reference` does so
+too.
 
 What the callbacks work on is one `BLACKBOARD` a process: numbers, and addresses of arrays that stay where
 they are while a model lives. Its own address comes from a function that the linker resolves, so that the
@@ -441,7 +442,7 @@ def judge(boards):
 
 
 @compile_callback(CONTROL, error_model="numpy")
-def watch(model, data):
+def watch_iterations(model, data):
     """Control callback: look at what MuJoCo's solver leaves unconverged, and change nothing."""
     board = _blackboard()
     if _is_for(board, model, data):
@@ -478,7 +479,7 @@ def _start_sticking(board, model, data, rows, softness, target):
 
 
 @compile_callback(CONTROL, error_model="numpy")
-def correct(model, data):
+def correct_reference(model, data):
     """Control callback: bring the contacts' own acceleration into MuJoCo's reference accelerations.
 
     It also gives MuJoCo's solver its start, and judges how the last evaluation's solution turned out.

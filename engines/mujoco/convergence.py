@@ -117,5 +117,5 @@ def watch_solver(model: mujoco.MjModel, data: mujoco.MjData, converged_below: fl
     EngineError
         If callbacks are in use already.
     """
-    with install_callbacks(compiled.watch), judge_solver(model, data, converged_below) as convergence:
+    with install_callbacks(compiled.watch_iterations), judge_solver(model, data, converged_below) as convergence:
         yield convergence

@@ -98,7 +98,7 @@ def watched_edges(
     """
     _check_pairs(model, wheels)
     with (
-        install_callbacks(compiled.correct, compiled.touch),
+        install_callbacks(compiled.correct_reference, compiled.touch),
         _written(model, surface, wheels),
         judge_solver(model, data, converged_below) as convergence,
     ):

@@ -242,8 +242,8 @@ class ExactContactSettings(ContactSettings):
     def solver_options(self) -> dict[str, float]:
         """Options of MuJoCo's contact solver beside its tolerance, for rows as stiff as these.
 
-        Wheels that roll need one iteration from the start that `compiled.correct` gives. One that slides is found
-        along the curved edge of the cone, on which a step gets the shorter the stiffer the rows: by some hundred
+        Wheels that roll need one iteration from the start that `compiled.correct_reference` gives. One that slides is
+        found along the curved edge of the cone, on which a step gets the shorter the stiffer the rows: by some hundred
         iterations, where MuJoCo's own limit is 100. Between sliding and sticking the cost bends within so short a
         stretch that a line search must halve its way there to the last digit, 52 times with up to three
         evaluations each, where MuJoCo's own limit is 50 evaluations; one that ends before moves nothing, and the

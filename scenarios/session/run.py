@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -112,7 +112,7 @@ def _with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
         if isinstance(given, Settings):
             values = given.model_dump(mode="json", exclude_none=True)
         elif isinstance(given, Mapping):
-            table: Mapping[str, Any] = given
+            table = cast("Mapping[str, Any]", given)
             values = {key: _plain(value) for key, value in table.items()}
         else:
             raise ScenarioError(f"settings of {name!r} are {given!r}; they must be a mapping such as {{'step': 0.001}}")
