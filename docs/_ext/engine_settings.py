@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from inspect import getdoc
 
-from fields import list_fields
+from fields import list_fields, make_sentence
 
-from velodrome.engines.engine import ENTRY_POINT_GROUP, engine_names, load_engine
+from velodrome.engines.engine import ENTRY_POINT_GROUP, describe_engine, engine_names, load_engine
 
 
 def own_engines() -> list[str]:
@@ -27,25 +27,9 @@ def describe_engines() -> str:
         parts += [
             f"(engine-{name})=",
             f"## `{name}`",
-            WHAT[name],
+            make_sentence(describe_engine(engine)),
             f"Gives, beside coordinates, rates and poses: {given}.",
             f"Settings, under `[engines.{name}]` of a scenario file or by `--set engines.{name}.NAME=VALUE`. {doc}",
             list_fields(engine.settings),
         ]
     return "\n\n".join(parts)
-
-
-# What an engine is, for a reader who chooses one.
-WHAT = {
-    "reference": "Lagrange's equations with six multipliers, as in the paper, integrated to round-off.",
-    "exudyn": "Rigid bodies and knife edges on true rolling constraints, by a joint that works in any Exudyn model.",
-    "exudyn-plane-normal": "Exudyn's own rolling disc; its plane is turned to the contact's before every residual.",
-    "exudyn-builtin": "Exudyn's own rolling disc as it is, on the level plane only. Its first contact forces are "
-    "wrong by half; `examples/exudyn_contact_forces.py` shows why.",
-    "mujoco-default": "MuJoCo with all its defaults. The bicycle falls.",
-    "mujoco-native": "MuJoCo as a careful user sets it. Its wheels creep.",
-    "mujoco-exact-contact": "MuJoCo's solver on exact knife-edge contacts, with the acceleration that its own contact "
-    "rows leave out.",
-    "mujoco-multipliers": "MuJoCo's tree and integrator under the exact forces of rolling: a check of the tree, not "
-    "of its contacts.",
-}

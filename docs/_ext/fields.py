@@ -39,16 +39,11 @@ def list_fields(model: type[BaseModel], tables: Mapping[str, str] | None = None)
         given = "required" if name in required else _default(field)
         lines += [
             f"`{name}`",
-            f": {describe_type(field, known, tables or {})}; {given}",
-            f": {_sentence(field.get('description', ''))}" if field.get("description") else "",
+            f": {describe_type(field, known, tables or {})}{_unit(field)}; {given}",
+            f": {make_sentence(_without_unit(field))}" if field.get("description") else "",
             "",
         ]
     return "\n".join(lines)
-
-
-def field_names(model: type[BaseModel]) -> list[str]:
-    """Names of a model's fields, in their order."""
-    return list(model.model_fields)
 
 
 def describe_type(field: Mapping[str, Any], known: Mapping[str, Any], tables: Mapping[str, str]) -> str:
@@ -73,6 +68,11 @@ def describe_type(field: Mapping[str, Any], known: Mapping[str, Any], tables: Ma
         return f"list, each a {describe_type(field.get('items', {}), known, tables)}"
     text = _TYPES.get(str(field.get("type")), "any value")
     return " ".join([text, *_range(field)])
+
+
+def _unit(field: Mapping[str, Any]) -> str:
+    unit = field.get("unit")
+    return "" if unit in (None, "1") else f" [{unit}]"
 
 
 def _range(field: Mapping[str, Any]) -> Iterator[str]:
@@ -102,9 +102,14 @@ def _default(field: Mapping[str, Any]) -> str:
     return f"default `{json.dumps(field['default'])}`"
 
 
-def _sentence(text: str) -> str:
+def _without_unit(field: Mapping[str, Any]) -> str:
+    """A field's description without the unit that stands with its type."""
+    return field["description"].replace(f" [{field['unit']}]", "", 1) if "unit" in field else field["description"]
+
+
+def make_sentence(text: str) -> str:
     """A description as a sentence: in the code it may be a phrase."""
     first, _, _ = text.partition(" ")
-    if len(first) > 1:  # one letter is a name, such as x
+    if len(first) > 1 or first == "a":  # another letter is a name, such as x
         text = text[:1].upper() + text[1:]
     return text if text.endswith((".", "!", "?")) else f"{text}."

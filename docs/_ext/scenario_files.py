@@ -10,6 +10,7 @@ from fields import list_fields
 from pydantic import BaseModel
 
 from velodrome.reference.bicycle import Bicycle
+from velodrome.scenarios.scenario import PARAMETERS
 from velodrome.scenarios.scenario.schema import Scenario
 from velodrome.scenarios.scenario.surfaces import SurfaceTable
 from velodrome.scenarios.sweep.file import Hypercube, SweepFile
@@ -57,8 +58,10 @@ def describe_scenario_file() -> str:
 
 def list_parameters() -> str:
     """Markdown of the bicycle's parameters with the benchmark's values."""
-    lines = ["| parameter | benchmark |", "| --- | ---: |"]
-    lines += [f"| `{name}` | {value.default!r} |" for name, value in Bicycle.__dataclass_fields__.items()]
+    lines = ["| parameter | benchmark | meaning |", "| --- | ---: | --- |"]
+    for name, parameter in PARAMETERS.items():
+        unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
+        lines.append(f"| `{name}` | {Bicycle.__dataclass_fields__[name].default!r} | {parameter.meaning}{unit} |")
     return "\n".join(lines)
 
 
