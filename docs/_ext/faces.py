@@ -30,7 +30,7 @@ def describe_module(name: str) -> str:
     kinds: dict[str, list[str]] = {section: [] for section in _SECTIONS}
     for public in public_names(module):
         kinds[_section(getattr(module, public))].append(public)
-    parts = [f"```{{eval-rst}}\n.. module:: {name}\n```"]
+    parts = [f"```{{eval-rst}}\n.. automodule:: {name}\n```"]
     for section, names in kinds.items():
         if not names:
             continue
