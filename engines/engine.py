@@ -216,7 +216,36 @@ class Settings(BaseModel):
 class Engine(Protocol):
     """A multibody engine that rides the bicycle.
 
-    It may have a ``description`` besides: what it is, one line of text, which `velodrome show` tells.
+    An engine is an object of any class with the members below. It joins the suite from a package of its own, through
+    an entry point of the group ``velodrome.engines`` whose name is the engine's; nothing in the suite is touched. To
+    write one:
+
+    1. Derive its settings from `Settings`. Every field has a default, bounds and a description with its unit. With a
+       field ``step`` the settings can be refined for studies of convergence; a method that chooses its own steps
+       overrides ``refined`` and scales its tolerance by the factor to the power of its order.
+    2. In ``check`` refuse what cannot be run, before anything is computed: a ground that the engine does not know by
+       `UnsuitableProblem`, output times that its steps do not meet by ValueError, in one line that says what would
+       do. `velodrome.reference.simulate.steps_per_output` does the latter for a fixed step.
+    3. Start from exactly the coordinates and rates of the problem, for its bicycle and on its ground.
+       `velodrome.engines.coordinates` has the poses and twists of the bodies there, `velodrome.engines.rolling` the
+       contacts of the wheels.
+    4. Sample at the problem's times and stamp each sample with the engine's own clock. Call ``progress`` now and then.
+    5. Give coordinates, rates and poses of the bodies at every sample. Coordinates of rigid bodies come from
+       `velodrome.engines.coordinates.coordinates_from_bodies`. Angles go on beyond a turn, or not: whole turns do not
+       count.
+    6. List in ``gives`` what else the engine computes itself, and give it. What it does not compute is None, never
+       filled from the reference. Contact forces are those of the ground on the wheels, in inertial axes.
+    7. End a ride that cannot go on with the samples so far and the reason in ``ended``; raise `EngineError` where not
+       even the first sample can be computed. Count steps whose iterations did not converge.
+    8. State in ``step_noise`` what a step may leave beyond its method: 2^-52 for round-off, or the tolerance of its
+       iterations or of its steps. Limits follow from it.
+    9. Give the same bits in every ride of one problem, whatever was ridden before. Neither print to stdout nor change
+       the process; import what is slow to load where it is needed.
+    10. Hold it against all of this with `velodrome.testing.check_engine`, which says what looks wrong.
+
+    ``examples/velodrome-symbrim`` is a whole package with an engine.
+
+    An engine may also have a ``description``, one line of text that says what it is, which `velodrome show` prints.
     """
 
     @property

@@ -1,4 +1,4 @@
-"""Settings of MuJoCo's models: the choices that a user of MuJoCo has, and their defaults as ladders of care."""
+"""Settings of the MuJoCo models: MuJoCo's own choices, with defaults of increasing care."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ Impedances = tuple[
     Annotated[float, Field(ge=0, le=1)],
     Annotated[float, Field(ge=1)],
 ]
-# MuJoCo's own: least and largest impedance, width, midpoint and power of the way between them.
+# MuJoCo's default: least and largest impedance, and width, midpoint and power of the transition between them.
 IMPEDANCES = (0.9, 0.95, 0.001, 0.5, 2.0)
-# MuJoCo moves a larger impedance here without a word.
+# MuJoCo reduces larger impedances to this value without a message.
 LARGEST_IMPEDANCE = 0.9999
 SOLVER_ROUND_OFF = 2.0**-52
-FORCE_NOISE = 0.01  # the largest share of round-off that a contact force may have
-# Contact forces that may be off by more than this share of themselves are none.
+FORCE_NOISE = 0.01  # largest share of a contact force that round-off may make up
+# Contact forces with a larger relative error than this are unusable.
 WRONG = 0.01
-# Where a line search stops: of the mean inertia, which forces some 2 times of, a few roundings.
+# Slope at which a line search stops, relative to the mean inertia and to forces of about that size: a few roundings.
 SLOPE = 1e-14
 
 
@@ -148,7 +148,7 @@ class ContactSettings(StepSettings):
 
     @model_validator(mode="after")
     def _contacts_are_resolved(self) -> Self:
-        # MuJoCo would raise a smaller one without a word.
+        # MuJoCo would raise a smaller one without a message.
         if self.contact_time < 2 * self.step:
             raise ValueError(
                 f"time_constant is {self.time_constant!r}; it must be at least twice the step, {2 * self.step!r}"
@@ -162,13 +162,13 @@ _ON_PLANES = "MuJoCo's integrator; on a curved surface RK4's stages see the grou
 
 
 class NativeSettings(ContactSettings):
-    """A careful user's: stiff contacts, hard friction, the elliptic cone."""
+    """Settings of a careful user: stiff contacts, hard friction, the elliptic cone."""
 
     integrator: Integrator = Field(default="implicitfast", description=_ON_PLANES)
 
 
 class DefaultSettings(ContactSettings):
-    """MuJoCo's own defaults, all of them."""
+    """MuJoCo's own defaults."""
 
     integrator: Integrator = Field(default="Euler", description=_ON_PLANES)
     time_constant: float | None = Field(
@@ -196,7 +196,7 @@ class DefaultSettings(ContactSettings):
 
 
 class ExactContactSettings(ContactSettings):
-    """MuJoCo's solver on exact contacts: its rows keep their form, and are nearly rigid."""
+    """Settings of MuJoCo's solver on exact contacts, whose rows keep MuJoCo's form and are nearly rigid."""
 
     # A row's error decays at 2 / time_constant, which the integrator must resolve; it adds no creep any more.
     time_constant: float | None = Field(
@@ -242,12 +242,13 @@ class ExactContactSettings(ContactSettings):
     def solver_options(self) -> dict[str, float]:
         """Options of MuJoCo's contact solver beside its tolerance, for rows as stiff as these.
 
-        Wheels that roll need one iteration from the start that `compiled.correct_reference` gives. One that slides is
-        found along the curved edge of the cone, on which a step gets the shorter the stiffer the rows: by some hundred
-        iterations, where MuJoCo's own limit is 100. Between sliding and sticking the cost bends within so short a
-        stretch that a line search must halve its way there to the last digit, 52 times with up to three
-        evaluations each, where MuJoCo's own limit is 50 evaluations; one that ends before moves nothing, and the
-        solver stops at a force that may be anything. A line search stops at a slope of round-off in the forces.
+        Wheels that roll need one iteration from the start that `compiled.correct_reference` gives. The solution for a
+        wheel that slides is found along the curved edge of the cone, on which steps become shorter the stiffer the
+        rows are: this takes some hundred iterations, where MuJoCo's own limit is 100. Between sliding and sticking the
+        cost bends within so short an interval that a line search must bisect down to the last digit, 52 times with up
+        to three evaluations each, where MuJoCo's own limit is 50 evaluations. A line search that ends earlier makes no
+        progress, and the solver stops at arbitrary forces. A line search stops at a slope of the order of the forces'
+        round-off.
         """
         return {"iterations": 10_000, "ls_iterations": 200, "ls_tolerance": max(0.01, SLOPE / self.tolerance)}
 

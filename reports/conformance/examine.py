@@ -15,10 +15,9 @@ from ...engines.admission import ride_engine
 from ...engines.engine import Engine, Settings, why_failed
 from ...engines.guard import GuardedEngine, call_engine
 from ...reference.bicycle import Bicycle
-from ...reference.surface import Surface
 from .forces import check_forces
-from .maps import best_map, check_maps
-from .motions import GROUNDS, OTHER_BICYCLE, Motion, make_motion, make_problem, output_times
+from .maps import check_maps
+from .motions import GROUNDS, OTHER_BICYCLE, SAMPLES, Motion, make_motion, make_problem, output_interval
 from .order import check_order
 from .protocol import check_settings, guard_engine, step_noise_of
 from .refusals import check_refusals, suits
@@ -121,22 +120,14 @@ class _Examination:
         return settings
 
     def checks(self) -> Iterator[Check]:
-        times = output_times(getattr(self.settings, "step", None))
-        wrong: list[str] = []
-        suitable: dict[str, bool] = {}
-        grounds: dict[str, Surface] = {}
-        for name, make in GROUNDS.items():
-            grounds[name] = make()
-            problem = make_problem(grounds[name], Bicycle(), times)
-            suitable[name], more = suits(self.engine, problem, self.settings)
-            wrong += more
+        """All checks that take rides."""
+        wrong, suitable = self.grounds()
         ridden = [name for name, good in suitable.items() if good]
         if not ridden:
-            yield judge(
-                "grounds", "it rides on one ground at least", [*wrong, "it refuses all: a plane, a bowl, waves"]
-            )
+            refused = f"it refuses all: {', '.join(suitable)}"
+            yield judge("grounds", "it rides on one ground at least", [*wrong, refused])
             return
-        motion = make_motion(ridden[0], make_problem(grounds[ridden[0]], Bicycle(), times))
+        motion = make_motion(ridden[0], Bicycle(), self.interval)
         try:
             first = self.ride(motion)
         except Exception as error:  # another package's code may break in any way
@@ -144,33 +135,64 @@ class _Examination:
             return
         yield judge(f"ride on {motion.name}", _RIDE, _wrong_facts(first, self.reported[-1]))
         yield check_refusals(self.engine, self.settings, first, wrong, suitable)
-        yield from _judged(first)
-        # The other bicycle too: an engine that knows but the benchmark's would pass on one.
-        other = make_motion(f"{ridden[-1]}, another bicycle", make_problem(grounds[ridden[-1]], OTHER_BICYCLE, times))
+        judged = tuple(_judged(first))
+        yield from judged
+        # An engine that knows but the benchmark's bicycle, or but the plane, would pass on these.
+        yield from self.checks_of_another(make_motion(ridden[-1], OTHER_BICYCLE, self.interval))
+        yield from self.checks_of_repeats(first)
+        yield self.check_order(first, mapped=any(check.outcome == "failed" for check in judged if _is_of_maps(check)))
+
+    @property
+    def interval(self) -> float:
+        """Interval of the samples [s]."""
+        step = getattr(self.settings, "step", None)
+        return output_interval(step if isinstance(step, float) and 0 < step < np.inf else None)
+
+    def grounds(self) -> tuple[list[str], dict[str, bool]]:
+        """What is wrong with the refusals of grounds, and which ones the engine is made for."""
+        wrong: list[str] = []
+        suitable: dict[str, bool] = {}
+        for name in GROUNDS:
+            problem = make_problem(name, Bicycle(), self.interval, SAMPLES)
+            suitable[name], more = suits(self.engine, problem, self.settings)
+            wrong += more
+        return wrong, suitable
+
+    def checks_of_another(self, motion: Motion) -> Iterator[Check]:
+        """The checks of a ride of a second motion."""
         try:
-            second = self.ride(other)
+            second = self.ride(motion)
         except Exception as error:  # another package's code may break in any way
-            yield judge(f"ride on {other.name}", _RIDE, [why_failed(error)])
-        else:
-            yield judge(f"ride on {other.name}", _RIDE, _wrong_facts(second, self.reported[-1]))
-            yield from _judged(second)
+            yield judge(f"ride on {motion.name}", _RIDE, [why_failed(error)])
+            return
+        yield judge(f"ride on {motion.name}", _RIDE, _wrong_facts(second, self.reported[-1]))
+        yield from _judged(second)
+
+    def checks_of_repeats(self, first: Ride) -> Iterator[Check]:
+        """The checks of a ride that is repeated after another one."""
         try:
-            again = self.ride(motion)
+            again = self.ride(first.motion)
         except Exception as error:  # another package's code may break in any way
             yield judge("same bits", "a ride can be repeated", [why_failed(error)])
         else:
             yield check_bits(first, again.trajectory)
-        if len(first.trajectory.time) < _FEWEST:
-            return
         yield check_own_work(first, self.engine.name)
-        if best_map(motion, first.trajectory) is None:
-            yield check_order(
-                motion.name,
-                lambda factor: self.refine(motion, factor),
-                lambda settings: self.ride(motion, settings),
-            )
-        else:
-            yield skip(f"order on {motion.name}", "it is judged in the right coordinates", _MAPPED)
+
+    def check_order(self, first: Ride, mapped: bool) -> Check:
+        """The check of rides with other steps."""
+        motion = first.motion
+        name, claim = f"order on {motion.name}", "it is judged along a ride in the right coordinates"
+        if mapped:
+            return skip(name, claim, _MAPPED)
+        if first.trajectory.ended is not None:
+            return skip(name, claim, "it does not ride to the end")
+        return check_order(
+            motion.name, lambda factor: self.refine(motion, factor), lambda settings: self.ride(motion, settings)
+        )
+
+
+def _is_of_maps(check: Check) -> bool:
+    return check.name.startswith("maps on ")
 
 
 def _judged(ride: Ride) -> Iterator[Check]:
@@ -180,16 +202,18 @@ def _judged(ride: Ride) -> Iterator[Check]:
     yield check_start(ride, mapped)
     yield maps
     yield check_bodies(ride)
-    yield check_reports(ride)
-    rest = f"rates, clock and forces on {ride.motion.name}"
     if mapped:
+        rest = f"reports, rates, clock and forces on {ride.motion.name}"
         yield skip(rest, "they are judged in the right coordinates", _MAPPED)
-    elif len(ride.trajectory.time) < _FEWEST:
+        return
+    yield check_reports(ride)
+    if len(ride.trajectory.time) < _FEWEST:
+        rest = f"rates, clock and forces on {ride.motion.name}"
         yield skip(rest, "they are judged along a ride", f"it has fewer than {_FEWEST} samples")
-    else:
-        yield check_rates(ride)
-        yield check_clock(ride)
-        yield check_forces(ride)
+        return
+    yield check_rates(ride)
+    yield check_clock(ride)
+    yield check_forces(ride)
 
 
 def _wrong_facts(ride: Ride, reported: list[float]) -> Iterator[str]:

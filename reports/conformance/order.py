@@ -11,7 +11,7 @@ import numpy as np
 from ...engines.engine import why_failed
 from ..measure import SAME_BITS, extrapolate, observed_orders, order_limit
 from .explain import EXPLAINED
-from .maps import scaled_rate, violation
+from .maps import find_scaled_rate, violation
 from .report import Check, judge, skip
 from .rides import Ride
 
@@ -36,6 +36,7 @@ def check_order(name: str, refine: Callable[[float], Any], ride_with: Callable[[
         Rides with settings.
     """
     name, told = f"order on {name}", ""
+    unseen: list[Ride] | None = None
     for ladder in LADDERS:
         try:
             chosen = [refine(factor) for factor in ladder]
@@ -51,33 +52,43 @@ def check_order(name: str, refine: Callable[[float], Any], ride_with: Callable[[
         first, second = (float(np.abs(b - a).max()) for a, b in pairwise(_paths(rides)))
         if order_limit(rides[-1].noise, (first, second)) is not None:
             return _judge_order(name, rides)
-        told = f"its order cannot be seen: halving its steps changes {second:.2g}, its noise is {rides[-1].noise:.2g}"
-    return skip(name, CLAIM, told)
+        unseen = rides if unseen is None else unseen
+    return skip(name, CLAIM, told) if unseen is None else _judge_noise(name, unseen)
+
+
+def _judge_noise(name: str, rides: Sequence[Ride]) -> Check:
+    """Judge rides whose order cannot be seen: they are as near to each other as to what they converge to."""
+    paths, finest = _paths(rides), rides[-1]
+    moved = float(np.abs(paths[-1] - paths[0]).max())
+    seen = f"its order cannot be seen: four times the step changes {moved:.2g}, its noise is {finest.noise:.2g}"
+    return _judge_limit(name, rides, paths[-1], moved, seen)
 
 
 def _paths(rides: Sequence[Ride]) -> list[np.ndarray]:
     """Coordinates of rides relative to the motion's sizes, as long as the shortest ride."""
-    sizes = np.array([*3 * [rides[-1].motion.size], *6 * [1.0]])
     samples = min(len(ride.q) for ride in rides)
-    return [ride.q[:samples] / sizes for ride in rides]
+    return [ride.q[:samples] / ride.motion.sizes for ride in rides]
 
 
 def _judge_order(name: str, rides: Sequence[Ride]) -> Check:
     """Judge rides whose steps change more than their noise."""
-    paths, finest = _paths(rides), rides[-1]
+    paths = _paths(rides)
     order = observed_orders(paths)[-1]
     seen = f"an order of {order:.3g} is seen"
     if not order >= _LEAST_ORDER:
         return judge(name, CLAIM, [f"{seen}: it does not converge"], tolerance=_LIMIT)
+    found = extrapolate(paths)
+    return _judge_limit(name, rides, found.value, found.uncertainty, seen)
+
+
+def _judge_limit(name: str, rides: Sequence[Ride], value: np.ndarray, uncertainty: float, seen: str) -> Check:
+    """Judge what rides converge to, known up to an uncertainty; contacts with friction have their own limit."""
+    finest = rides[-1]
     if finest.trajectory.friction is not None:
-        return judge(
-            name, CLAIM, [], [seen, "its contacts have friction: what it converges to is its own model's ride"]
-        )
-    found, exact = extrapolate(paths), _paths([Ride(finest.motion, finest.exact, 0.0)])[0]
-    off, allowed = (
-        float(np.abs(found.value - exact[: len(found.value)]).max()),
-        finest.noise + _ROOM * found.uncertainty,
-    )
+        told = "its contacts have friction: what it converges to is its own model's ride"
+        return judge(name, CLAIM, [], [seen, told])
+    exact = finest.exact.q[: len(value)] / finest.motion.sizes
+    off, allowed = float(np.abs(value - exact).max()), finest.noise + _ROOM * uncertainty
     if off <= allowed:
         return judge(name, CLAIM, [], [seen, f"what it converges to is {off:.2g} from the reference"])
     wrong = f"what it converges to is {off:.2g} of the motion's size from the reference, limit {allowed:.2g}"
@@ -91,5 +102,5 @@ def _explain(rides: Sequence[Ride], off: float) -> list[str]:
     slip = violation(motion, trajectory.q, trajectory.qd)
     if slip <= EXPLAINED * off:
         return ["its wheels roll: a mass, an inertia, a length or gravity looks different from the problem's"]
-    scaled = scaled_rate(motion, trajectory)
+    scaled = find_scaled_rate(finest)
     return [f"its wheels are off rolling by {slip:.2g} of their speed: look at the maps", *([scaled] if scaled else [])]

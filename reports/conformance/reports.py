@@ -122,9 +122,10 @@ def _explain_report(ride: Ride, field: str) -> str | None:
         stale = np.concatenate([right[:1], right[:-1]])
         if explains(given, stale, right):
             return f"its {words} looks stale, that of the sample before"
-        offset = float(np.median(given - right))
+        offset, factor = float(np.median(given - right)), fit_factor(given, right)
         if explains(given, right + offset, right):
-            return f"its {words} looks shifted by {offset:.6g} J: another datum than z = 0"
+            scaled = "" if factor is None else f", or scaled by {factor:.6g}: another mass or gravity"
+            return f"its {words} looks shifted by {offset:.6g} J: another datum than z = 0{scaled}"
     if explains(given, -right, right):
         return f"its {words} looks mirrored"
     if field != "kinetic_energy" and field != "potential_energy":

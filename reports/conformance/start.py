@@ -38,7 +38,7 @@ def check_start(ride: Ride, mapped: bool) -> Check:
             what = ", ".join(names[i] for i in off) if len(off) < len(names) else f"all, from {names[0]} on"
             wrong.append(f"its first sample is off in {what}, by {apart.max():.2g} at the most: it moves its start")
             off = [] if mapped else [int(np.argmax(apart))]
-        wrong += explain_columns(own[None], asked[None], off, names)
+        wrong += explain_columns(own[None], asked[None], off, names, factors=not mapped)
     return judge(
         f"start on {ride.motion.name}",
         "its first sample is the state that the problem starts from, but for whole turns",

@@ -38,8 +38,8 @@ class CircularTable(Table):
 
     kind: Literal["circular"] = "circular"
     rear_rate: float = Field(gt=0, le=1e4, description="rate of the rear wheel", json_schema_extra={"unit": "rad/s"})
-    family: Annotated[int, Field(ge=1, le=4)] | None = Field(None, description="number of the solution family")
-    near: Near | None = Field(None, description="angles that the motion is near to, where there are several")
+    family: Annotated[int, Field(ge=1, le=4)] | None = Field(default=None, description="number of the solution family")
+    near: Near | None = Field(default=None, description="angles that the motion is near to, where there are several")
 
     @model_validator(mode="after")
     def _determined(self) -> CircularTable:
@@ -58,20 +58,26 @@ class UprightTable(Table):
 class Perturbation(Table):
     """Added to the independent variables of the start; the rest is solved."""
 
-    x: _Moderate = Field(0.0, description="of the point D on the steering axis", json_schema_extra={"unit": "m"})
-    y: _Moderate = Field(0.0, description="of the point D on the steering axis", json_schema_extra={"unit": "m"})
-    lean: _Moderate = Field(0.0, description="of the rear frame", json_schema_extra={"unit": "rad"})
-    steer: _Moderate = Field(0.0, description="positive to the left", json_schema_extra={"unit": "rad"})
-    lean_rate: _Moderate = Field(0.0, description="of the rear frame", json_schema_extra={"unit": "rad/s"})
-    steer_rate: _Moderate = Field(0.0, description="positive to the left", json_schema_extra={"unit": "rad/s"})
-    rear_rate: _Moderate = Field(0.0, description="of the rear wheel", json_schema_extra={"unit": "rad/s"})
+    x: _Moderate = Field(
+        default=0.0, description="of the point D on the steering axis", json_schema_extra={"unit": "m"}
+    )
+    y: _Moderate = Field(
+        default=0.0, description="of the point D on the steering axis", json_schema_extra={"unit": "m"}
+    )
+    lean: _Moderate = Field(default=0.0, description="of the rear frame", json_schema_extra={"unit": "rad"})
+    steer: _Moderate = Field(default=0.0, description="positive to the left", json_schema_extra={"unit": "rad"})
+    lean_rate: _Moderate = Field(default=0.0, description="of the rear frame", json_schema_extra={"unit": "rad/s"})
+    steer_rate: _Moderate = Field(default=0.0, description="positive to the left", json_schema_extra={"unit": "rad/s"})
+    rear_rate: _Moderate = Field(default=0.0, description="of the rear wheel", json_schema_extra={"unit": "rad/s"})
 
 
 class Simulation(Table):
     """How long, and how often to report."""
 
     duration: float = Field(gt=0, le=1e5, description="simulated time", json_schema_extra={"unit": "s"})
-    output_rate: float = Field(100.0, gt=0, le=1e5, description="samples a second", json_schema_extra={"unit": "1/s"})
+    output_rate: float = Field(
+        default=100.0, gt=0, le=1e5, description="samples a second", json_schema_extra={"unit": "1/s"}
+    )
 
     @model_validator(mode="after")
     def _whole_samples(self) -> Simulation:
@@ -122,15 +128,15 @@ class Scenario(Table):
 
     title: str = Field(description="one line of text")
     # TOML has arrays only.
-    tags: Annotated[tuple[str, ...], Field(strict=False)] = Field((), description="for velodrome run --tag")
+    tags: Annotated[tuple[str, ...], Field(strict=False)] = Field(default=(), description="for velodrome run --tag")
     surface: SurfaceTable = Field(description="the ground")
     motion: Annotated[CircularTable | UprightTable, Field(discriminator="kind")] = Field(
         description="the motion to start from"
     )
-    perturbation: Perturbation = Field(Perturbation(), description="added to the start; the rest is solved")
+    perturbation: Perturbation = Field(default=Perturbation(), description="added to the start; the rest is solved")
     simulation: Simulation = Field(description="how long, and how often to report")
-    gate: Gate | None = Field(None, description="how velodrome check rides it")
-    criterion: Criterion | None = Field(None, description="a verdict on every engine")
+    gate: Gate | None = Field(default=None, description="how velodrome check rides it")
+    criterion: Criterion | None = Field(default=None, description="a verdict on every engine")
     bicycle: dict[str, _Moderate] = Field(
         default_factory=dict,
         description="parameters that differ from the benchmark bicycle's",

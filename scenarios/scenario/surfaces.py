@@ -103,10 +103,12 @@ class ProfileTable(Table):
 
     kind: Literal["profile"]
     coefficients: _Numbers | None = Field(
-        None, description="coefficients of r^2, r^4, ...", json_schema_extra={"unit": "1/m, 1/m^3, ..."}
+        default=None, description="coefficients of r^2, r^4, ...", json_schema_extra={"unit": "1/m, 1/m^3, ..."}
     )
-    radii: _Numbers | None = Field(None, description="radii of the points, rising", json_schema_extra={"unit": "m"})
-    heights: _Numbers | None = Field(None, description="heights of the points", json_schema_extra={"unit": "m"})
+    radii: _Numbers | None = Field(
+        default=None, description="radii of the points, rising", json_schema_extra={"unit": "m"}
+    )
+    heights: _Numbers | None = Field(default=None, description="heights of the points", json_schema_extra={"unit": "m"})
 
     @model_validator(mode="after")
     def _one_way(self) -> ProfileTable:
@@ -133,7 +135,7 @@ class HeightFieldTable(Table):
     )
     spacing: _Length = Field(description="distance of neighbours in the grid", json_schema_extra={"unit": "m"})
     origin: Annotated[tuple[_Moderate, _Moderate], Field(strict=False)] = Field(
-        (0.0, 0.0), description="x and y of the first height", json_schema_extra={"unit": "m"}
+        default=(0.0, 0.0), description="x and y of the first height", json_schema_extra={"unit": "m"}
     )
 
     @model_validator(mode="after")

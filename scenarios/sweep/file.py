@@ -74,22 +74,28 @@ class Hypercube(Table):
 class SweepFile(Table):
     """A sweep as its file declares it."""
 
-    title: str = Field("", description="one line of text")
+    title: str = Field(default="", description="one line of text")
     scenario: str | dict[str, Any] = Field(description="library name, path from the sweep file, or tables")
-    engines: _Names = Field((REFERENCE,), description="engines that ride at every point")
+    engines: _Names = Field(default=(REFERENCE,), description="engines that ride at every point")
     time_limit: float = Field(
-        600.0, gt=0, le=1e6, description="of a run, on the clock", json_schema_extra={"unit": "s"}
+        default=600.0, gt=0, le=1e6, description="of a run, on the clock", json_schema_extra={"unit": "s"}
     )
     memory_limit: float | None = Field(
-        None, ge=1, le=1e9, description="memory that a run may take for itself", json_schema_extra={"unit": "MB"}
+        default=None,
+        ge=1,
+        le=1e9,
+        description="memory that a run may take for itself",
+        json_schema_extra={"unit": "MB"},
     )
     grid: dict[str, _Values] = Field(
         default_factory=dict,
         description="scenario's keys, dotted or as tables, to lists of values: all combinations",
         json_schema_extra=_allow_tables,
     )
-    latin_hypercube: Hypercube | None = Field(None, description="points of a Latin hypercube")
-    list: Annotated[tuple[dict[str, Any], ...], Field(strict=False)] = Field((), description="points, a table each")
+    latin_hypercube: Hypercube | None = Field(default=None, description="points of a Latin hypercube")
+    list: Annotated[tuple[dict[str, Any], ...], Field(strict=False)] = Field(
+        default=(), description="points, a table each"
+    )
 
     @field_validator("grid", mode="before")
     @classmethod

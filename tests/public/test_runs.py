@@ -126,8 +126,8 @@ def test_the_table_of_metrics_has_every_quantity(stored: velodrome.Run) -> None:
     assert tuple(frame.columns) == table.columns
     assert {"position_error_max", "position_error_end", "cpu_time", "steps"} <= set(table.columns)
     assert "position_error" not in table.columns
-    assert frame["steps"].dtype == np.int64
-    assert frame["fell_at"].isna().all()
+    assert str(frame["steps"].dtype) == "int64"
+    assert list(frame["fell_at"].isna()) == [True] * 3
     assert dict(frame["energy_drift"]) == table.column("energy_drift")
     assert table.column("energy_drift")[NATIVE] == table[NATIVE]["energy_drift"]
     with pytest.raises(KeyError, match="'warp' is no column; there are position_error_max"):

@@ -466,7 +466,7 @@ def test_cpu_time_is_judged_if_asked_for(
     ratio: float, status: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     def check(ratio: float, hold_cpu: bool = True) -> dict[str, Verdict]:
-        monkeypatch.setattr(gate_sample, "_cpu_ratio", lambda *_: ratio)
+        monkeypatch.setattr(gate_sample, "_measure_cpu_ratio", lambda *_: ratio)
         verdicts, fresh = gate.check_gate(lambda *_: None, ["q2"], [REFERENCE], tmp_path, hold_cpu=hold_cpu)
         if not (tmp_path / "q2.json").exists():
             gate.update_baselines(fresh, verdicts, None, tmp_path)
