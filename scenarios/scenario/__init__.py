@@ -1,7 +1,7 @@
 """Scenario files: their schema, the surfaces they can name, and the start they describe."""
 
 from .bicycle_file import BicycleFile, read_bicycle_file
-from .engine_settings import configure_engine, list_engine_faults, refuse_engine
+from .engine_settings import configure_engine, installed_engines, list_engine_faults, refuse_engine
 from .parameters import PARAMETERS
 from .resolved import resolve_scenario
 from .schema import (
@@ -41,6 +41,7 @@ __all__ = [
     "configure_engine",
     "error_place",
     "format_validation_error",
+    "installed_engines",
     "join_complaints",
     "library_names",
     "list_complaints",

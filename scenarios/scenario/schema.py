@@ -12,7 +12,7 @@ from ...engines.names import suggest_name
 from ...reference.bicycle import Bicycle, require_rigid_bodies
 from ..error import ScenarioError
 from ..names import LIBRARY as LIBRARY
-from ..names import library_names as library_names
+from ..names import list_library
 from .engine_settings import list_engine_faults
 from .parameters import PARAMETERS
 from .surfaces import SurfaceTable
@@ -207,6 +207,11 @@ def _line_of_text(text: str) -> str:
     if not text.strip() or not text.isprintable():
         raise ValueError("must be one line of text")
     return text
+
+
+def library_names() -> list[str]:
+    """Return the names of the library's scenarios, sorted."""
+    return list_library()
 
 
 def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tuple[str, Scenario]:
