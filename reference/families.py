@@ -234,7 +234,7 @@ def _replace_last_by_end(equations: Steady, points: list[Point]) -> list[Point]:
 
 
 @lru_cache(maxsize=8)
-def _all_curves(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Sequence[Family]:
+def _follow_all_curves(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Sequence[Family]:
     """Follow all curves. Cached, since motions of many rates are searched for on the same ground."""
     return trace_all(bicycle, surface)[0]
 
@@ -280,7 +280,7 @@ def _yield_motions(
         for towards in start.directions:
             points = _up_to_end(follow_curve(start.equations, start.unknowns, towards))
             yield from _append_new_motions(found, start.equations, points, rear_rate)
-    every = _all_curves(bicycle, surface)  # type: ignore[arg-type]
+    every = _follow_all_curves(bicycle, surface)  # type: ignore[arg-type]
     others = [c for c in every if c.number == family and not any(_passes_through(c, start) for start in anchors)]
     for curve in others:
         yield from _append_new_motions(found, curve.equations, curve.points, rear_rate)

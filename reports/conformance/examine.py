@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import random
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -133,7 +133,7 @@ class _Examination:
         except Exception as error:  # another package's code may break in any way
             yield judge(f"ride on {motion.name}", _RIDE, [why_failed(error)])
             return
-        yield judge(f"ride on {motion.name}", _RIDE, _wrong_facts(first, self.reported[-1]))
+        yield judge(f"ride on {motion.name}", _RIDE, _wrong_facts(first, self.engine.gives, self.reported[-1]))
         yield check_refusals(self.engine, self.settings, first, wrong, suitable)
         judged = tuple(_judged(first))
         yield from judged
@@ -165,7 +165,7 @@ class _Examination:
         except Exception as error:  # another package's code may break in any way
             yield judge(f"ride on {motion.name}", _RIDE, [why_failed(error)])
             return
-        yield judge(f"ride on {motion.name}", _RIDE, _wrong_facts(second, self.reported[-1]))
+        yield judge(f"ride on {motion.name}", _RIDE, _wrong_facts(second, self.engine.gives, self.reported[-1]))
         yield from _judged(second)
 
     def checks_of_repeats(self, first: Ride) -> Iterator[Check]:
@@ -216,8 +216,12 @@ def _judged(ride: Ride) -> Iterator[Check]:
     yield check_forces(ride)
 
 
-def _wrong_facts(ride: Ride, reported: list[float]) -> Iterator[str]:
+def _wrong_facts(ride: Ride, gives: Iterable[str], reported: list[float]) -> Iterator[str]:
+    """What is wrong with a ride before any number of it is looked at, in words."""
     trajectory, end = ride.trajectory, float(ride.motion.problem.times[-1])
+    missing = [name for name in gives if getattr(trajectory, name) is None]
+    if missing:
+        yield f"it lists {', '.join(missing)} in gives, and gives None"
     if trajectory.ended is not None:
         yield f"it ended after {trajectory.time[-1]:.6g} s: {trajectory.ended}"
     if trajectory.not_finite():

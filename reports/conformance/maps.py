@@ -29,9 +29,7 @@ from .rides import Ride
 
 _CLAIM = "neither its slip nor its ride is that of mirrored, swapped or rescaled coordinates"
 _LIMIT = "a map is wrong if that explains nine tenths of the slip and the gaps, or of the ride's difference"
-
-
-_AS_MUCH = 2.0
+_AS_MUCH = 2.0  # evidence that leaves up to twice the least is as good
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,7 @@ class Evidence:
 
 
 def check_maps(ride: Ride) -> Check:
-    """Check that a ride speaks of no wrong map."""
+    """Check that no wrong map explains a ride."""
     name = f"maps on {ride.motion.name}"
     if len(ride.q) < 2:
         return skip(name, _CLAIM, "it has no sample but the start")

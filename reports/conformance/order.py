@@ -31,7 +31,7 @@ def check_order(name: str, refine: Callable[[float], Any], ride_with: Callable[[
     name : str
         Of the ground.
     refine : callable
-        Gives settings with a factor on the step; ValueError where the engine takes no such step.
+        Gives settings with a factor on the step; an error where the engine takes no such step.
     ride_with : callable
         Rides with settings.
     """
@@ -40,8 +40,8 @@ def check_order(name: str, refine: Callable[[float], Any], ride_with: Callable[[
     for ladder in LADDERS:
         try:
             chosen = [refine(factor) for factor in ladder]
-        except ValueError as error:
-            told = told or " ".join(str(error).split())
+        except Exception as error:  # of a step that there is not, or another package's code that breaks
+            told = told or why_failed(error)
             continue
         try:
             rides = [ride_with(settings) for settings in chosen]
@@ -96,7 +96,7 @@ def _judge_limit(name: str, rides: Sequence[Ride], value: np.ndarray, uncertaint
 
 
 def _explain(rides: Sequence[Ride], off: float) -> list[str]:
-    """Say what a wrong limit speaks of: maps if the wheels slip by as much, else another bicycle."""
+    """Say what a wrong limit comes from: maps if the wheels slip by as much, else another bicycle."""
     finest = rides[-1]
     motion, trajectory = finest.motion, finest.trajectory
     slip = violation(motion, trajectory.q, trajectory.qd)

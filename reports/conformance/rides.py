@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -74,7 +75,7 @@ class Ride:
         """Largest error of the coordinates against the reference, relative to the motion's sizes."""
         return float(np.abs((self.q - self.exact.q) / self.motion.sizes).max()) + START_ERROR
 
-    def altered(self, **changes: np.ndarray) -> Ride:
+    def altered(self, **changes: Any) -> Ride:
         """The ride with other samples of some fields."""
         return Ride(self.motion, replace(self.trajectory, **changes), self.step_noise)
 
