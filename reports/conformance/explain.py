@@ -61,7 +61,7 @@ def fit_lag(given: np.ndarray, expected: np.ndarray, time: np.ndarray) -> float 
     return lag if explained and abs(lag) <= _LONGEST_LAG * float(np.max(np.diff(time))) else None
 
 
-def explain_wrong(
+def explain_numbers(
     given: np.ndarray, expected: np.ndarray, off: Sequence[int], names: Sequence[str], factors: bool = True
 ) -> Iterator[str]:
     """Say of columns what they look like.

@@ -22,9 +22,9 @@ import numpy as np
 from ...reference.contact import observe
 from .coordinate_maps import coordinate_maps
 from .explain import EXPLAINED, rate_names
-from .motions import TrialMotion
-from .predictions import predicted_distance, predictions
-from .report import Check, record_check, skip
+from .motions import TransientMotion
+from .predictions import measure_distance, predictions
+from .report import ConformanceCheck, make_check, skip_check
 from .rides import Ride
 
 _CLAIM = "neither its slip nor its ride is that of mirrored, swapped or rescaled coordinates"
@@ -54,15 +54,15 @@ class MapEvidence:
     told: str
 
 
-def check_maps(ride: Ride) -> Check:
+def check_maps(ride: Ride) -> ConformanceCheck:
     """Check that no wrong map explains a ride."""
     name = f"maps on {ride.motion.name}"
     if len(ride.q) < 2:
-        return skip(name, _CLAIM, "it has no sample but the start")
+        return skip_check(name, _CLAIM, "it has no sample but the start")
     found = find_wrong_map(ride)
     own = violation(ride.motion, ride.trajectory.q, ride.trajectory.qd)
     wrong = [] if found is None else [f"{found.what}: {found.told}"]
-    return record_check(name, _CLAIM, wrong, [f"wheels are off rolling by {own:.2g} of their speed"], _LIMIT)
+    return make_check(name, _CLAIM, wrong, [f"wheels are off rolling by {own:.2g} of their speed"], _LIMIT)
 
 
 def find_wrong_map(ride: Ride) -> MapEvidence | None:
@@ -90,9 +90,9 @@ def _of_rolling(ride: Ride) -> Iterator[MapEvidence]:
 
 def _of_the_ride(ride: Ride) -> Iterator[MapEvidence]:
     motion, exact, qd = ride.motion, ride.motion.exact, ride.trajectory.qd
-    own = predicted_distance(motion, ride.q, qd, exact.q, exact.qd)
+    own = measure_distance(motion, ride.q, qd, exact.q, exact.qd)
     for one in predictions(motion):
-        left = predicted_distance(motion, ride.trajectory.q, qd, one.q, one.qd)
+        left = measure_distance(motion, ride.trajectory.q, qd, one.q, one.qd)
         told = f"its ride is {own:.2g} from the reference's, and {left:.2g} from the reference's with that mistake"
         yield MapEvidence(one.what, one.simple, _share(left, own), told)
 
@@ -101,7 +101,7 @@ def _share(left: float, own: float) -> float:
     return left / own if 0 < own < np.inf else (0.0 if left < own else np.inf)
 
 
-def violation(motion: TrialMotion, q: np.ndarray, qd: np.ndarray) -> float:
+def violation(motion: TransientMotion, q: np.ndarray, qd: np.ndarray) -> float:
     """How far wheels are from rolling on the ground, a mean over samples: slip over speed, and gap over radius.
 
     inf where a wheel has no contact. The first sample is the problem's start, which says nothing of the engine.

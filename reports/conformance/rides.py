@@ -12,7 +12,7 @@ import numpy as np
 from ...engines.engine import Trajectory
 from ...reference.kinematics import YAW
 from ..measure import LARGEST_NOISE, ROUND_OFF, START_ERROR, Mismatch, evaluate_ride, find_mismatches, noise
-from .motions import TrialMotion
+from .motions import TransientMotion
 
 _SINGLE = 2.0**-23
 
@@ -23,14 +23,14 @@ class Ride:
 
     Attributes
     ----------
-    motion : Motion
+    motion : TransientMotion
     trajectory : Trajectory
         As `velodrome.engines.admission.ride_engine` admits it.
     step_noise : float
         Relative error that a step of the engine may add beyond its method, as it says itself.
     """
 
-    motion: TrialMotion
+    motion: TransientMotion
     trajectory: Trajectory
     step_noise: float
 

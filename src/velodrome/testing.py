@@ -14,6 +14,13 @@ Or by hand, which prints every check::
     print(examine_engine("own"))
 """
 
-from .reports.conformance import Check, ConformanceError, ConformanceReport, Outcome, check_engine, examine_engine
+from .reports.conformance import (
+    ConformanceCheck,
+    ConformanceError,
+    ConformanceReport,
+    Outcome,
+    check_engine,
+    examine_engine,
+)
 
-__all__ = ["Check", "ConformanceError", "ConformanceReport", "Outcome", "check_engine", "examine_engine"]
+__all__ = ["ConformanceCheck", "ConformanceError", "ConformanceReport", "Outcome", "check_engine", "examine_engine"]
