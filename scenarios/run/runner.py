@@ -222,6 +222,8 @@ def ride_plan(
         Of the engines that were done before Ctrl-C was pressed, if it was.
     """
     rides = Rides({}, {})
+    for line in plan.start.problem.bicycle.warnings():
+        note(line)
     problem, duration = plan.start.problem, plan.scenario.simulation.duration
     try:
         for name, (engine, settings) in plan.engines.items():

@@ -20,7 +20,7 @@ from math import cos, isfinite, sin
 from pathlib import Path
 from typing import Any
 
-import yaml
+from yaml import YAMLError, safe_load
 
 from ...reference.bicycle import Bicycle
 from ..error import ScenarioError
@@ -115,7 +115,7 @@ def read_bicycle_file(path: Path) -> BicycleFile:
         return BicycleFile(path.stem, Bicycle(**parameters), uncertainties, convention, ignored)
     except ScenarioError:
         raise
-    except (OSError, ValueError, yaml.YAMLError) as error:
+    except (OSError, ValueError, RecursionError, YAMLError) as error:
         raise ScenarioError(f"{shown}: {show_value(' '.join(str(error).split()))}") from error
 
 
@@ -126,7 +126,7 @@ def _read_entries(text: str, suffix: str) -> tuple[Mapping[str, Any], Mapping[st
         table = document.get("bicycle", {key: value for key, value in document.items() if key != "uncertainties"})
         return _table("bicycle", table), _table("uncertainties", document.get("uncertainties", {}))
     if suffix in (".yml", ".yaml"):
-        content = _table("the file", yaml.safe_load(text))
+        content = _table("the file", safe_load(text))
         return _table("values", content.get("values", content)), {}
     entries: dict[str, Any] = {}
     for number, line in enumerate(text.splitlines(), 1):

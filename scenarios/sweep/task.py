@@ -71,6 +71,7 @@ class Tasks:
         if isinstance(start, str):
             return facts | {"status": "no-motion", "reason": reason_line(start)}
         facts |= {"family": start.family, "growth_rate": start.growth_rate, "size": start.size}
+        facts["warnings"] = "; ".join(start.problem.bicycle.warnings()) or None
         try:
             engine.check(start.problem, settings)
         except UnsuitableProblem:

@@ -121,6 +121,9 @@ def calls(tree: ast.AST) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module == "yaml":
+            # Its safe_load makes plain values only.
+            yield from ("yaml" for alias in node.names if alias.name not in ("safe_load", "YAMLError"))
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
             yield (node.module or "").partition(".")[0]
         elif isinstance(node, ast.Call):

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from planted import changed, plant, reported
+from planting import changed, plant, reported
 from pydantic import BaseModel, Field
 
 from velodrome.engines.engine import REFERENCE, Problem, Settings, Trajectory, UnsuitableProblem, load_engine
