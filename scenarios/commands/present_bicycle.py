@@ -1,4 +1,4 @@
-"""What `velodrome bicycle` shows."""
+"""Terminal output of `velodrome bicycle`."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
     source = study.source
     console.print(f"{source.name} ({source.convention})", style="bold", markup=False, highlight=False)
     table = Table(box=None, show_header=False, pad_edge=False)
-    for one in fields(source.bicycle):
-        deviation = source.uncertainties.get(one.name)
-        value = f"{getattr(source.bicycle, one.name):.9g}"
-        table.add_row(one.name, value, "" if deviation is None else f"± {deviation:.2g}")
+    for parameter in fields(source.bicycle):
+        deviation = source.uncertainties.get(parameter.name)
+        value = f"{getattr(source.bicycle, parameter.name):.9g}"
+        table.add_row(parameter.name, value, "" if deviation is None else f"± {deviation:.2g}")
     console.print(table)
     for line in source.bicycle.warnings():
         console.print(line, style="yellow", markup=False, soft_wrap=True)
@@ -34,7 +34,7 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
             matrices.add_row(name if k == 0 else "", *(f"{value:.12g}" for value in row))
     console.print(matrices)
     console.print()
-    console.print(_eigenvalues(study))
+    console.print(_make_eigenvalue_table(study))
     console.print()
     for mode, speed in (("weave", study.weave_speed), ("capsize", study.capsize_speed)):
         deviation = study.deviations.get(mode)
@@ -46,8 +46,8 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
     console.print(f"stable speeds: {'; '.join(ranges) + ' m/s' if ranges else 'none'}", highlight=False)
 
 
-def _eigenvalues(study: BicycleStudy) -> Table:
-    """Make the table of eigenvalues at some of the speeds, a column for each mode [1/s]."""
+def _make_eigenvalue_table(study: BicycleStudy) -> Table:
+    """Make the table of eigenvalues at some of the speeds, with one column per mode [1/s]."""
     table = Table(box=None, pad_edge=False)
     for title in ("speed", *dict.fromkeys(study.modes)):
         table.add_column(title, justify="right", no_wrap=True)

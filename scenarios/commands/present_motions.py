@@ -1,4 +1,4 @@
-"""What `velodrome circular`, `families`, `critical` and `atlas` show."""
+"""Terminal output of `velodrome circular`, `families`, `critical` and `atlas`."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ def show_circular(console: Console, found: dict[str, Any]) -> None:
     """Print a circular motion."""
     table = Table(box=None, show_header=False, pad_edge=False)
     if found["alpha"] is not None:
-        table.add_row("alpha", _shown(found["alpha"]), "1/m")
+        table.add_row("alpha", _format_value(found["alpha"]), "1/m")
     else:
         for name, value in found["surface"].items():
-            table.add_row("surface" if name == "kind" else name, _shown(value))
+            table.add_row("surface" if name == "kind" else name, _format_value(value))
     for name, unit in (
         *(("family", ""), ("rear_rate", "rad/s"), ("front_rate", "rad/s"), ("yaw_rate", "rad/s")),
         *(("lean", "rad"), ("steer", "rad"), ("pitch", "rad"), ("energy", "J"), ("residual", "")),
     ):
         table.add_row(name, f"{found[name]:.12g}", unit)
-    table.add_row("position", _numbers(found["position"]), "m, D in the heading frame")
+    table.add_row("position", _format_numbers(found["position"]), "m, D in the heading frame")
     for wheel in ("rear", "front"):
-        table.add_row(f"{wheel} contact", _numbers(found["contact_point"][wheel]), "m")
-        table.add_row(f"{wheel} force", _numbers(found["contact_force"][wheel]), "N, on the wheel")
+        table.add_row(f"{wheel} contact", _format_numbers(found["contact_point"][wheel]), "m")
+        table.add_row(f"{wheel} force", _format_numbers(found["contact_force"][wheel]), "N, on the wheel")
         table.add_row(f"{wheel} normal force", f"{found['normal_force'][wheel]:.9g}", "N")
     for i, (real, imaginary) in enumerate(found["eigenvalues"]):
         value = (
@@ -39,16 +39,16 @@ def show_circular(console: Console, found: dict[str, Any]) -> None:
     console.print(f"{stable}; {physical}")
 
 
-def _shown(value: Any) -> str:
+def _format_value(value: Any) -> str:
     return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
-def _numbers(values: list[float]) -> str:
+def _format_numbers(values: list[float]) -> str:
     return ", ".join(f"{value:.9g}" for value in values)
 
 
 def show_families(console: Console, document: Mapping[str, Any]) -> None:
-    """Print the families: where each runs, its special points, its stable sections."""
+    """Print the families: the ends, special points and stable sections of each."""
     for family in document["families"]:
         points = family["points"]
         console.print(
@@ -91,7 +91,7 @@ def show_critical(console: Console, document: Mapping[str, Any]) -> None:
 
 
 def show_atlas(console: Console, document: Mapping[str, Any], out: Path) -> None:
-    """Print the stable regions of the atlas, and where it is."""
+    """Print the stable regions of the atlas and the path of its folder."""
     table = Table("family", box=None, pad_edge=False)
     for title in ("stable from alpha", "to alpha", "where at rear rate"):
         table.add_column(title, justify="right")

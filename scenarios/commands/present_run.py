@@ -1,4 +1,4 @@
-"""What `velodrome run` shows."""
+"""Terminal output of `velodrome run`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def show_outcome(console: Console, plan: RunPlan, outcome: RunOutcome) -> None:
-    """Print the table of a run and where its folder is."""
+    """Print the table of a run and the path of its folder."""
     duration = plan.scenario.simulation.duration
     console.print()
     console.print(f"{plan.name}: {plan.scenario.title}, {duration:g} s", style="bold", markup=False)
@@ -25,7 +25,7 @@ def show_outcome(console: Console, plan: RunPlan, outcome: RunOutcome) -> None:
         name: [format_cell(values, metric, part) for _, _, metric, part in COLUMNS]
         for name, values in outcome.metrics.items()
     }
-    for table in _metric_tables(cells, console.width):
+    for table in _make_metric_tables(cells, console.width):
         console.print(table)
     for name, values in outcome.metrics.items():
         for line in make_remarks(name, values, duration):
@@ -46,10 +46,10 @@ def show_outcome(console: Console, plan: RunPlan, outcome: RunOutcome) -> None:
         console.print(f"recording:  {command} view {outcome.folder}", markup=False, highlight=False, soft_wrap=True)
 
 
-def _metric_tables(cells: Mapping[str, list[str]], width: int) -> Iterator[Table]:
-    """The table of a run, or several one below the other where it is wider than the terminal.
+def _make_metric_tables(cells: Mapping[str, list[str]], width: int) -> Iterator[Table]:
+    """Yield the table of a run, split into several tables if it is wider than the terminal.
 
-    Every engine's name and every figure is whole at any width.
+    Names and numbers are not broken at any width.
     """
     texts = [(*title.split(), unit) for title, unit, _, _ in COLUMNS]
     widths = [max(map(len, (*text, *(row[k] for row in cells.values())))) for k, text in enumerate(texts)]
@@ -73,7 +73,7 @@ def _metric_tables(cells: Mapping[str, list[str]], width: int) -> Iterator[Table
 
 
 def outcome_json(plan: RunPlan, outcome: RunOutcome) -> dict[str, Any]:
-    """JSON of one run."""
+    """Return the JSON document of one run."""
     return {
         "scenario": plan.name,
         "folder": str(outcome.folder),
