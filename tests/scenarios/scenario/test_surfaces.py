@@ -133,7 +133,7 @@ def test_a_steep_bowls_document_has_further_curves_after_the_families() -> None:
     assert [family["family"] for family in document["families"]] == [1, 2, 3, 4, 1]
     # Families 2 and 4 have joined: their curve is listed once.
     assert [family["joined_families"] for family in document["families"]] == [[], [4], [], [], []]
-    reversed_circles, slow = document["families"][4:]
+    reversed_circles, slow = document["families"][3:]
     assert reversed_circles["ends"] == ["large circle", "large circle"]
     assert min(reversed_circles["points"]["steer"]) > np.pi / 2
     assert slow["ends"] == ["static", "large circle"]
