@@ -8,7 +8,7 @@ LOWEST_STAMP := $(LOWEST)/set-up
 # Two processes, a file of tests in one of them: what its tests share is computed once.
 PYTEST := -m pytest -n 2 --dist loadfile
 
-.PHONY: run test test-all test-lowest test-machines test-machines-short lint check
+.PHONY: run test test-all test-lowest test-machines test-machines-short test-wheel lint check
 
 run: $(STAMP)
 	$(BIN)/velodrome run q2-plus
@@ -29,10 +29,16 @@ test-machines: $(STAMP)
 test-machines-short: $(STAMP)
 	$(BIN)/python -m tests.machines --short
 
+# The package as it is installed elsewhere: built, put into an empty environment, and used from there.
+test-wheel: $(STAMP)
+	$(BIN)/python -m tests.wheel
+
 lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache
 
 check: $(STAMP)
 	$(BIN)/velodrome check
@@ -45,5 +51,5 @@ $(STAMP): pyproject.toml constraints.txt
 
 $(LOWEST_STAMP): pyproject.toml constraints-lowest.txt
 	$(PYTHON) -m venv $(LOWEST)
-	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints-lowest.txt --editable '.[benchmark,cluster]' hypothesis pillow pytest pytest-xdist
+	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints-lowest.txt --editable '.[benchmark,cluster,notebook]' hypothesis ipykernel jsonschema nbclient pillow pytest pytest-xdist
 	touch $@

@@ -72,7 +72,7 @@ def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progr
 def _own(trajectory: Trajectory) -> Trajectory:
     """Copy a trajectory's numbers: an engine may use its arrays again for the next ride, and have numpy's numbers."""
     given = {name: value for name in SHAPES if (value := getattr(trajectory, name)) is not None}
-    copies = {name: np.array(value, dtype=float, order="C") for name, value in given.items()}
+    copies: dict[str, Any] = {name: np.array(value, dtype=float, order="C") for name, value in given.items()}
     return replace(trajectory, **copies, steps=int(trajectory.steps), cpu_time=float(trajectory.cpu_time))
 
 

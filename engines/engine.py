@@ -4,6 +4,9 @@ An engine is any object that satisfies `Engine` and is announced under the entry
 ``velodrome.engines``; the suite never names one.
 """
 
+# pandas and pyarrow carry no types.
+# pyright: reportMissingTypeStubs=false
+
 from __future__ import annotations
 
 import re
@@ -19,7 +22,8 @@ from pydantic import BaseModel, ConfigDict
 from ..reference.bicycle import Bicycle
 from ..reference.surface import Surface
 from .format_version import VERSION_KEY
-from .guard import EngineError, GuardedEngine, call_engine, where_raised
+from .guard import EngineError as EngineError
+from .guard import GuardedEngine, call_engine, where_raised
 from .names import suggest_name
 
 if TYPE_CHECKING:
@@ -148,7 +152,7 @@ class Trajectory:
         """The ride up to a time [s], its first sample at least; steps and CPU time stay those of the whole."""
         return self.first(max(1, int(np.searchsorted(self.time, time, side="right"))))
 
-    def to_arrow(self) -> pa.Table:
+    def to_arrow(self) -> pa.Table:  # pyright: ignore[reportUnknownParameterType, reportUnknownMemberType]
         """Return the trajectory as a table, with the columns of the stored Parquet files.
 
         Units stand in the metadata of the columns, what is no column in that of the schema.
@@ -158,9 +162,9 @@ class Trajectory:
         pyarrow.Table
             With n rows, in double precision.
         """
-        from .storage import trajectory_table
+        from .storage import trajectory_table  # pyright: ignore[reportUnknownVariableType]
 
-        return trajectory_table(self)
+        return trajectory_table(self)  # pyright: ignore[reportUnknownVariableType]
 
     def to_pandas(self) -> pd.DataFrame:
         """Return the trajectory as a data frame, with the columns of the stored Parquet files.
@@ -210,7 +214,39 @@ class Settings(BaseModel):
 
 
 class Engine(Protocol):
-    """A multibody engine that rides the bicycle."""
+    """A multibody engine that rides the bicycle.
+
+    An engine is an object of any class with the members below. It joins the suite from a package of its own, through
+    an entry point of the group ``velodrome.engines`` whose name is the engine's; nothing in the suite is touched. To
+    write one:
+
+    1. Derive its settings from `Settings`. Every field has a default, bounds and a description with its unit. With a
+       field ``step`` the settings can be refined for studies of convergence; a method that chooses its own steps
+       overrides ``refined`` and scales its tolerance by the factor to the power of its order.
+    2. In ``check`` refuse what cannot be run, before anything is computed: a ground that the engine does not know by
+       `UnsuitableProblem`, output times that its steps do not meet by ValueError, in one line that says what would
+       do. `velodrome.reference.simulate.steps_per_output` does the latter for a fixed step.
+    3. Start from exactly the coordinates and rates of the problem, for its bicycle and on its ground.
+       `velodrome.engines.coordinates` has the poses and twists of the bodies there, `velodrome.engines.rolling` the
+       contacts of the wheels.
+    4. Sample at the problem's times and stamp each sample with the engine's own clock. Call ``progress`` now and then.
+    5. Give coordinates, rates and poses of the bodies at every sample. Coordinates of rigid bodies come from
+       `velodrome.engines.coordinates.coordinates_from_bodies`. Angles go on beyond a turn, or not: whole turns do not
+       count.
+    6. List in ``gives`` what else the engine computes itself, and give it. What it does not compute is None, never
+       filled from the reference. Contact forces are those of the ground on the wheels, in inertial axes.
+    7. End a ride that cannot go on with the samples so far and the reason in ``ended``; raise `EngineError` where not
+       even the first sample can be computed. Count steps whose iterations did not converge.
+    8. State in ``step_noise`` what a step may leave beyond its method: 2^-52 for round-off, or the tolerance of its
+       iterations or of its steps. Limits follow from it.
+    9. Give the same bits in every ride of one problem, whatever was ridden before. Neither print to stdout nor change
+       the process; import what is slow to load where it is needed.
+    10. Hold it against all of this with `velodrome.testing.check_engine`, which says what looks wrong.
+
+    ``examples/velodrome-symbrim`` is a whole package with an engine.
+
+    An engine may also have a ``description``, one line of text that says what it is, which `velodrome show` prints.
+    """
 
     @property
     def name(self) -> str:
@@ -349,6 +385,15 @@ def load_engine(name: str) -> Engine:
     return GuardedEngine(engine, **{fact: members[fact] for fact in _FACTS})
 
 
+def describe_engine(engine: Engine) -> str:
+    """Say in a line what an engine is: its ``description`` if it has one, else the first line of its docstring."""
+    own = engine.inner if isinstance(engine, GuardedEngine) else engine
+    text = getattr(own, "description", None)
+    if not isinstance(text, str) or not text.strip():
+        text = next(iter((type(own).__doc__ or "").strip().splitlines()), "")
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+
+
 def why_failed(error: Exception) -> str:
     """Say in one line why an engine failed: its own words where it chose them, else what broke in which line."""
     if isinstance(error, EngineError):
@@ -356,6 +401,18 @@ def why_failed(error: Exception) -> str:
     place = None if isinstance(error, UnsuitableProblem) else where_raised(error)
     words = f"{type(error).__name__}: {error}" + (f" ({place})" if place else "")
     return " ".join(words.split())
+
+
+def package_of(name: str) -> str | None:
+    """Return the distribution that announces an installed engine; None where the entry point does not say.
+
+    Raises
+    ------
+    KeyError
+        If no engine of that name is installed.
+    """
+    distribution = _announced()[name].dist
+    return None if distribution is None else distribution.name
 
 
 @cache

@@ -23,9 +23,15 @@ class LagrangeSettings(Settings):
         default="dop853", description="adaptive order 8 with projection, or the paper's own method"
     )
     tolerance: float = Field(
-        default=1e-13, ge=1e-15, le=1e-3, description="error of a step of dop853, relative to 1 + |state|"
+        default=1e-13,
+        ge=1e-15,
+        le=1e-3,
+        description="error of a step of dop853, relative to 1 + |state|",
+        json_schema_extra={"unit": "1"},
     )
-    step: float = Field(default=1e-3, ge=1e-6, le=0.1, description="step of modified-euler [s]")
+    step: float = Field(
+        default=1e-3, ge=1e-6, le=0.1, description="step of modified-euler [s]", json_schema_extra={"unit": "s"}
+    )
 
     def refined(self, factor: float) -> Self:
         """These settings with another step; for dop853 the tolerance that such steps would leave."""
@@ -38,6 +44,7 @@ class LagrangeEngine:
     """Lagrange's equations of the first kind with six multipliers."""
 
     name = REFERENCE
+    description = "Lagrange's equations of the first kind with exact rolling, integrated to round-off: the reference"
     gives = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
     settings = LagrangeSettings
 

@@ -151,14 +151,14 @@ def read_trajectory(path: Path) -> Trajectory:
     """
     table = _table(path)
     facts = _facts(table, path)
-    values = {name: _field(table, name, names, path) for name, names in trajectory_columns()}
+    values: dict[str, Any] = {name: _field(table, name, names, path) for name, names in trajectory_columns()}
     time = table.column("time").to_numpy()
     if not (len(time) and np.all(np.isfinite(time)) and np.all(np.diff(time) > 0)):
         raise ValueError(f"{path} is not a trajectory: its times must be finite and rising, one or more")
     found = digest(table)
     if table.schema.metadata.get(DIGEST_KEY, found) != found:
         raise ValueError(f"{path} is not the trajectory that was written: its contents do not match their digest")
-    return Trajectory(**facts.model_dump(), **values)  # pyright: ignore[reportArgumentType]
+    return Trajectory(**facts.model_dump(), **values)
 
 
 def _table(path: Path) -> pa.Table:

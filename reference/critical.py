@@ -76,7 +76,7 @@ def reconnections(
     list of CriticalPoint
         In order of rising alpha.
     """
-    found = []
+    found: list[CriticalPoint] = []
     for number in (1, 2):
         for low, high in _bracket_changes(bicycle, number, largest, progress):
             point = _find_touching_point(bicycle, number, low, high)

@@ -326,7 +326,7 @@ def _yield_motions(
         for towards in start.directions:
             points = _up_to_end(follow_curve(start.equations, start.unknowns, towards))
             yield from _append_new_motions(found, start.equations, points, rear_rate)
-    every = _follow_all_curves(bicycle, surface)
+    every = _follow_all_curves(bicycle, surface)  # type: ignore[arg-type]
     others = [c for c in every if family in c.numbers and not any(_passes_through(c, start) for start in anchors)]
     for curve in others:
         yield from _append_new_motions(found, curve.equations, curve.points, rear_rate)
@@ -446,7 +446,7 @@ def _motions_without_number(
     bicycle: Bicycle, surface: SurfaceOfRevolution, rear_rate: float
 ) -> Iterator[tuple[None, CircularMotion]]:
     """Yield motions of a rear rate on the curves without a number."""
-    for curve in _follow_all_curves(bicycle, surface):
+    for curve in _follow_all_curves(bicycle, surface):  # type: ignore[arg-type]
         if curve.number is None:
             for motion in _append_new_motions([], curve.equations, curve.points, rear_rate):
                 yield None, motion

@@ -39,7 +39,7 @@ def rim_search(surface: Surface, radii: Sequence[float] | np.ndarray) -> kernel.
     bend = getattr(surface, "bend", None)
     bends, width = np.array([math.inf if bend is None else float(bend)]), math.inf
     if bend is None and isinstance(surface, SurfaceOfRevolution):
-        bends, width = _bound_curvature(surface, 2 * largest, detail)
+        bends, width = _bound_curvature(surface, 2 * largest, detail)  # type: ignore[arg-type]
     return kernel.RimSearch(bool(bends[0] > 0 or len(bends) > 1), bends, width, detail, samples)
 
 

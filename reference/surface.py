@@ -40,7 +40,7 @@ class SurfaceFunction:
         Whether the compiled code is kept on disk; that of a closure cannot be.
     """
 
-    source: Callable[..., tuple]
+    source: Callable[..., tuple[Any, ...]]
     cached: bool = True
 
     @cached_property
@@ -54,7 +54,7 @@ class SurfaceFunction:
         return compile_callback(_signature(types.complex128), cache=self.cached)(self.source)
 
 
-def surface_function(function: Callable[..., tuple]) -> SurfaceFunction:
+def surface_function(function: Callable[..., tuple[Any, ...]]) -> SurfaceFunction:
     """Prepare ``function(x, y, parameters) -> (f, fx, fy, fxx, fxy, fyy)`` for compilation into the kernels.
 
     All six results must have the type of ``x`` (write ``0 * x`` for a zero), and the function must be

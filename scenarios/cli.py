@@ -6,6 +6,7 @@ of them waits for the others'.
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import Annotated, NoReturn
 
@@ -25,15 +26,17 @@ from .commands import (
     print_versions,
     run_command,
     run_supervised,
+    show_command,
     sweep_command,
     view_command,
 )
 from .error import ScenarioError
 
+# Set by the shell when it asks for completions.
+_COMPLETING = "_VELODROME_COMPLETE"
 app = typer.Typer(
     name="velodrome",
     help="Cross-validation of multibody engines on a bicycle that rides hands-free in circles inside a bowl.",
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -63,6 +66,7 @@ def _take_options(
 # In the order of the help.
 for _command in (
     list_command,
+    show_command,
     run_command,
     circular_command,
     families_command,
@@ -100,11 +104,18 @@ def main() -> NoReturn:
         sys.stderr.close()
         sys.exit(1)
     except SystemExit as error:
+        if _is_completion(sys.argv[1:]):
+            raise  # typer ends so, and no engine has been near
         # The commands end with typer.Exit: this is somebody else's.
         _complain(f"something called sys.exit({error.code!r}) before the command was done", status=1)
     except (OSError, UnicodeEncodeError) as error:  # the latter of a path that is no text
         _complain(f"cannot write: {error}")
     sys.exit(status or 0)
+
+
+def _is_completion(arguments: list[str]) -> bool:
+    """Whether the shell asks for completions, or the user for the shell's script; neither runs a command."""
+    return _COMPLETING in os.environ or arguments[:1] in (["--install-completion"], ["--show-completion"])
 
 
 def _complain(message: str, status: int = 2) -> NoReturn:

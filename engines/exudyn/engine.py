@@ -1,7 +1,7 @@
-"""Exudyn: rigid bodies and revolute joints of the library, and its ways to roll on the ground.
+"""Engines in Exudyn: rigid bodies and revolute joints of the library, with different ways to roll on the ground.
 
-`exudyn` rolls on true constraints, `exudyn-plane-normal` on the library's rolling disc whose plane follows
-the contact, `exudyn-builtin` on that disc as it is, on the level plane.
+`exudyn` rolls by true constraints, `exudyn-plane-normal` by the library's rolling disc with a plane that follows
+the contact, `exudyn-builtin` by that disc without changes, on the level plane only.
 """
 
 from __future__ import annotations
@@ -26,21 +26,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ExudynEngine:
-    """An engine on Exudyn; the library is imported when a problem is run.
+    """An engine in Exudyn; the library is imported when a problem is run.
 
     Attributes
     ----------
     name : str
     settings : type
-        Model of its settings.
+        Model of the engine's settings.
+    description : str
+        The engine in one line.
     put_on_ground : callable
-        Imports and returns its way to put the wheels on the ground.
+        Imports and returns the function that puts the wheels on the ground.
     level_only : bool
         Whether it rolls on the level plane only.
     """
 
     name: str
     settings: type[SolverSettings]
+    description: str
     put_on_ground: Callable[[], PutOnGround]
     level_only: bool = False
     gives = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
@@ -51,16 +54,16 @@ class ExudynEngine:
         return package_version("exudyn")
 
     def check(self, problem: Problem, settings: SolverSettings) -> None:
-        """Refuse output times that the step does not meet, and ground; see `velodrome.engines.engine.Engine`."""
+        """Refuse ground that is unsuitable and output times that the step does not divide; see `Engine.check`."""
         if self.level_only and not is_level(problem.surface):
             raise UnsuitableProblem("it rolls on the level plane only; exudyn rides on any surface")
         steps_per_output(problem.times, settings.step)
 
     def step_noise(self, settings: SolverSettings) -> float:
-        """What Newton's method may leave unconverged in a step; see `velodrome.engines.engine.Engine`.
+        """Return what Newton's method may leave unconverged in a step; see `velodrome.engines.engine.Engine`.
 
-        Its residual falls by the tolerance from the bodies' weights, which are some 1 kN: it leaves the tolerance of
-        the forces, and as many metres of gaps and of slip in a step, on a motion of some metres.
+        Its residual decreases by the tolerance from the bodies' weights, which are about 1 kN. The remaining error is
+        the tolerance times the forces, and as many metres of gap, and of slip in a step, on a motion of some metres.
         """
         return settings.newton_relative_tolerance
 
@@ -70,11 +73,11 @@ class ExudynEngine:
         Raises
         ------
         UnsuitableProblem
-            If the engine knows no such ground.
+            If the ground is unsuitable for the engine.
         ValueError
-            If the output times are no uniform grid from 0, or the step does not divide its interval.
+            If the output times are not a uniform grid from 0, or the step does not divide its interval.
         EngineError
-            If the engine does not even accept the initial state.
+            If the engine does not accept the initial state.
         """
         from .model import build_model, make_rim_check
         from .solve import integrate, no_progress
@@ -83,7 +86,7 @@ class ExudynEngine:
         with no_progress():
             model = build_model(problem, settings, self.put_on_ground())
             look = make_rim_check(model, problem)
-            outcome = integrate(model.system, _integration(problem, settings, model), progress, look)
+            outcome = integrate(model.system, _make_integration(problem, settings, model), progress, look)
         trajectory = self._trajectory(problem, settings, model, outcome)
         return trajectory.until(outcome.until)
 
@@ -122,7 +125,7 @@ class ExudynEngine:
         )
 
 
-def _integration(problem: Problem, settings: SolverSettings, model: Model) -> Integration:
+def _make_integration(problem: Problem, settings: SolverSettings, model: Model) -> Integration:
     from .solve import Integration
 
     intervals = len(problem.times) - 1
@@ -140,24 +143,37 @@ def _integration(problem: Problem, settings: SolverSettings, model: Model) -> In
     )
 
 
-def _constrain() -> PutOnGround:
+def _import_constrain() -> PutOnGround:
     from .wheels import constrain
 
     return constrain
 
 
-def _roll_discs_on_tangents() -> PutOnGround:
+def _import_roll_discs_on_tangents() -> PutOnGround:
     from .wheels import roll_discs_on_tangents
 
     return roll_discs_on_tangents
 
 
-def _roll_discs() -> PutOnGround:
+def _import_roll_discs() -> PutOnGround:
     from .wheels import roll_discs
 
     return roll_discs
 
 
-ENGINE = ExudynEngine("exudyn", ExudynSettings, _constrain)
-PLANE_NORMAL = ExudynEngine("exudyn-plane-normal", SolverSettings, _roll_discs_on_tangents)
-BUILTIN = ExudynEngine("exudyn-builtin", SolverSettings, _roll_discs, level_only=True)
+ENGINE = ExudynEngine(
+    "exudyn", ExudynSettings, "Exudyn with true knife-edge rolling joints on any surface", _import_constrain
+)
+PLANE_NORMAL = ExudynEngine(
+    "exudyn-plane-normal",
+    SolverSettings,
+    "Exudyn with its own rolling discs on moving tangent planes",
+    _import_roll_discs_on_tangents,
+)
+BUILTIN = ExudynEngine(
+    "exudyn-builtin",
+    SolverSettings,
+    "Exudyn with its own rolling discs on the level plane, as it is",
+    _import_roll_discs,
+    level_only=True,
+)

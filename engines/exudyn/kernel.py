@@ -1,4 +1,4 @@
-"""A knife-edge wheel as the engine sees it: one rigid body whose coordinates are Euler parameters.
+"""Contact of a knife-edge wheel that is a rigid body with Euler parameters as coordinates.
 
 With the node's position x, the body's rotation A(theta), the wheel's centre c = x + A p and its axle
 a = A b (p and b fixed in the body), the contact search gives the vector d from the centre to the contact
@@ -7,7 +7,7 @@ is linear in the coordinates' rates:
 
     F (x' + w x (A p + d)) = F [I, -skew(A p + d) G(theta)] (x', theta') = W q'
 
-whose normal row is the gap's gradient, since the contact is a closest approach.
+and its normal row is the gap's gradient, since the contact is a closest approach.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from ...reference.kernels.wheel import contact_frame
 
 @jit
 def axes(t0, t1, t2, t3):
-    """Unit vectors (x, y, z) of a body with Euler parameters of any length.
+    """Return unit vectors (x, y, z) of a body with Euler parameters of any length.
 
-    Newton's iterates leave the unit sphere; the engine's own equation brings them back, so contact must
-    not feel the length.
+    Newton's iterates leave the unit sphere, and the engine's own equation brings them back, so the contact must
+    not depend on the length.
     """
     s = 2 / (t0 * t0 + t1 * t1 + t2 * t2 + t3 * t3)
     x = (1 - s * (t2 * t2 + t3 * t3), s * (t1 * t2 + t0 * t3), s * (t1 * t3 - t0 * t2))
@@ -35,7 +35,7 @@ def axes(t0, t1, t2, t3):
 
 @jit
 def rotate_vector(body, v):
-    """Inertial components of a vector ``v`` fixed in a body with unit vectors ``body``."""
+    """Return the inertial components of a vector ``v`` fixed in a body with unit vectors ``body``."""
     return (
         body[0][0] * v[0] + body[1][0] * v[1] + body[2][0] * v[2],
         body[0][1] * v[0] + body[1][1] * v[1] + body[2][1] * v[2],
@@ -77,12 +77,13 @@ def velocity_rows(coordinates, centre, triad, radius, ground, function, paramete
 
 @jit
 def constraints(state, centres, triads, radii, ground, function, parameters, scale, rows, values):
-    """Evaluate the rolling constraints of k wheels again at every `next`.
+    """Evaluate the rolling constraints of k wheels at every `next`.
 
-    A generator: its arguments are unpacked once, which would otherwise cost ten times the evaluation.
+    This is a generator so that its arguments are unpacked only once, which would otherwise take ten times as long as
+    the evaluation.
 
-    state (2 k, 7) holds the wheels' coordinates, then their rates; centres (k, 3), triads (k, 3, 3) and
-    radii (k,) are the wheels; scale (1,) multiplies the slip on position level. Fills rows (3 k, 7 k) with
+    state (2 k, 7) has the wheels' coordinates, then their rates; centres (k, 3), triads (k, 3, 3) and
+    radii (k,) describe the wheels; scale (1,) multiplies the slip on position level. Fills rows (3 k, 7 k) with
     W of all wheels, and values (2, 3 k): on position level (scale lateral, scale forward, gap), on velocity
     level W q'.
     """
@@ -104,9 +105,9 @@ def constraints(state, centres, triads, radii, ground, function, parameters, sca
 
 @jit
 def probe(state, centre, triad, radius, ground, function, parameters, point, frame, slip, gap):
-    """Measure the contact of one wheel again at every `next`.
+    """Measure the contact of one wheel at every `next`.
 
-    state (2, 7) holds its coordinates and their rates. Fills point (3,), frame (3, 3) with rows lateral,
+    state (2, 7) has its coordinates and their rates. Fills point (3,), frame (3, 3) with rows lateral,
     forward and normal, slip (2,), and gap (1,).
     """
     rows = np.empty((3, 7))
@@ -126,9 +127,9 @@ def probe(state, centre, triad, radius, ground, function, parameters, point, fra
 
 @jit
 def normals(coordinates, centres, triads, radii, ground, function, parameters, out):
-    """Fill ``out`` (k, 3) with the surface's normals at the contacts of k wheels, again at every `next`.
+    """Fill ``out`` (k, 3) with the surface's normals at the contacts of k wheels at every `next`.
 
-    A wheel without contact gets NaN, on which the engine ends: any other normal would be taken for the true one.
+    A wheel without contact gets NaN, with which the engine stops; any other normal would be used as if it were right.
     """
     while True:
         for wheel in range(radii.size):

@@ -1,4 +1,4 @@
-"""The bicycle as the engine's multibody system: four rigid bodies, three revolute joints, two wheels on the ground."""
+"""The bicycle as a multibody system in Exudyn: four rigid bodies, three revolute joints, two wheels on the ground."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from .wheels import LEFT_AXIS, MASS_UNIT, PutOnGround, WheelRolling
 
 @dataclass(frozen=True)
 class Model:
-    """An assembled system, ready to solve.
+    """An assembled system, ready to be solved.
 
     Attributes
     ----------
     container : exudyn.SystemContainer
-        Owner of the system; it must outlive it.
+        Owner of the system, which must live as long as the system.
     system : exudyn.MainSystem
-    rolling : Rolling
+    rolling : WheelRolling
         Both wheels on the ground.
     sensors : tuple of dict
-        Per body, in the order of `BODIES`, sensor numbers of position, velocity, rotation and spin.
+        For each body, in the order of `BODIES`, sensor numbers of position, velocity, rotation and spin.
     wheels : tuple
         Nodes of the rear and the front wheel.
     """
@@ -48,9 +48,9 @@ def build_model(problem: Problem, settings: SolverSettings, put_on_ground: PutOn
     container = exu.SystemContainer()
     system = container.AddSystem()
     bodies = _add_bodies(system, problem)
-    _connect(system, problem.bicycle, problem.q, [body["bodyNumber"] for body in bodies])
+    _connect_bodies(system, problem.bicycle, problem.q, [body["bodyNumber"] for body in bodies])
     rolling = put_on_ground(system, bodies[2:], problem, settings)
-    sensors = tuple(_watch(system, body["bodyNumber"]) for body in bodies)
+    sensors = tuple(_add_sensors(system, body["bodyNumber"]) for body in bodies)
     system.Assemble()
     rear, front = (body["nodeNumber"] for body in bodies[2:])
     return Model(container, system, rolling, sensors, (rear, front))
@@ -81,8 +81,8 @@ def _add_bodies(system: exu.MainSystem, problem: Problem) -> list[dict[str, Any]
     return bodies
 
 
-def _connect(system: exu.MainSystem, bicycle: Bicycle, q: np.ndarray, bodies: list[Any]) -> None:
-    """Hinge the wheels in their frames and the front frame in the rear one, along the axes at the start."""
+def _connect_bodies(system: exu.MainSystem, bicycle: Bicycle, q: np.ndarray, bodies: list[Any]) -> None:
+    """Connect the wheels to their frames and the front frame to the rear one by hinges, along the axes at the start."""
     rear_frame, front_frame, rear_wheel, front_wheel = bodies
     rotation, position = rotations(bicycle, q[None])[0], body_positions(bicycle, q[None])[0]
     for pair, point, axis in (
@@ -93,8 +93,8 @@ def _connect(system: exu.MainSystem, bicycle: Bicycle, q: np.ndarray, bodies: li
         system.CreateRevoluteJoint(itemNumbers=pair, position=point, axis=axis, show=False)
 
 
-def _watch(system: exu.MainSystem, body: Any) -> dict[str, Any]:
-    """Sensors of a body's motion, stored in memory."""
+def _add_sensors(system: exu.MainSystem, body: Any) -> dict[str, Any]:
+    """Add sensors of a body's motion, stored in memory."""
     kinds: dict[str, Any] = {
         "position": exu.OutputVariableType.Position,
         "velocity": exu.OutputVariableType.Velocity,
@@ -110,7 +110,7 @@ def _watch(system: exu.MainSystem, body: Any) -> dict[str, Any]:
 
 
 def make_rim_check(model: Model, problem: Problem) -> Callable[[float], Ending | None]:
-    """Make the look at both rims that `velodrome.engines.exudyn.solve.integrate` calls at every step.
+    """Make the check of both rims that `velodrome.engines.exudyn.solve.integrate` calls at every step.
 
     Raises
     ------
@@ -136,14 +136,14 @@ def make_rim_check(model: Model, problem: Problem) -> Callable[[float], Ending |
 
 @dataclass(frozen=True)
 class BodyMotion:
-    """Motion of the four bodies as the engine computed it, all in inertial axes.
+    """Motion of the four bodies as computed by the engine, in inertial axes.
 
     Attributes
     ----------
     time : ndarray, shape (n,)
-        Sampling times by the engine's own clock [s].
+        Sampling times from the engine's own clock [s].
     position, velocity, spin : ndarray, shape (n, 4, 3)
-        Of the centres of mass [m, m/s] and angular velocities [rad/s].
+        Positions and velocities of the centres of mass [m, m/s], and angular velocities [rad/s].
     rotation : ndarray, shape (n, 4, 3, 3)
         Body to inertial axes.
     """
@@ -155,11 +155,11 @@ class BodyMotion:
     spin: np.ndarray
 
 
-_SIZES = {"position": 3, "velocity": 3, "rotation": 9, "spin": 3}  # of a body's sensors
+_SIZES = {"position": 3, "velocity": 3, "rotation": 9, "spin": 3}  # numbers of values of a body's sensors
 
 
 def stored_samples(model: Model, sensor: Any) -> np.ndarray:
-    """Samples of a sensor after a run, shape (n, 1 + k): time and values."""
+    """Return the samples of a sensor after a run, shape (n, 1 + k): time and values."""
     return np.atleast_2d(model.system.GetSensorStoredData(sensor))
 
 
@@ -168,7 +168,7 @@ def read_motion(model: Model) -> BodyMotion:
     time = stored_samples(model, model.sensors[0]["position"])[:, 0].copy()
     values = {name: np.empty((len(time), 4, size)) for name, size in _SIZES.items()}
     for body, sensors in enumerate(model.sensors):
-        for name, where in values.items():  # one sensor's copy at a time: a long ride has many samples
-            where[:, body] = stored_samples(model, sensors[name])[:, 1:]
+        for name, out in values.items():  # one sensor's copy at a time, since a long ride has many samples
+            out[:, body] = stored_samples(model, sensors[name])[:, 1:]
     rotation = values["rotation"].reshape(len(time), 4, 3, 3)
     return BodyMotion(time, values["position"], values["velocity"], rotation, values["spin"])

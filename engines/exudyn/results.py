@@ -1,4 +1,4 @@
-"""From the engine's bodies and multipliers to the suite's quantities."""
+"""The suite's quantities from the engine's bodies and multipliers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Contacts:
 
 
 def measure_contacts(problem: Problem, model: Model, motion: BodyMotion) -> Contacts:
-    """Measure gap and slip on the wheels' own bodies, and turn the contact forces to inertial axes."""
+    """Measure gap and slip at the wheels' bodies, and transform the contact forces to inertial axes."""
     n = len(motion.time)
     point, force, gap, slip = np.empty((n, 2, 3)), np.empty((n, 2, 3)), np.empty((n, 2)), np.empty((n, 2, 2))
     function, parameters = problem.surface.function.real, problem.surface.parameters
@@ -55,12 +55,12 @@ def measure_contacts(problem: Problem, model: Model, motion: BodyMotion) -> Cont
 
 
 def weights(bicycle: Bicycle) -> np.ndarray:
-    """Weights of the four bodies in the model's unit of force, shape (4,)."""
+    """Return the weights of the four bodies in the model's unit of force, shape (4,)."""
     return bicycle.gravity / MASS_UNIT * np.array([bicycle.body_mass(body) for body in BODIES])
 
 
 def read_energies(bicycle: Bicycle, motion: BodyMotion) -> tuple[np.ndarray, np.ndarray]:
-    """Kinetic and potential energy of the four bodies, each of shape (n,) [J]."""
+    """Compute kinetic and potential energy of the four bodies, each of shape (n,) [J]."""
     mass = np.array([bicycle.body_mass(body) for body in BODIES])
     inertia = np.stack([bicycle.inertia(body) for body in BODIES])
     spin = np.einsum("nbji,nbj->nbi", motion.rotation, motion.spin)
@@ -70,7 +70,7 @@ def read_energies(bicycle: Bicycle, motion: BodyMotion) -> tuple[np.ndarray, np.
 
 
 def read_coordinates(problem: Problem, motion: BodyMotion) -> tuple[np.ndarray, np.ndarray]:
-    """Generalised coordinates and rates (n, 9), the angles on the turn on which the problem starts."""
+    """Compute generalised coordinates and rates (n, 9), with angles on the same turn as the problem's start."""
     q, qd = coordinates_from_bodies(
         problem.bicycle, motion.time, motion.position[:, 0], motion.velocity[:, 0], motion.rotation, motion.spin
     )

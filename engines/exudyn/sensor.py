@@ -1,4 +1,4 @@
-"""What a rolling joint shows: contact point, gap, slip and contact force, as sensors of the engine."""
+"""Sensors of a rolling joint: contact point, gap, slip and contact force."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def CreateRollingJointSensor(
         the material velocity there, lateral and forward, (2,) [m/s]; force of the ground on the wheel,
         (3,) [N]. Vectors in inertial axes.
     wheel : int
-        Which of the joint's wheels.
+        Index of the wheel in the joint.
     name, storeInternal, fileName
-        As the engine's sensors take them.
+        As for the engine's sensors.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def CreateRollingJointSensor(
         raise ValueError(f"the joint has no wheel {wheel!r}; it has {len(joint.radii)}")
     item = SensorUserFunction(
         name=name,
-        sensorUserFunction=_user_function(joint, quantity, wheel),
+        sensorUserFunction=_make_user_function(joint, quantity, wheel),
         storeInternal=storeInternal,
         writeToFile=bool(fileName),
         fileName=fileName,
@@ -62,7 +62,7 @@ def CreateRollingJointSensor(
     return mbs.AddSensor(item)
 
 
-def _user_function(joint: RollingJoint, quantity: Quantity, wheel: int) -> Any:
+def _make_user_function(joint: RollingJoint, quantity: Quantity, wheel: int) -> Any:
     state = np.zeros((2, 7))
     state[0, 2], state[0, 3] = joint.radii[wheel], 1.0
     point, frame, slip, gap = np.empty(3), np.empty((3, 3)), np.empty(2), np.empty(1)
@@ -70,10 +70,10 @@ def _user_function(joint: RollingJoint, quantity: Quantity, wheel: int) -> Any:
     where = (rim_search(joint.surface, joint.radii), function, joint.surface.parameters)
     shape = (joint.centres[wheel], joint.triads[wheel], joint.radii[wheel])
     measure = kernel.probe(state, *shape, *where, point, frame, slip, gap).__next__
-    seen = {"ContactPoint": point, "Gap": gap, "Slip": slip}
+    values = {"ContactPoint": point, "Gap": gap, "Slip": slip}
     node, kind = joint.nodeNumbers[wheel], exu.OutputVariableType
 
-    # The generator does not keep the surface's compiled function alive: the default argument does.
+    # The generator does not keep the surface's compiled function alive, but the default argument does.
     def value(mbs, _time, _sensors, _factors, configuration, _function=function):
         state[0] = mbs.GetNodeOutput(node, kind.CoordinatesTotal, configuration)
         state[1] = mbs.GetNodeOutput(node, kind.Coordinates_t, configuration)
@@ -81,6 +81,6 @@ def _user_function(joint: RollingJoint, quantity: Quantity, wheel: int) -> Any:
         if quantity == "ContactForce":
             multipliers = mbs.GetObjectOutput(joint.objectNumber, kind.Force, configuration)
             return (-multipliers[3 * wheel : 3 * wheel + 3] @ frame).tolist()
-        return seen[quantity].tolist()
+        return values[quantity].tolist()
 
     return value

@@ -10,10 +10,14 @@ from ..engine import Settings
 
 
 class SolverSettings(Settings):
-    """What every model in Exudyn is solved with."""
+    """Settings common to all engines in Exudyn."""
 
     step: float = Field(
-        default=1e-3, ge=1e-6, le=0.05, description="Step size [s]; the output interval is a multiple of it."
+        default=1e-3,
+        ge=1e-6,
+        le=0.05,
+        description="Step size [s]; the output interval is a multiple of it.",
+        json_schema_extra={"unit": "s"},
     )
     solver: Literal["generalized-alpha", "trapezoidal-index2"] = Field(
         default="generalized-alpha",
@@ -24,8 +28,9 @@ class SolverSettings(Settings):
         default=0.8,
         ge=0,
         lt=1,
-        description="Generalized alpha's spectral radius at infinite frequency: below 1, or errors of the contact "
-        "forces never die out. The trapezoidal rule has none.",
+        description="Generalized alpha's spectral radius at infinite frequency; it must be below 1, or errors of the "
+        "contact forces do not decay. The trapezoidal rule does not have one.",
+        json_schema_extra={"unit": "1"},
     )
     jacobian: Literal["iteration", "step", "reuse"] = Field(
         default="step",
@@ -36,13 +41,18 @@ class SolverSettings(Settings):
         default=1e-11,
         gt=0,
         le=1e-4,
-        description="Newton's method stops when its residual has fallen by this factor. The residual is one norm of "
-        "the forces' imbalance [kN] and of the constraints' violation [m; of slip, m in a step]. The library starts "
-        "every step without constraint forces, so it falls from the bodies' weights, 0.84 kN for the benchmark "
-        "bicycle: 1e-11 lets go of 8e-12 m, and of a slip of some 2e-8 m/s at a step of 1 ms.",
+        description="Newton's method stops when its residual has decreased by this factor. The residual is a norm of "
+        "both the imbalance of forces [kN] and the violation of constraints [m; of slip, m in a step]. The library "
+        "starts every step without constraint forces, so the residual decreases from the bodies' weights, 0.84 kN for "
+        "the benchmark bicycle: 1e-11 leaves 8e-12 m, and a slip of about 2e-8 m/s at a step of 1 ms.",
+        json_schema_extra={"unit": "1"},
     )
     newton_absolute_tolerance: float = Field(
-        default=1e-12, gt=0, le=1e-4, description="Newton's method stops below this residual [kN and m, one norm]."
+        default=1e-12,
+        gt=0,
+        le=1e-4,
+        description="Newton's method stops below this residual [kN and m, one norm].",
+        json_schema_extra={"unit": "kN, m"},
     )
 
 
@@ -52,5 +62,5 @@ class ExudynSettings(SolverSettings):
     start: Literal["second-order", "engine"] = Field(
         default="second-order",
         description="How generalized alpha starts: corrected, so that contact forces are of second order from the "
-        "first step (Arnold, Bruels and Cardona 2015), or as the engine does, of first order until that dies out.",
+        "first step (Arnold, Bruels and Cardona 2015), or as in the engine, of first order until that decays.",
     )

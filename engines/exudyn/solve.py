@@ -1,4 +1,4 @@
-"""Integration by the engine's implicit solvers."""
+"""Integration by Exudyn's implicit solvers."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ PROGRESS_STEPS = 100
 class Integration:
     """How to integrate: until ``end`` [s] in equal ``steps``, with ``samples`` evenly spaced samples after the start.
 
-    With ``slip_equations`` generalized alpha starts as in `velodrome.engines.exudyn.start`; None leaves the start to
-    the engine.
+    With ``slip_equations`` generalized alpha starts as in `velodrome.engines.exudyn.start`; with None the engine
+    computes the start.
     """
 
     end: float
@@ -38,22 +38,22 @@ class Integration:
 
 @dataclass(frozen=True)
 class IntegrationOutcome:
-    """What an integration came to.
+    """Result of an integration.
 
     Attributes
     ----------
     steps : int
-        Steps done.
+        Number of steps taken.
     cpu_time : float
         Process CPU time [s].
     ended : str or None
-        Why it ended early; None if it did not.
+        Why the integration ended early; None if it did not.
     unconverged_steps : int
-        Steps done whose Newton iteration did not converge by the engine's own word.
+        Number of steps whose Newton iteration did not converge according to the engine.
     largest_residual : float
-        That Newton's method left in a step done: a norm of forces and lengths, in the model's units.
+        Largest residual that Newton's method left in a step: a norm of forces and lengths, in the model's units.
     until : float
-        Time after which nothing belongs to the ride any more [s].
+        Time after which samples do not belong to the ride [s].
     """
 
     steps: int
@@ -65,19 +65,19 @@ class IntegrationOutcome:
 
 
 class _Steps:
-    """The steps of a run, as the engine's call before every step sees them.
+    """Bookkeeping of a run's steps, from the engine's call before every step.
 
-    The call also tells the engine which steps' ends are samples. By its own period it would leave some out: it adds
-    the period up, and skips a sample once the sum is 1e-10 s too large.
+    The call also tells the engine at which steps' ends to sample. With its own sampling period the engine would omit
+    some samples: it accumulates the period, and skips a sample if the sum is 1e-10 s too large.
 
     Attributes
     ----------
     taken : int
-        Steps begun.
+        Number of steps begun.
     unconverged : int
-        Of those done.
+        Number of finished steps that did not converge.
     residual : float
-        Largest that Newton's method left in a step done.
+        Largest residual that Newton's method left in a finished step.
     """
 
     def __init__(self, solver: Any, integration: Integration) -> None:
@@ -86,7 +86,7 @@ class _Steps:
         self._stride = integration.steps // integration.samples
 
     def end(self) -> None:
-        """Take down how the step at work converged, once it is done."""
+        """Record the convergence of the current step after it is finished."""
         self.unconverged += not self._convergence.newtonConverged
         self.residual = max(self.residual, self._convergence.residual)
 
@@ -97,7 +97,7 @@ class _Steps:
             self._output.lastSensorsWritten = time
 
     def outcome(self, done: int, cpu_time: float, ended: str | None, until: float = math.inf) -> IntegrationOutcome:
-        """Outcome of a run."""
+        """Return the outcome of a run."""
         return IntegrationOutcome(done, cpu_time, ended, self.unconverged, self.residual, until)
 
 
@@ -107,22 +107,22 @@ def integrate(
     progress: Progress,
     look: Callable[[float], Ending | None] = lambda _: None,
 ) -> IntegrationOutcome:
-    """Integrate a system from its initial state; its sensors hold the result.
+    """Integrate a system from its initial state; its sensors contain the result.
 
     Parameters
     ----------
     system : exudyn.MainSystem
-        Assembled.
+        An assembled system.
     integration : Integration
     progress : callable
-        Called now and then with the simulated time [s]; what it raises ends the run and is raised again.
+        Called now and then with the simulated time [s]; an exception from it ends the run and is raised again.
     look : callable
-        Called with the time [s] before each step and after the last; says why the ride ends there, or None.
+        Called with the time [s] before each step and after the last; returns why the ride ends there, or None.
 
     Raises
     ------
     EngineError
-        If the engine did not come to the first step.
+        If the engine did not reach the first step.
     """
     raised: list[BaseException] = []
     step = integration.end / integration.steps
@@ -131,7 +131,7 @@ def integrate(
     steps = _Steps(solver, integration)
     ending: Ending | None = None
 
-    with _interruptible() as interrupted:
+    with _delay_interrupt() as interrupted:
 
         def before_step(_system, time):
             nonlocal ending
@@ -146,7 +146,7 @@ def integrate(
                 if steps.taken > 0 and steps.taken % PROGRESS_STEPS == 0:
                     progress(steps.taken * step)
                 steps.begin(time)
-            except BaseException as error:  # an exception must not cross the engine, which would swallow it
+            except BaseException as error:  # the engine would swallow an exception
                 raised.append(error)
             return not (raised or interrupted.is_set())
 
@@ -164,7 +164,7 @@ def integrate(
         cpu_time += time.process_time()
     if raised:
         raise raised[0]
-    if interrupted.is_set():  # by a signal that the caller has made harmless
+    if interrupted.is_set():  # only if the caller ignores the signal
         return steps.outcome(steps.taken, cpu_time, "interrupted")
     if ending is not None:  # before a step that was not taken
         return steps.outcome(steps.taken, cpu_time, ending.why, ending.time)
@@ -180,19 +180,19 @@ def integrate(
 
 
 def simulation_settings(integration: Integration) -> exu.SimulationSettings:
-    """Settings of the library."""
+    """Return the library's settings."""
     chosen = integration.settings
     settings = exu.SimulationSettings()
     settings.solution.file.write = False
-    # Beyond the end: after the start, no step's end is a sample but those that `_Steps` names, and the last.
+    # Beyond the end: after the start, samples are only at the ends of the steps that `_Steps` chooses, and at the last.
     settings.solution.sensors.writePeriod = 2 * integration.end
-    # The default inverts the matrix of some fifty unknowns, which takes nearly as long as the rest of the step.
+    # The default inverts a matrix of about fifty unknowns, which takes nearly as long as the rest of the step.
     settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
     method: Any = settings.timeIntegration
     method.verboseMode = 0
     method.numberOfSteps = integration.steps
     method.endTime = integration.end
-    # A refused step ends the run: a shorter one would miss the output times and hide the failure.
+    # A refused step ends the run: a shorter step would miss the output times and hide the failure.
     method.adaptiveStep = False
     method.generalizedAlpha.spectralRadius = chosen.spectral_radius
     trapezoidal = chosen.solver == "trapezoidal-index2"
@@ -201,14 +201,14 @@ def simulation_settings(integration: Integration) -> exu.SimulationSettings:
     method.newton.modifiedNewtonJacUpdatePerStep = chosen.jacobian == "step"
     method.newton.relativeTolerance = chosen.newton_relative_tolerance
     method.newton.absoluteTolerance = chosen.newton_absolute_tolerance
-    # Else a first iterate that is worse than the start would loosen the relative tolerance.
+    # Otherwise a first iterate that is worse than the start would loosen the relative tolerance.
     method.newton.adaptInitialResidual = False
     return settings
 
 
 @contextmanager
 def no_progress() -> Iterator[None]:
-    """Keep the engine's messages off the standard output."""
+    """Suppress the engine's messages on the standard output."""
     before = exu.config.printToConsole
     exu.config.printToConsole = False
     try:
@@ -218,10 +218,10 @@ def no_progress() -> Iterator[None]:
 
 
 @contextmanager
-def _interruptible() -> Iterator[threading.Event]:
-    """Hold back SIGINT until the integration has stopped.
+def _delay_interrupt() -> Iterator[threading.Event]:
+    """Delay SIGINT until the integration has stopped.
 
-    Python would raise inside a user function, from where the engine makes an error of its own of it.
+    Python would raise an exception inside a user function, which the engine would turn into an error of its own.
     """
     interrupted = threading.Event()
     if threading.current_thread() is not threading.main_thread():

@@ -1,19 +1,19 @@
-"""Start values for generalized alpha that give the multipliers its second order from the first step.
+"""Start values for generalized alpha with which the multipliers are of second order from the first step.
 
-Generalized alpha with positions constrained keeps q_n on the constraints, but its velocities leave them:
+Generalized alpha with constrained positions keeps q_n on the constraints, but its velocities leave them:
 with D = alpha_m - alpha_f the position formula has the error C h^3 q''', C = (1 - 6 beta - 3 D) / 6, so the
 velocities of the smooth numerical solution satisfy B v_n = C h^2 B q''' with B the constraints' Jacobian,
-and the auxiliary accelerations belong to the time t_n + D h. A start with B v = 0 and a_0 = q''_0, which is
-what the engine does, excites an oscillation of the multipliers of first order in h, damped by nothing but
+and the auxiliary accelerations are those at the time t_n + D h. A start with B v = 0 and a_0 = q''_0, as in
+the engine, excites an oscillation of the multipliers of first order in h, which is damped only by
 the spectral radius (Arnold, Bruels and Cardona: Error analysis of generalized-alpha Lie group time
-integration methods for constrained mechanical systems. Numerische Mathematik 129, 2015). The cure is to
+integration methods for constrained mechanical systems. Numerische Mathematik 129, 2015). The remedy is to
 start from
 
     v_0 + C h^2 P q''',    a_0 = q''_0 + D h q''',
 
-where P takes q''' to the velocities of smallest kinetic energy with the same B v and no slip: rows that
-hold velocities do so exactly. All of it comes from the engine: accelerations at the start and one step
-before and after, mass matrix, Jacobian. The initial sample keeps the velocities that it was given.
+where P maps q''' to the velocities of smallest kinetic energy with the same B v and without slip: rows that
+constrain velocities hold exactly. All of it is computed by the engine: accelerations at the start and one step
+before and after it, mass matrix, Jacobian. The initial sample keeps the given velocities.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ CURRENT: Any = exu.ConfigurationType.Current
 
 @dataclass(frozen=True)
 class GeneralizedAlphaStart:
-    """Start values.
+    """Start values of generalized alpha.
 
     Attributes
     ----------
     acceleration, multipliers : ndarray
-        Of the given state.
+        Those of the given state.
     auxiliary : ndarray
         Generalized alpha's accelerations a_0.
     velocity : ndarray
-        Corrected, to be set before the first step.
+        Corrected velocity, to be set before the first step.
     """
 
     acceleration: np.ndarray
@@ -60,27 +60,27 @@ def second_order_start(
     Parameters
     ----------
     system : exudyn.MainSystem
-        Its initial state satisfies the constraints and is left as it is.
+        Its initial state satisfies the constraints and is left unchanged.
     settings : exudyn.SimulationSettings
-        With generalized alpha.
+        Settings with generalized alpha.
     step : float
         Step size h [s].
     slip_equations : sequence of int
-        Algebraic equations that hold velocities.
+        Indices of the algebraic equations that constrain velocities.
 
     Raises
     ------
     EngineError
-        If the engine finds no accelerations.
+        If the engine finds no initial accelerations.
     """
     data: Any = system.systemData
     q, v = np.array(data.GetODE2Coordinates(INITIAL)), np.array(data.GetODE2Coordinates_t(INITIAL))
-    a, multipliers, mass, jacobian = _dynamics(system, settings, q, v)
+    a, multipliers, mass, jacobian = _compute_dynamics(system, settings, q, v)
     if not np.all(np.isfinite(a)):
         raise EngineError("exudyn could not start: it finds no initial accelerations; is a wheel without contact?")
 
     def acceleration(h: float) -> np.ndarray:
-        return _dynamics(system, settings, q + h * v + h * h / 2 * a, v + h * a)[0]
+        return _compute_dynamics(system, settings, q + h * v + h * h / 2 * a, v + h * a)[0]
 
     jerk = (acceleration(step) - acceleration(-step)) / (2 * step)
     _set_initial(system, q, v)
@@ -93,9 +93,9 @@ def second_order_start(
 
 
 def begin(system: exu.MainSystem, settings: exu.SimulationSettings, solver: Any, start: GeneralizedAlphaStart) -> bool:
-    """Initialize a solver with start values; the velocity is left to `correct_start`."""
+    """Initialize a solver with start values; the velocity is set later, by `correct_start`."""
     settings.timeIntegration.generalizedAlpha.computeInitialAccelerations = False
-    # What the solver finds as initial accelerations becomes its auxiliary ones; the true ones follow.
+    # The initial accelerations that the solver finds become its auxiliary ones; the true ones are set afterwards.
     data: Any = system.systemData
     data.SetODE2Coordinates_tt(start.auxiliary, INITIAL)
     ready = solver.InitializeSolver(system, settings)
@@ -105,7 +105,7 @@ def begin(system: exu.MainSystem, settings: exu.SimulationSettings, solver: Any,
 
 
 def correct_start(system: exu.MainSystem, start: GeneralizedAlphaStart) -> None:
-    """Set the corrected velocity: after the initial sample, before the first step."""
+    """Set the corrected velocity, after the initial sample and before the first step."""
     data: Any = system.systemData
     data.SetODE2Coordinates_t(start.velocity, CURRENT)
 
@@ -116,10 +116,10 @@ def _set_initial(system: exu.MainSystem, q: np.ndarray, v: np.ndarray) -> None:
     data.SetODE2Coordinates_t(v, INITIAL)
 
 
-def _dynamics(
+def _compute_dynamics(
     system: exu.MainSystem, settings: exu.SimulationSettings, q: np.ndarray, v: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Accelerations, multipliers, mass matrix and constraint Jacobian of a state, by the engine."""
+    """Compute accelerations, multipliers, mass matrix and constraint Jacobian of a state by the engine."""
     _set_initial(system, q, v)
     solver: Any = exu.MainSolverImplicitSecondOrder()
     solver.InitializeSolver(system, settings)

@@ -1,4 +1,4 @@
-"""Ways to put the bicycle's two wheels on the ground, and to read the contact forces after a run."""
+"""Ways to put the bicycle's wheels on the ground, and to read the contact forces after a run."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from .joint import CreateRollingJointOnSurface, RollingJoint, slip_equations
 from .method import generalized_alpha
 from .settings import SolverSettings
 
-# Of the models, in kilograms, and so of their forces in newtons. Newton's residual is one norm of forces and of
-# lengths, measured against the bodies' weights: in kilograms it would let go of lengths a thousand times too soon.
+# Mass unit of the models [kg], and so their unit of force [N]. Newton's residual is a norm of both forces and lengths,
+# relative to the bodies' weights: in kilograms the iterations would stop a thousand times too early for lengths.
 MASS_UNIT = 1000.0
 
 LEFT_AXIS = np.array([0.0, 1.0, 0.0])
@@ -30,11 +30,11 @@ class WheelRolling(Protocol):
     """Both wheels on the ground."""
 
     def local_forces(self, system: exu.MainSystem) -> np.ndarray:
-        """Forces of the ground on the wheels after a run, (n, 2, 3): lateral, forward, normal [N]."""
+        """Return forces of the ground on the wheels after a run, (n, 2, 3): lateral, forward, normal [N]."""
         ...
 
     def slip_equations(self, system: exu.MainSystem) -> list[int]:
-        """Numbers of those algebraic equations that hold velocities though declared holonomic."""
+        """Return indices of the algebraic equations that constrain velocities although declared holonomic."""
         ...
 
 
@@ -43,17 +43,17 @@ PutOnGround = Callable[[exu.MainSystem, Sequence[WheelBody], Problem, SolverSett
 
 @dataclass(frozen=True)
 class Constrained:
-    """Wheels on the joint of this package, both in one object."""
+    """Wheels on this package's joint, both in one object."""
 
     joint: RollingJoint
     sensor: Any
 
     def local_forces(self, system: exu.MainSystem) -> np.ndarray:
-        """See `WheelRolling`: the engine adds W^T lambda to the inertia forces' side, so forces are minus lambda."""
-        return -_samples(system, self.sensor).reshape(-1, 2, 3)
+        """Return minus lambda, as the engine adds W^T lambda on the inertia forces' side; see `WheelRolling`."""
+        return -_read_forces(system, self.sensor).reshape(-1, 2, 3)
 
     def slip_equations(self, system: exu.MainSystem) -> list[int]:
-        """See `WheelRolling`."""
+        """Return the indices of the joint's slip rows; see `WheelRolling`."""
         return slip_equations(system, self.joint)
 
 
@@ -70,7 +70,7 @@ def constrain(
         surface=problem.surface,
         newmarkRatio=method.beta / method.gamma,
     )
-    return Constrained(joint, _watch(system, joint.objectNumber, exu.OutputVariableType.Force))
+    return Constrained(joint, _add_sensor(system, joint.objectNumber, exu.OutputVariableType.Force))
 
 
 @dataclass(frozen=True)
@@ -80,11 +80,11 @@ class Discs:
     sensors: tuple[Any, Any]
 
     def local_forces(self, system: exu.MainSystem) -> np.ndarray:
-        """See `WheelRolling`; the engine's contact axes are the same."""
-        return np.stack([_samples(system, sensor) for sensor in self.sensors], axis=1)
+        """Return the discs' forces, whose contact axes are the same as ours; see `WheelRolling`."""
+        return np.stack([_read_forces(system, sensor) for sensor in self.sensors], axis=1)
 
     def slip_equations(self, system: exu.MainSystem) -> list[int]:
-        """See `WheelRolling`: the discs are declared nonholonomic."""
+        """Return no equations, since the discs are declared nonholonomic; see `WheelRolling`."""
         return []
 
 
@@ -98,10 +98,10 @@ def roll_discs(
 def roll_discs_on_tangents(
     system: exu.MainSystem, wheels: Sequence[WheelBody], problem: Problem, _settings: SolverSettings
 ) -> Discs:
-    """Put the wheels on the surface by rolling discs whose normal follows the contact before every residual.
+    """Put the wheels on the surface by rolling discs with a normal that follows the contact before every residual.
 
-    The disc's constraints are velocities: of its plane they know the normal only, so there is no point of
-    the plane to follow, and the gap drifts.
+    The disc's constraints are velocities, and the plane enters them only by its normal: no point of
+    the plane can be followed, and the gap drifts.
     """
     nodes, out = [wheel["nodeNumber"] for wheel in wheels], np.empty((2, 3))
     coordinates = np.array([system.GetNode(node)["referenceCoordinates"] for node in nodes])
@@ -112,7 +112,7 @@ def roll_discs_on_tangents(
     discs, objects = _add_discs(system, wheels, problem, out)
     kind = exu.OutputVariableType
 
-    # The generator does not keep the surface's compiled function alive: the default argument does.
+    # The generator does not keep the surface's compiled function alive, but the default argument does.
     def follow(mbs, _time, _iteration, _discontinuous, _function=function):
         for wheel in range(2):
             coordinates[wheel] = mbs.GetNodeOutput(nodes[wheel], kind.CoordinatesTotal)
@@ -125,7 +125,7 @@ def roll_discs_on_tangents(
 
 
 def wheel_radii(problem: Problem) -> list[float]:
-    """Radii of the rear and the front wheel [m]."""
+    """Return the radii of the rear and the front wheel [m]."""
     return [problem.bicycle.rear_wheel_radius, problem.bicycle.front_wheel_radius]
 
 
@@ -144,15 +144,15 @@ def _add_discs(
         )
         for wheel, radius, normal in zip(wheels, wheel_radii(problem), normals, strict=True)
     ]
-    rear, front = (_watch(system, item, exu.OutputVariableType.ForceLocal) for item in objects)
+    rear, front = (_add_sensor(system, item, exu.OutputVariableType.ForceLocal) for item in objects)
     return Discs((rear, front)), objects
 
 
-def _watch(system: exu.MainSystem, item: Any, kind: Any) -> Any:
+def _add_sensor(system: exu.MainSystem, item: Any, kind: Any) -> Any:
     return system.AddSensor(
         SensorObject(objectNumber=item, outputVariableType=kind, storeInternal=True, writeToFile=False)
     )
 
 
-def _samples(system: exu.MainSystem, sensor: Any) -> np.ndarray:
+def _read_forces(system: exu.MainSystem, sensor: Any) -> np.ndarray:
     return MASS_UNIT * np.atleast_2d(system.GetSensorStoredData(sensor))[:, 1:]

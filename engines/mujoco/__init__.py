@@ -1,1 +1,1 @@
-"""MuJoCo on the bicycle: a ladder of models, from its defaults to what its solver can be pushed to."""
+"""Model the bicycle in MuJoCo, from MuJoCo's default settings to exact contacts and exact rolling forces."""

@@ -1,4 +1,4 @@
-"""Installing compiled callbacks in MuJoCo, for a while and one user at a time: MuJoCo has them once a process."""
+"""Install compiled callbacks in MuJoCo temporarily and for one user at a time: MuJoCo has one set per process."""
 
 # MuJoCo's compiled bindings carry no types.
 # pyright: reportAttributeAccessIssue=false
@@ -22,25 +22,27 @@ _in_use = Lock()
 
 @contextmanager
 def install_callbacks(control: Any, collision: Any = None) -> Iterator[None]:
-    """Let MuJoCo call compiled functions; what it called before is restored, however the block ends.
+    """Let MuJoCo call compiled functions inside the block, and restore the previous callbacks afterwards.
+
+    They are restored also where the block ends with an exception.
 
     Parameters
     ----------
-    control : numba cfunc
-        Called in every evaluation of the dynamics, after MuJoCo knows its constraints and bias forces.
-    collision : numba cfunc, optional
-        Called for planes with cylinders.
+        control : numba cfunc
+            Called in every evaluation of the dynamics, after MuJoCo has computed its constraints and bias forces.
+        collision : numba cfunc, optional
+            Called for each pair of a plane and a cylinder.
 
     Raises
     ------
-    EngineError
-        If callbacks are in use already, here or by someone else in this process.
+        EngineError
+            If callbacks are in use already, by this package or by other code in this process.
     """
     if not _in_use.acquire(blocking=False):
         raise EngineError("another model with compiled callbacks runs in this process; one must end before the next")
     try:
         if mujoco.get_mjcb_control() is not None:
-            raise EngineError("MuJoCo has a control callback already; mujoco.set_mjcb_control(None) ends it")
+            raise EngineError("MuJoCo has a control callback already; mujoco.set_mjcb_control(None) removes it")
         slot = collision_slot()
         before = slot.value
         try:

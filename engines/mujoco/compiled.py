@@ -1,29 +1,31 @@
-"""Compiled callbacks that MuJoCo calls inside its step: knife-edge contacts, and forces instead of contacts.
+"""Compiled callbacks that MuJoCo calls inside its step: knife-edge contacts, and forces in place of contacts.
 
-A wheel is a circle of radius r about its geom's z axis. Its contact with the ground z = f(x, y) is the
-closest approach of the two (`velodrome.reference.kernels.contact`), and a material point of the rim there has
+A wheel is a circle of radius r about the z axis of its geom. Its contact with the ground z = f(x, y) is the
+closest approach of the two (`velodrome.reference.kernels.contact`). The material point of the rim there has
 
     velocity      v = Jp q'
     acceleration  Jp q'' + gamma,    gamma = Jp' q' + w x (r a' t)
 
-where Jp' follows the material point and a' t r is how the contact runs along the rim. MuJoCo's contact rows
-prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `correct` subtracts it.
+where Jp' is the derivative for the material point and r a' t is the velocity of the contact along the rim. MuJoCo's
+contact rows prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `correct_reference` subtracts gamma.
 
-`press` leaves the contacts to itself: it solves, for the six forces on two wheels,
+`press` does not use MuJoCo's contacts. It solves, for the six force components on two wheels,
 
     Jp M^-1 Jp^T F = -(Jp a + gamma + s^2 gap n + 2 s v),    M a = passive - bias
 
-and applies Jp^T F; s is a rate of stabilisation, which on the constraints adds nothing.
+and applies Jp^T F. The stabilisation rate s contributes nothing where the constraints hold.
 
-`watch` looks on: what MuJoCo's solver makes of one evaluation is judged when the next one begins, which is the first
-moment after it that a callback sees (`convergence` says what it is judged by). `correct` does so too.
+`watch_iterations` only observes: it assesses the solution of MuJoCo's solver when the next evaluation begins, the first
+moment after the solution at which a callback is called (the criterion is in `convergence`). `correct_reference` does
+so too.
 
-What the callbacks work on is one `BLACKBOARD` a process: numbers, and addresses of arrays that stay where
-they are while a model lives. Its own address comes from a function that the linker resolves, so that the
-code can be kept on disk. All of it is in one file, because a changed file is what renews numba's cache.
+The callbacks of a process share one `BLACKBOARD`, which holds numbers and the addresses of arrays that keep their
+place while a model exists. Compiled code gets the blackboard's own address from a function that the linker resolves,
+so that the code can be cached on disk. All callbacks are in one file because numba renews its cache when that file
+changes.
 """
 
-# numba gives an intrinsic its typing context, and knows what its results are.
+# numba passes a typing context to an intrinsic and infers the result types itself.
 # pyright: reportCallIssue=false, reportGeneralTypeIssues=false
 
 from __future__ import annotations
@@ -43,21 +45,21 @@ from ...reference.kernels.vector import add, cross, dot
 from ...reference.kernels.wheel import contact_run
 from .library import announce_collision
 
-WHEEL_COUNT = 8  # the most that a blackboard has room for
-# A wheel whose centre is less than this above its contact lies flat [m].
+WHEEL_COUNT = 8  # largest number of wheels on a blackboard
+# A wheel whose centre is less than this above its contact counts as lying flat [m].
 FLAT = 1e-4
 
 _ADDRESS = np.uintp
 BLACKBOARD = np.dtype(
     [
-        # Callbacks are for one model's one state; others pass.
+        # The callbacks act on one state of one model and ignore all others.
         ("model", _ADDRESS),
         ("data", _ADDRESS),
-        ("collision", _ADDRESS),  # MuJoCo's own function for planes and cylinders
+        ("collision", _ADDRESS),  # MuJoCo's own collision function for planes and cylinders
         ("surface", _ADDRESS),
         ("parameters", _ADDRESS),
         ("parameter_count", np.int64),
-        # How closely to look at rims, `velodrome.reference.kernels.rim.RimSearch`.
+        # Resolution of the search along the rims, `velodrome.reference.kernels.rim.RimSearch`.
         ("curved", np.int64),
         ("bends", _ADDRESS),
         ("bend_count", np.int64),
@@ -65,7 +67,7 @@ BLACKBOARD = np.dtype(
         ("detail", np.float64),
         ("samples", np.int64),
         ("speeds", np.int64),
-        # Arrays of the state that never move.
+        # Arrays of the state whose addresses are constant.
         ("qvel", _ADDRESS),
         ("geom_xpos", _ADDRESS),
         ("geom_xmat", _ADDRESS),
@@ -82,10 +84,10 @@ BLACKBOARD = np.dtype(
         ("M_rowadr", _ADDRESS),
         ("M_colind", _ADDRESS),
         ("M_entries", np.int64),
-        # The inertia of the last evaluation, whose solution is judged when the next one begins.
+        # Inertia of the last evaluation, whose solution is assessed when the next evaluation begins.
         ("kept_M", _ADDRESS),
         ("pending", np.int64),
-        # What the judge counts: evaluations since a step that Python knows, and the steps that were left unconverged.
+        # Counters: evaluations since the last step that Python has reported, and steps left unconverged.
         ("evaluations", np.int64),
         ("evaluations_per_step", np.int64),
         ("since_step", np.int64),
@@ -96,7 +98,7 @@ BLACKBOARD = np.dtype(
         ("largest_residual", np.float64),
         ("wrong_step", np.int64),  # -1 if there is none
         ("wrong_residual", np.float64),
-        # Where the state keeps what does move, and where a contact keeps its parts.
+        # Offsets of mjData's pointers to arrays that move, and of the fields of mjContact [bytes].
         ("ncon_at", np.int64),
         ("contact_at", np.int64),
         ("efc_aref_at", np.int64),
@@ -118,29 +120,29 @@ BLACKBOARD = np.dtype(
         ("radius", np.float64, WHEEL_COUNT),
         ("place", np.float64, (WHEEL_COUNT, 3)),  # xi, eta, angle of the contacts
         ("force", np.float64, (WHEEL_COUNT, 3)),
-        ("lost", np.int64),  # how often a wheel had no contact point
-        ("found", np.int64),  # contacts made since the callbacks were installed
+        ("lost", np.int64),  # number of searches that found no contact point
+        ("found", np.int64),  # number of contacts found since the callbacks were installed
     ],
     align=True,
 )
 
 board = np.zeros(1, BLACKBOARD)
-_BOARD_AT = board.ctypes.data
-_WHERE = "velodrome_mujoco_blackboard"
+_BOARD_ADDRESS = board.ctypes.data
+_BOARD_SYMBOL = "velodrome_mujoco_blackboard"
 
 
-# Compiled anew in every process, the only code that knows an address.
+# Compiled anew in every process, because it contains an address.
 @cfunc(types.uintp())
-def _where_the_board_is():
-    return _BOARD_AT
+def _return_board_address():
+    return _BOARD_ADDRESS
 
 
-llvm.add_symbol(_WHERE, _where_the_board_is.address)
+llvm.add_symbol(_BOARD_SYMBOL, _return_board_address.address)
 announce_collision("mj_jac", "mj_jacDot", "mj_solveM", "mj_fwdActuation", "mj_fwdAcceleration")
 
 _pointer = types.voidptr
 _numbers = types.CPointer(types.float64)
-_where = types.ExternalFunction(_WHERE, types.uintp())
+_get_board_address = types.ExternalFunction(_BOARD_SYMBOL, types.uintp())
 _jac = types.ExternalFunction("mj_jac", types.void(_pointer, _pointer, _numbers, _numbers, _numbers, types.int32))
 _jac_dot = types.ExternalFunction(
     "mj_jacDot", types.void(_pointer, _pointer, _numbers, _numbers, _numbers, types.int32)
@@ -158,7 +160,7 @@ _COLLISION = types.FunctionType(COLLISION)
 
 @intrinsic
 def _function_at(typing, address, kind):
-    """Make an address a function of a given type, called as C functions are."""
+    """Return the function of a given type at an address, with the C calling convention."""
     function = kind.instance_type
 
     def build(context, builder, signature, arguments):
@@ -173,7 +175,7 @@ def _function_at(typing, address, kind):
 
 @intrinsic
 def _pointer_at(typing, address):
-    """Make an integer an address."""
+    """Convert an integer to a pointer."""
 
     def build(context, builder, signature, arguments):
         return builder.inttoptr(arguments[0], cgutils.voidptr_t)
@@ -183,7 +185,7 @@ def _pointer_at(typing, address):
 
 @intrinsic
 def _address_of(typing, pointer):
-    """Make an address an integer."""
+    """Convert a pointer to an integer."""
 
     def build(context, builder, signature, arguments):
         return builder.ptrtoint(arguments[0], context.get_value_type(types.uintp))
@@ -192,89 +194,89 @@ def _address_of(typing, pointer):
 
 
 @jit
-def _reals(address, count):
+def _real_array(address, count):
     return carray(_pointer_at(address), (count,), np.float64)
 
 
 @jit
-def _integers(address, count):
+def _integer_array(address, count):
     return carray(_pointer_at(address), (count,), np.int32)
 
 
 @jit
-def _integer(address):
+def _read_integer(address):
     return carray(_pointer_at(address), (1,), np.int32)[0]
 
 
 @jit
-def _stored(address):
+def _read_pointer(address):
     return carray(_pointer_at(address), (1,), np.uintp)[0]
 
 
 @jit
 def _blackboard():
-    return carray(_pointer_at(_where()), (1,), BLACKBOARD)[0]
+    return carray(_pointer_at(_get_board_address()), (1,), BLACKBOARD)[0]
 
 
 @jit
-def _is_for(board, model, data):
+def _is_watched(board, model, data):
     return _address_of(model) == board.model and _address_of(data) == board.data
 
 
 @jit
-def _wheel(board, k):
-    """Return (centre, axle) of wheel k."""
+def _wheel_pose(board, k):
+    """Return the centre and the axle of wheel k."""
     geom = board.geom[k]
-    at, turn = _reals(board.geom_xpos, 3 * geom + 3), _reals(board.geom_xmat, 9 * geom + 9)
+    at, turn = _real_array(board.geom_xpos, 3 * geom + 3), _real_array(board.geom_xmat, 9 * geom + 9)
     i, j = 3 * geom, 9 * geom
     return (at[i], at[i + 1], at[i + 2]), (turn[j + 2], turn[j + 5], turn[j + 8])
 
 
 @jit
-def _contact_at(board, k):
-    """Evaluate wheel k's contact at its place on the blackboard."""
-    centre, axle = _wheel(board, k)
+def _evaluate_contact(board, k):
+    """Evaluate the contact equations of wheel k at the contact parameters stored on the blackboard."""
+    centre, axle = _wheel_pose(board, k)
     x, z = level_axes(axle)
     function = _function_at(board.surface, _SURFACE)
     xi, eta, angle = board.place[k, 0], board.place[k, 1], board.place[k, 2]
-    parameters = _reals(board.parameters, board.parameter_count)
+    parameters = _real_array(board.parameters, board.parameter_count)
     here = contact.equations(centre, x, z, board.radius[k], xi, eta, angle, function, parameters)
     return centre, axle, here
 
 
 @jit
-def _find(board, k):
-    """Search wheel k's contact from its pose alone and keep its place; True where it stands on the ground."""
-    centre, axle = _wheel(board, k)
+def _find_contact(board, k):
+    """Find the contact of wheel k from its pose alone and store it; return whether the wheel stands on the ground."""
+    centre, axle = _wheel_pose(board, k)
     x, z = level_axes(axle)
     radius, function = board.radius[k], _function_at(board.surface, _SURFACE)
-    parameters = _reals(board.parameters, board.parameter_count)
+    parameters = _real_array(board.parameters, board.parameter_count)
     ground = RimSearch(
-        board.curved != 0, _reals(board.bends, board.bend_count), board.bend_width, board.detail, board.samples
+        board.curved != 0, _real_array(board.bends, board.bend_count), board.bend_width, board.detail, board.samples
     )
     xi, eta, angle, found = find_contact(centre, x, z, radius, ground, function, parameters)
     board.place[k, 0], board.place[k, 1], board.place[k, 2] = xi, eta, angle
     if not found:
         return False
     here = contact.equations(centre, x, z, radius, xi, eta, angle, function, parameters)
-    # Not ">=": what is no number is no contact either. Above its centre the search went round the rim.
+    # NaN gives False here. Where the contact is above the centre, the search went round the rim.
     return bool(dot(here.arm, here.normal) < -FLAT) and bool(np.isfinite(here.gap))
 
 
 @jit
-def _motion(board, k, model, data, rows, turning):
-    """Fill the contact point's velocity rows (3, n); return (contact, velocity, gamma).
+def _contact_motion(board, k, model, data, rows, turning):
+    """Fill the Jacobian (3, n) of the contact point's velocity; return the contact, the velocity and gamma.
 
-    ``turning`` (3, n) is room for the rows of the angular velocity.
+    ``turning`` (3, n) is a work array for the Jacobian of the angular velocity.
     """
-    centre, _, here = _contact_at(board, k)
+    centre, _, here = _evaluate_contact(board, k)
     point, rate = np.empty(3), np.empty((6, board.speeds))
     for i in range(3):
         point[i] = centre[i] + here.arm[i]
     body = types.int32(board.body[k])
     _jac(model, data, rows.ctypes, turning.ctypes, point.ctypes, body)
     _jac_dot(model, data, rate[:3].ctypes, rate[3:].ctypes, point.ctypes, body)
-    qvel = _reals(board.qvel, board.speeds)
+    qvel = _real_array(board.qvel, board.speeds)
     v, w, gamma = np.zeros(3), np.zeros(3), np.zeros(3)
     for i in range(3):
         for j in range(board.speeds):
@@ -288,21 +290,21 @@ def _motion(board, k, model, data, rows, turning):
 
 @compile_callback(COLLISION, error_model="numpy")
 def touch(model, data, made, ground, geom, margin):
-    """Collision function for planes and cylinders: a knife edge's contact with the true ground.
+    """Collision callback for a plane and a cylinder: the contact of a knife edge with the true ground.
 
-    Other planes and cylinders, and other models, get MuJoCo's own. A wheel without a contact point makes
-    no contact and is counted.
+    Planes and cylinders that are not on the blackboard, and other models, get MuJoCo's own function. A wheel without a
+    contact point makes no contact and is counted.
     """
     board = _blackboard()
-    if _is_for(board, model, data):
+    if _is_watched(board, model, data):
         for k in range(board.wheels):
             if board.geom[k] == geom and board.ground[k] == ground:
-                if not _find(board, k):
+                if not _find_contact(board, k):
                     board.lost += 1
                     return types.int32(0)
                 board.found += 1
-                centre, _, here = _contact_at(board, k)
-                out = _reals(_address_of(made), 10)
+                centre, _, here = _evaluate_contact(board, k)
+                out = _real_array(_address_of(made), 10)
                 out[0] = here.gap
                 for i in range(3):
                     out[1 + i] = centre[i] + here.arm[i]
@@ -313,7 +315,7 @@ def touch(model, data, made, ground, geom, margin):
 
 
 @jit
-def _wheel_of(board, geom, ground):
+def _find_wheel(board, geom, ground):
     for k in range(board.wheels):
         if board.geom[k] == geom and board.ground[k] == ground:
             return k
@@ -322,8 +324,8 @@ def _wheel_of(board, geom, ground):
 
 @jit
 def _row_axes(board, contact_at):
-    """Directions (3 or 4, 3) of MuJoCo's rows of one contact: normal and tangents, or the edges of a pyramid."""
-    frame, friction = _reals(contact_at + board.frame_at, 9), _reals(contact_at + board.friction_at, 2)
+    """Return the directions (3 or 4, 3) of one contact's rows: normal and tangents, or the edges of a pyramid."""
+    frame, friction = _real_array(contact_at + board.frame_at, 9), _real_array(contact_at + board.friction_at, 2)
     axes = np.empty((4 if board.pyramidal else 3, 3))
     for j in range(3):
         if board.pyramidal:
@@ -338,9 +340,9 @@ def _row_axes(board, contact_at):
 
 @jit
 def _correct_rows(board, contact_at, first_row, aref, kbip, along):
-    """Subtract gamma along each row from one contact's reference accelerations, and the margin from its distance."""
-    margin = _reals(contact_at + board.margin_at, 1)[0]
-    # MuJoCo holds a wheel at its margin; it shall touch.
+    """Subtract gamma along each row, and the effect of the margin, from one contact's reference accelerations."""
+    margin = _real_array(contact_at + board.margin_at, 1)[0]
+    # MuJoCo keeps a wheel at the distance of its margin; subtracting this makes it touch.
     stiffness = kbip[4 * first_row] * kbip[4 * first_row + 2]
     for i in range(len(along)):
         aref[first_row + i] -= along[i]
@@ -349,11 +351,11 @@ def _correct_rows(board, contact_at, first_row, aref, kbip, along):
 
 
 @jit
-def _kept_mass(board):
-    """Inertia (n, n) of the last evaluation."""
+def _stored_inertia(board):
+    """Return the inertia matrix (n, n) of the last evaluation."""
     n = board.speeds
-    stored, column = _reals(board.kept_M, board.M_entries), _integers(board.M_colind, board.M_entries)
-    count, first = _integers(board.M_rownnz, n), _integers(board.M_rowadr, n)
+    stored, column = _real_array(board.kept_M, board.M_entries), _integer_array(board.M_colind, board.M_entries)
+    count, first = _integer_array(board.M_rownnz, n), _integer_array(board.M_rowadr, n)
     mass = np.zeros((n, n))
     for i in range(n):
         for at in range(first[i], first[i] + count[i]):
@@ -362,8 +364,8 @@ def _kept_mass(board):
 
 
 @jit
-def _size(factors, force, n):
-    """f^T M^-1 f of a force (n,) from the factors of M; the force is overwritten."""
+def _squared_norm(factors, force, n):
+    """Return f^T M^-1 f of a force f (n,) from the factors of M; ``force`` is overwritten."""
     total = 0.0
     for i in range(n):
         for k in range(i):
@@ -373,48 +375,52 @@ def _size(factors, force, n):
 
 
 @jit
-def _left(board, mass, factors, acceleration):
-    """Size of the gradient M (a - a_smooth) - qfrc_constraint at an acceleration (n,)."""
+def _squared_gradient(board, mass, factors, acceleration):
+    """Return |g|^2 of the gradient g = M (a - a_smooth) - qfrc_constraint at an acceleration a (n,)."""
     n = board.speeds
-    smooth, force, left = _reals(board.qacc_smooth, n), _reals(board.qfrc_constraint, n), np.empty(n)
+    smooth, force, gradient = _real_array(board.qacc_smooth, n), _real_array(board.qfrc_constraint, n), np.empty(n)
     for i in range(n):
-        left[i] = -force[i]
+        gradient[i] = -force[i]
         for j in range(n):
-            left[i] += mass[i, j] * (acceleration[j] - smooth[j])
-    return _size(factors, left, n)
+            gradient[i] += mass[i, j] * (acceleration[j] - smooth[j])
+    return _squared_norm(factors, gradient, n)
 
 
 @jit
-def _residual(board):
-    """What MuJoCo's solver left of the last evaluation, relative to the forces."""
+def _relative_residual(board):
+    """Return the residual of MuJoCo's solver in the last evaluation, relative to the forces."""
     n = board.speeds
-    mass = _kept_mass(board)
+    mass = _stored_inertia(board)
     factors = mass.copy()
     factorise(factors, n)
-    smooth, free, pushed = _reals(board.qacc_smooth, n), _reals(board.qfrc_smooth, n), np.empty(n)
+    smooth, free, constraint = _real_array(board.qacc_smooth, n), _real_array(board.qfrc_smooth, n), np.empty(n)
     scale = 0.0
     for i in range(n):
-        pushed[i] = _reals(board.qfrc_constraint, n)[i]
+        constraint[i] = _real_array(board.qfrc_constraint, n)[i]
         scale += smooth[i] * free[i]
-    scale = max(scale, _size(factors, pushed, n))
+    scale = max(scale, _squared_norm(factors, constraint, n))
     if not scale > 0:
         return 0.0
-    # After a step of RK4 qacc is the mean of its stages; the last stage's own is where the warm start comes from.
-    left = min(
-        _left(board, mass, factors, _reals(board.qacc, n)), _left(board, mass, factors, _reals(board.qacc_warmstart, n))
+    # After a step of RK4, qacc is the mean of the stages; the last stage's own acceleration is in the warm start.
+    residual = min(
+        _squared_gradient(board, mass, factors, _real_array(board.qacc, n)),
+        _squared_gradient(board, mass, factors, _real_array(board.qacc_warmstart, n)),
     )
-    return np.sqrt(left / scale)
+    return np.sqrt(residual / scale)
 
 
 @jit
-def _judge(board):
-    """Judge what the solver made of the last evaluation, if nobody has; what is infinite is judged elsewhere."""
+def _assess_solution(board):
+    """Assess the solver's solution of the last evaluation unless that has been done.
+
+    Residuals that are not finite are skipped: other checks find them.
+    """
     if board.pending == 0:
         return
     board.pending = 0
     step = board.since_step + board.evaluations // board.evaluations_per_step
     board.evaluations += 1
-    residual = _residual(board)
+    residual = _relative_residual(board)
     if not np.isfinite(residual):
         return
     board.largest_residual = max(board.largest_residual, residual)
@@ -426,34 +432,34 @@ def _judge(board):
 
 
 @jit
-def _keep(board):
-    """Keep of this evaluation what the judge needs and MuJoCo will overwrite."""
-    now, kept = _reals(board.M, board.M_entries), _reals(board.kept_M, board.M_entries)
+def _store_inertia(board):
+    """Store this evaluation's inertia, which the assessment needs and MuJoCo will overwrite."""
+    inertia, stored = _real_array(board.M, board.M_entries), _real_array(board.kept_M, board.M_entries)
     for i in range(board.M_entries):
-        kept[i] = now[i]
+        stored[i] = inertia[i]
     board.pending = 1
 
 
 @jit
 def judge(boards):
-    """Judge the last evaluation on a blackboard (1,) if no later one has."""
-    _judge(boards[0])
+    """Assess the last evaluation of a blackboard (1,) unless a later evaluation has done so."""
+    _assess_solution(boards[0])
 
 
 @compile_callback(CONTROL, error_model="numpy")
-def watch(model, data):
-    """Control callback: look at what MuJoCo's solver leaves unconverged, and change nothing."""
+def watch_iterations(model, data):
+    """Control callback: assess the convergence of MuJoCo's solver and change nothing."""
     board = _blackboard()
-    if _is_for(board, model, data):
-        _judge(board)
-        _keep(board)
+    if _is_watched(board, model, data):
+        _assess_solution(board)
+        _store_inertia(board)
 
 
 @jit
 def _start_sticking(board, model, data, rows, softness, target):
-    """Let MuJoCo's solver start where all these rows (k, n) act, as on wheels that neither slide nor lift off.
+    """Start MuJoCo's solver from the solution with all these rows (k, n) active: no wheel slides or lifts off.
 
-    The start's forces are those of the rows' own softness (k,) and reference accelerations (k,):
+    The starting forces are those of the rows' own softness (k,) and reference accelerations (k,):
 
         (J M^-1 J^T + R) F = aref - J a,    M a = all forces but the contacts'
     """
@@ -461,7 +467,7 @@ def _start_sticking(board, model, data, rows, softness, target):
     # MuJoCo computes the same again after this callback.
     _actuation(model, data)
     _acceleration(model, data)
-    smooth, start = _reals(board.qacc_smooth, n), _reals(board.qacc_warmstart, n)
+    smooth, start = _real_array(board.qacc_smooth, n), _real_array(board.qacc_warmstart, n)
     spread, force = np.empty((size, n)), target.copy()
     _solve_mass(model, data, spread.ctypes, rows.ctypes, types.int32(size))
     schur = rows @ spread.T
@@ -478,32 +484,32 @@ def _start_sticking(board, model, data, rows, softness, target):
 
 
 @compile_callback(CONTROL, error_model="numpy")
-def correct(model, data):
-    """Control callback: bring the contacts' own acceleration into MuJoCo's reference accelerations.
+def correct_reference(model, data):
+    """Control callback: subtract the contacts' own acceleration from MuJoCo's reference accelerations.
 
-    It also gives MuJoCo's solver its start, and judges how the last evaluation's solution turned out.
+    It also gives MuJoCo's solver its starting point and assesses the solution of the last evaluation.
     """
     board = _blackboard()
-    if not _is_for(board, model, data):
+    if not _is_watched(board, model, data):
         return
-    _judge(board)
-    _keep(board)
+    _assess_solution(board)
+    _store_inertia(board)
     base, n = _address_of(data), board.speeds
     each, used = 4 if board.pyramidal else 3, 0
-    contacts = _stored(base + types.uintp(board.contact_at))
+    contacts = _read_pointer(base + types.uintp(board.contact_at))
     velocities, turning = np.empty((3, n)), np.empty((3, n))
     rows, numbers = np.empty((each * board.wheels, n)), np.empty((2, each * board.wheels))
-    for i in range(_integer(base + types.uintp(board.ncon_at))):
+    for i in range(_read_integer(base + types.uintp(board.ncon_at))):
         contact_at = contacts + types.uintp(i * board.contact_size)
         pair = contact_at + types.uintp(board.geom_at)
-        k = _wheel_of(board, _integer(pair + types.uintp(4)), _integer(pair))
-        first = _integer(contact_at + types.uintp(board.row_at))
+        k = _find_wheel(board, _read_integer(pair + types.uintp(4)), _read_integer(pair))
+        first = _read_integer(contact_at + types.uintp(board.row_at))
         if k < 0 or first < 0:
             continue
-        aref = _reals(_stored(base + types.uintp(board.efc_aref_at)), first + each)
-        kbip = _reals(_stored(base + types.uintp(board.efc_KBIP_at)), 4 * first + 4)
-        softness = _reals(_stored(base + types.uintp(board.efc_R_at)), first + each)
-        _, _, gamma = _motion(board, k, model, data, velocities, turning)
+        aref = _real_array(_read_pointer(base + types.uintp(board.efc_aref_at)), first + each)
+        kbip = _real_array(_read_pointer(base + types.uintp(board.efc_KBIP_at)), 4 * first + 4)
+        softness = _real_array(_read_pointer(base + types.uintp(board.efc_R_at)), first + each)
+        _, _, gamma = _contact_motion(board, k, model, data, velocities, turning)
         axes = _row_axes(board, contact_at)
         _correct_rows(board, contact_at, first, aref, kbip, axes @ np.array(gamma))
         rows[used : used + each] = axes @ velocities
@@ -515,26 +521,26 @@ def correct(model, data):
 
 @compile_callback(CONTROL, error_model="numpy")
 def press(model, data):
-    """Control callback: the contact forces of rolling without slip, as applied forces."""
+    """Control callback: apply the contact forces of rolling without slip as external forces."""
     board = _blackboard()
-    if not _is_for(board, model, data):
+    if not _is_watched(board, model, data):
         return
     n, size = board.speeds, 3 * board.wheels
-    applied = _reals(board.qfrc_applied, n)
+    applied = _real_array(board.qfrc_applied, n)
     applied[:] = 0
     rows, spread, turning = np.empty((size, n)), np.empty((size, n)), np.empty((3, n))
     force, free, smooth = np.empty(size), np.empty(n), np.empty(n)
-    bias, passive = _reals(board.qfrc_bias, n), _reals(board.qfrc_passive, n)
+    bias, passive = _real_array(board.qfrc_bias, n), _real_array(board.qfrc_passive, n)
     for j in range(n):
         smooth[j] = passive[j] - bias[j]
     _solve_mass(model, data, free.ctypes, smooth.ctypes, types.int32(1))
     s = board.stabilisation
     for k in range(board.wheels):
-        if not _find(board, k):
+        if not _find_contact(board, k):
             board.lost += 1
             return
         board.found += 1
-        here, velocity, gamma = _motion(board, k, model, data, rows[3 * k : 3 * k + 3], turning)
+        here, velocity, gamma = _contact_motion(board, k, model, data, rows[3 * k : 3 * k + 3], turning)
         for i in range(3):
             total = gamma[i] + s * s * here.gap * here.normal[i] + 2 * s * velocity[i]
             for j in range(n):

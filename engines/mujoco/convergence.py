@@ -1,16 +1,16 @@
-"""Whether MuJoCo's contact solver found, in every evaluation of the dynamics, what it looks for.
+"""Check that MuJoCo's contact solver converged in every evaluation of the dynamics.
 
-It looks for the acceleration a at which the gradient of its cost vanishes,
+The solver looks for the acceleration a at which the gradient of its cost vanishes,
 
     g = M (a - a_smooth) - J^T f(a),    a_smooth: the acceleration without contacts
 
-and stops without a word where its line search finds no better point: a contact force may then be anything. Its
-cost is convex enough for a bound on what that does, in the norm |x|^2 = x^T M^-1 x of forces:
+and stops without a message where its line search finds no better point: the contact forces may then be arbitrarily
+wrong. The cost is sufficiently convex for the following bound, in the norm |x|^2 = x^T M^-1 x of forces:
 
     |M (a - a*)| <= |g|,    |J^T (f - f*)| <= 2 |g|,    a*, f*: the solution
 
 so the residual |g|, relative to the larger of |J^T f| and all other forces, bounds the relative error of the
-accelerations, and twice it that of the forces.
+accelerations, and twice it bounds that of the forces.
 """
 
 # MuJoCo's compiled bindings carry no types.
@@ -45,48 +45,48 @@ STATE = (
 
 
 def share(residual: float) -> str:
-    """What a relative residual means, in words."""
+    """Return in words what a relative residual means for the forces."""
     return f"its forces are off by up to {2 * residual:.2g} times themselves"
 
 
 class SolverConvergence:
-    """What the judge of the solver has seen since a block began."""
+    """Convergence of MuJoCo's solver since a block began, as the callbacks have recorded it."""
 
     def begin(self, steps: int) -> None:
-        """Count the evaluations from here on as those of the step after ``steps`` steps and of its successors."""
+        """Count the evaluations from here on as those of the step after ``steps`` steps and of the following steps."""
         self.look()
         compiled.board["since_step"], compiled.board["evaluations"] = steps, 0
 
     def look(self) -> None:
-        """Judge the last evaluation as well, which otherwise the next one does."""
+        """Assess the last evaluation too, which otherwise happens only in the next one."""
         compiled.judge(compiled.board)
 
     @property
     def unconverged(self) -> int:
-        """Steps in which the solver left more than the limit."""
+        """Number of steps in which the solver's residual exceeded the limit."""
         return int(compiled.board["unconverged"][0])
 
     @property
     def largest(self) -> float | None:
-        """Largest relative residual; None where no solver was judged."""
+        """Largest relative residual; None where no solver was assessed."""
         residual = float(compiled.board["largest_residual"][0])
         return residual if residual >= 0 else None
 
     @property
     def wrong(self) -> tuple[int, float] | None:
-        """The first step with a residual above `WRONG`, and that residual."""
+        """First step with a residual above `WRONG`, and that residual; None if there is none."""
         step = int(compiled.board["wrong_step"][0])
         return None if step < 0 else (step, float(compiled.board["wrong_residual"][0]))
 
 
 @contextmanager
 def judge_solver(model: mujoco.MjModel, data: mujoco.MjData, converged_below: float) -> Iterator[SolverConvergence]:
-    """Write on the blackboard whose solver is judged, and wipe it at the end.
+    """Write on the blackboard which model's solver is assessed, and clear it at the end.
 
     Parameters
     ----------
     model, data
-        What the callbacks are for inside the block.
+        The model and state on which the callbacks act inside the block.
     converged_below : float
         Relative residual up to which an evaluation counts as converged.
     """
@@ -110,12 +110,12 @@ def judge_solver(model: mujoco.MjModel, data: mujoco.MjData, converged_below: fl
 
 @contextmanager
 def watch_solver(model: mujoco.MjModel, data: mujoco.MjData, converged_below: float) -> Iterator[SolverConvergence]:
-    """Watch the solver of a model of MuJoCo's own contacts; parameters as in `judge_solver`.
+    """Record the convergence of the solver for a model with MuJoCo's own contacts; parameters as in `judge_solver`.
 
     Raises
     ------
     EngineError
         If callbacks are in use already.
     """
-    with install_callbacks(compiled.watch), judge_solver(model, data, converged_below) as convergence:
+    with install_callbacks(compiled.watch_iterations), judge_solver(model, data, converged_below) as convergence:
         yield convergence

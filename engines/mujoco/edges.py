@@ -1,4 +1,4 @@
-"""The bicycle on knife edges: with MuJoCo's contact solver, or with forces that are solved for it."""
+"""Build the bicycle on knife edges, with MuJoCo's contact solver or with solved rolling forces."""
 
 # MuJoCo's compiled bindings carry no types.
 # pyright: reportAttributeAccessIssue=false
@@ -19,7 +19,7 @@ GROUNDS: dict[str, str] = dict.fromkeys(WHEELS, "ground")
 
 
 def build_contacts(problem: Problem, settings: ExactContactSettings) -> Rig:
-    """MuJoCo's contact rows and solver on exact contacts.
+    """Build the bicycle with exact contacts, MuJoCo's contact rows and MuJoCo's solver.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def build_contacts(problem: Problem, settings: ExactContactSettings) -> Rig:
 
 
 def build_multipliers(problem: Problem, settings: MultiplierSettings) -> Rig:
-    """MuJoCo's tree under the exact forces of rolling.
+    """Build MuJoCo's tree of bodies under the exact forces of rolling.
 
     Raises
     ------

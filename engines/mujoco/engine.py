@@ -1,4 +1,4 @@
-"""What all of MuJoCo's models have in common as engines."""
+"""The engine class that all MuJoCo models share."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ STEP_ROUND_OFF = 1e-6
 
 
 def step_counts(times: np.ndarray, step: float) -> list[int]:
-    """Whole numbers of steps from the start to each of the output times (n,).
+    """Return the number of steps from the start to each of the output times (n,).
 
     Raises
     ------
@@ -52,12 +52,15 @@ class MujocoEngine(Generic[S]):
     builder : str
         Module and name of the function that makes a `Rig` of a problem and settings. It is imported when
         something runs, so that listing the engines does not load the library.
+    description : str
+        The engine in one line.
     gives : tuple of str
     """
 
     name: str
     settings: type[S]
     builder: str
+    description: str
     gives: tuple[str, ...] = GIVES
 
     @property
@@ -66,11 +69,11 @@ class MujocoEngine(Generic[S]):
         return package_version("mujoco")
 
     def check(self, problem: Problem, settings: Any) -> None:
-        """Refuse output times that the step does not meet; see `velodrome.engines.engine.Engine`."""
+        """Refuse output times that are not multiples of the step; see `velodrome.engines.engine.Engine`."""
         step_counts(problem.times, settings.step)
 
     def step_noise(self, settings: Any) -> float:
-        """What the contact solver may leave unconverged in a step, or round-off; see `Engine`."""
+        """Return the larger of round-off and what the contact solver may leave unconverged in a step; see `Engine`."""
         return settings.noise
 
     def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
@@ -94,7 +97,7 @@ class MujocoEngine(Generic[S]):
         ValueError
             If an output time lies between two steps.
         EngineError
-            If MuJoCo refuses the model, or a wheel stands nowhere at the start.
+            If MuJoCo refuses the model, or a wheel has no contact point at the start.
         """
         counts = step_counts(problem.times, settings.step)
         from .ride import ride_rig
@@ -104,7 +107,7 @@ class MujocoEngine(Generic[S]):
         ridden = ride_rig(build(problem, settings), settings.step, counts, progress)
         recording = ridden.recording
         q, qd = from_mujoco(recording.time, recording.qpos, recording.qvel, problem.q)
-        seen = observe(problem.bicycle, problem.surface, q, qd)
+        observed = observe(problem.bicycle, problem.surface, q, qd)
         return Trajectory(
             engine=self.name,
             version=self.version,
@@ -114,10 +117,10 @@ class MujocoEngine(Generic[S]):
             qd=qd,
             body_position=recording.position,
             body_quaternion=recording.quaternion,
-            contact_point=seen.point if seen.found else None,
+            contact_point=observed.point if observed.found else None,
             contact_force=recording.force,
-            gap=seen.gap if seen.found else None,
-            slip=seen.slip if seen.found else None,
+            gap=observed.gap if observed.found else None,
+            slip=observed.slip if observed.found else None,
             kinetic_energy=recording.energy[:, 1],
             potential_energy=recording.energy[:, 0],
             steps=ridden.steps,

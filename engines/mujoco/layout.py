@@ -1,9 +1,9 @@
-"""Where MuJoCo keeps what the compiled callbacks need, found out and checked before anything runs.
+"""Find and check the memory layout of MuJoCo's structures before anything runs.
 
-Arrays of the state that never move are given by MuJoCo's Python views. What lives in its arena moves with
-every step; there the callbacks follow the pointers of `mjData`. Their places come from MuJoCo's own
-description of its structures, and are held against the addresses that the views show: a version that
-moves a field gives an error here, not a crash in a step.
+MuJoCo's Python views give the addresses of arrays that keep their place. Arrays in MuJoCo's arena move in
+every step; for them the callbacks follow the pointers in `mjData`. The offsets of these pointers come from MuJoCo's own
+description of its structures and are compared with the addresses of the views, so that a version of MuJoCo that
+moves a field gives an error here and not a crash in a step.
 """
 
 # MuJoCo's compiled bindings carry no types.
@@ -34,7 +34,7 @@ _SIZES = {
     "mjtBool": 1,
     "mjtByte": 1,
 }
-# The C functions that the callbacks call, and MuJoCo's description of their parameters.
+# The C functions that the callbacks call, with the parameters that MuJoCo must describe them with.
 _CALLED = {
     "mj_jac": "const mjModel * | const mjData * | mjtNum * | mjtNum * | const mjtNum [3] | int",
     "mj_jacDot": "const mjModel * | const mjData * | mjtNum * | mjtNum * | const mjtNum [3] | int",
@@ -43,7 +43,7 @@ _CALLED = {
     "mj_fwdAcceleration": "const mjModel * | mjData *",
 }
 _PRE_CONTACT = {"dist": 0, "pos": 8, "normal": 32, "tangent": 56}
-# Two spheres sunk into a plane, and far from it: with contacts and without.
+# Two spheres sunk into a plane; raised by 1 m they have no contacts.
 _PROBE = """<mujoco><option cone="elliptic"/><worldbody><geom type="plane" size="0 0 1"/>
 <body pos="0 0 .09"><freejoint/><geom size=".1"/></body><body pos="1 0 .09"><freejoint/><geom size=".1"/></body>
 </worldbody></mujoco>"""
@@ -51,13 +51,14 @@ _PROBE = """<mujoco><option cone="elliptic"/><worldbody><geom type="plane" size=
 
 @dataclass(frozen=True)
 class Layout:
-    """Offsets in bytes.
+    """Offsets of fields in MuJoCo's structures [bytes].
 
     Attributes
     ----------
     data, contact : dict
-        Of fields of `mjData` and of `mjContact`.
+        Offset by name of the fields of `mjData` and of `mjContact`.
     contact_size : int
+        Size of `mjContact`.
     """
 
     data: dict[str, int]
@@ -65,20 +66,20 @@ class Layout:
     contact_size: int
 
 
-def _moved(what: str) -> EngineError:
+def _layout_error(what: str) -> EngineError:
     return EngineError(
         f"MuJoCo {mujoco.__version__} keeps {what} elsewhere than its description says; "
         "mujoco-native needs none of it, MuJoCo 4.0 has it in place"
     )
 
 
-def _extent(kind: Any) -> tuple[int, int]:
-    """Size and alignment of a type [bytes]."""
+def _type_size(kind: Any) -> tuple[int, int]:
+    """Return size and alignment of a type [bytes]."""
     if isinstance(kind, ast_nodes.PointerType):
         size = ctypes.sizeof(ctypes.c_void_p)
         return size, size
     if isinstance(kind, ast_nodes.ArrayType):
-        size, alignment = _extent(kind.inner_type)
+        size, alignment = _type_size(kind.inner_type)
         return size * int(np.prod(kind.extents)), alignment
     if isinstance(kind, ast_nodes.ValueType):
         if kind.name in _SIZES:
@@ -86,16 +87,16 @@ def _extent(kind: Any) -> tuple[int, int]:
         if kind.name in enums.ENUMS:
             return 4, 4
         if kind.name in structs.STRUCTS:
-            return _place(kind.name)[1:]
+            return _structure_layout(kind.name)[1:]
     raise EngineError(f"MuJoCo {mujoco.__version__} has a field of the unknown type {kind}")
 
 
 @cache
-def _place(name: str) -> tuple[dict[str, int], int, int]:
-    """Offsets of a structure's fields, its size and its alignment, by the rules of C."""
+def _structure_layout(name: str) -> tuple[dict[str, int], int, int]:
+    """Return the offsets of a structure's fields, its size and its alignment, by the rules of C [bytes]."""
     offsets, at, widest = {}, 0, 1
     for field in structs.STRUCTS[name].fields:
-        size, alignment = _extent(field.type)
+        size, alignment = _type_size(field.type)
         at = -(-at // alignment) * alignment
         offsets[field.name] = at
         at, widest = at + size, max(widest, alignment)
@@ -107,19 +108,19 @@ def _check_functions() -> None:
         parameters = functions.FUNCTIONS[name].parameters if name in functions.FUNCTIONS else ()
         if " | ".join(str(parameter.type) for parameter in parameters) != expected:
             raise EngineError(f"MuJoCo {mujoco.__version__} has another function {name}; MuJoCo 4.0 has the right one")
-    if "mjPreContact" not in structs.STRUCTS or _place("mjPreContact")[0] != _PRE_CONTACT:
+    if "mjPreContact" not in structs.STRUCTS or _structure_layout("mjPreContact")[0] != _PRE_CONTACT:
         raise EngineError(f"MuJoCo {mujoco.__version__} takes contacts in another form; MuJoCo 4.0 has the right one")
 
 
 def _check_state(layout: Layout, data: mujoco.MjData) -> None:
-    """Hold the offsets against what the views of a state show."""
+    """Compare the offsets with the addresses of a state's views."""
     base = data._address
-    # An array inside the structure itself: nothing is read before its place is known to be right.
+    # This array is part of the structure itself: no memory is read before its offset is known to be right.
     if data.energy.ctypes.data != base + layout.data["energy"]:
-        raise _moved("its state")
+        raise _layout_error("its state")
     for name in ("ncon", "nefc"):
         if ctypes.c_int.from_address(base + layout.data[name]).value != getattr(data, name):
-            raise _moved(name)
+            raise _layout_error(name)
     views = {"qpos": data.qpos, "qvel": data.qvel, "geom_xpos": data.geom_xpos}
     if data.nefc:
         views |= {
@@ -130,31 +131,31 @@ def _check_state(layout: Layout, data: mujoco.MjData) -> None:
         }
     for name, view in views.items():
         if ctypes.c_void_p.from_address(base + layout.data[name]).value != view.ctypes.data:
-            raise _moved(name)
+            raise _layout_error(name)
     for name in ("frame", "includemargin", "friction", "geom", "efc_address") if data.ncon else ():
         view = getattr(data.contact, name)
         if view.ctypes.data - data.contact.dist.ctypes.data != layout.contact[name]:
-            raise _moved(f"a contact's {name}")
+            raise _layout_error(f"a contact's {name}")
         if view.strides[0] != layout.contact_size:
-            raise _moved("its contacts")
+            raise _layout_error("its contacts")
 
 
 @cache
 def find_layout() -> Layout:
-    """Find and check all offsets, once a process.
+    """Find and check all offsets, once per process.
 
     Raises
     ------
     EngineError
-        If this version of MuJoCo keeps something elsewhere.
+        If this version of MuJoCo has another layout than it describes.
     """
     try:
         _check_functions()
-        contact, contact_size, _ = _place("mjContact")
-        layout = Layout(_place("mjData")[0], contact, contact_size)
+        contact, contact_size, _ = _structure_layout("mjContact")
+        layout = Layout(_structure_layout("mjData")[0], contact, contact_size)
         model = mujoco.MjModel.from_xml_string(_PROBE)
         if not model._address:
-            raise _moved("its model")
+            raise _layout_error("its model")
         for height in (0.0, 1.0):
             data = mujoco.MjData(model)
             data.qpos[[2, 9]] += height

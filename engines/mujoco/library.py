@@ -1,4 +1,4 @@
-"""MuJoCo's own shared library: its C functions for compiled code, and its table of collision functions."""
+"""MuJoCo's shared library: its C functions for compiled code, and its table of collision functions."""
 
 # MuJoCo's compiled bindings carry no types.
 # pyright: reportAttributeAccessIssue=false
@@ -21,17 +21,17 @@ _PATTERNS = ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll")
 
 @cache
 def load_library() -> ctypes.CDLL:
-    """The library that MuJoCo's Python package has loaded.
+    """Return the library that MuJoCo's Python package has loaded.
 
     Raises
     ------
     EngineError
-        If it is not where the package keeps it.
+        If it is not in the package's folder.
     """
     folder = Path(mujoco.__file__).parent
     found = [path for pattern in _PATTERNS for path in sorted(folder.glob(pattern))]
     if not found:
-        raise EngineError(f"no library of MuJoCo in {folder}; installing the package mujoco again brings it")
+        raise EngineError(f"no library of MuJoCo in {folder}; reinstalling the package mujoco restores it")
     return ctypes.CDLL(str(found[0]))
 
 
@@ -41,7 +41,7 @@ def announce_collision(*names: str) -> None:
     Raises
     ------
     EngineError
-        If the library lacks one.
+        If the library lacks one of them.
     """
     for name in names:
         try:
@@ -52,16 +52,16 @@ def announce_collision(*names: str) -> None:
 
 
 def collision_slot() -> Any:
-    """MuJoCo's pointer (its ``value`` can be set) to the collision function of planes with cylinders.
+    """Return MuJoCo's pointer to the collision function of planes with cylinders; its ``value`` can be set.
 
     Raises
     ------
     EngineError
         If the library has no such table.
     """
-    place = int(mujoco.mjtGeom.mjGEOM_PLANE) * _GEOM_TYPES + int(mujoco.mjtGeom.mjGEOM_CYLINDER)
+    index = int(mujoco.mjtGeom.mjGEOM_PLANE) * _GEOM_TYPES + int(mujoco.mjtGeom.mjGEOM_CYLINDER)
     try:
         table = (ctypes.c_void_p * _GEOM_TYPES**2).in_dll(load_library(), "mjCOLLISIONFUNC")
     except ValueError as error:
         raise EngineError(f"MuJoCo {mujoco.__version__} has no table mjCOLLISIONFUNC; MuJoCo 4.0 has") from error
-    return ctypes.c_void_p.from_buffer(table, place * ctypes.sizeof(ctypes.c_void_p))
+    return ctypes.c_void_p.from_buffer(table, index * ctypes.sizeof(ctypes.c_void_p))

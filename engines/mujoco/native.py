@@ -1,16 +1,15 @@
-"""MuJoCo as a careful user builds a bicycle: thin wheels on planes, MuJoCo's own soft contacts and solver.
+"""MuJoCo as a careful user models a bicycle: thin wheels on planes with MuJoCo's own soft contacts and solver.
 
-MuJoCo's contact rows prescribe J q'' = -b J q' (- k times the depth, in the normal direction) and leave
-out J' q', the acceleration of the contact at zero slip, so a wheel that rolls along a curve must creep
+MuJoCo's contact rows prescribe J q'' = -b J q' (- k times the depth, in the normal direction) and omit
+J' q', the acceleration of the contact at zero slip. A wheel that rolls along a curve therefore creeps
 until b J q' balances it:
 
     slip = J' q' / b,    b = 2 / (d_max time_constant)
 
-with d_max = 0.95 the largest impedance. With a time constant of two steps this is (v^2 / R) d_max step:
-first order in the step, as is the energy error of the one-step integrators. Both are MuJoCo's own; the
-engine shows them and corrects nothing. The wheels sink in by a fraction of a millimetre. At an exact start
-they do not slip yet, so the first contact forces lack the part that slip brings; it comes within a few time
-constants.
+with d_max = 0.95 the largest impedance. With a time constant of two steps the slip is (v^2 / R) d_max step,
+first order in the step, as is the energy error of the one-step integrators. Both errors are MuJoCo's own and are not
+corrected here. The wheels sink in by a fraction of a millimetre. At an exact start they do not slip yet, so the
+first contact forces lack the part that slip brings; it builds up within a few time constants.
 """
 
 from __future__ import annotations
@@ -18,4 +17,9 @@ from __future__ import annotations
 from .engine import MujocoEngine
 from .settings import NativeSettings
 
-ENGINE = MujocoEngine("mujoco-native", NativeSettings, "velodrome.engines.mujoco.planes:build_planes")
+ENGINE = MujocoEngine(
+    "mujoco-native",
+    NativeSettings,
+    "velodrome.engines.mujoco.planes:build_planes",
+    description="MuJoCo as a careful user sets it: stiff contacts on tangent planes, hard friction",
+)

@@ -1,4 +1,4 @@
-"""The bicycle on planes: one that rests, or one a wheel that moves with the surface's tangent plane."""
+"""Build the bicycle on planes: one fixed plane, or one per wheel that moves with the surface's tangent plane."""
 
 # MuJoCo's compiled bindings carry no types.
 # pyright: reportAttributeAccessIssue=false
@@ -21,9 +21,9 @@ from .tangent import place_planes
 
 
 def build_planes(problem: Problem, settings: ContactSettings) -> Rig:
-    """Everything at the start of a problem.
+    """Build the model and its state at the start of a problem.
 
-    On level ground the planes need no care, and `Rig.follow` only looks for the contacts.
+    On level ground the planes do not move, and `Rig.follow` only searches for the contacts.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def build_planes(problem: Problem, settings: ContactSettings) -> Rig:
     function, parameters = problem.surface.function.real, problem.surface.parameters
     guess_contacts(problem.q, contact, function, parameters, c)
     arguments = (data.qpos, c, function, parameters, contact, position, quaternion)
-    # The types never change, and finding them out takes numba longer than MuJoCo its step.
+    # The types never change, and inferring them in every call takes numba longer than MuJoCo takes for a step.
     follow = partial(place_planes.compile(tuple(typeof(argument) for argument in arguments)), *arguments)
     if not follow():
         raise EngineError("a wheel has no contact point with the surface at the start")

@@ -1,4 +1,4 @@
-"""The ride itself: MuJoCo's steps, and what is measured on the way."""
+"""Step a MuJoCo model through a ride and record its samples."""
 
 # MuJoCo's compiled bindings carry no types.
 # pyright: reportAttributeAccessIssue=false
@@ -28,7 +28,7 @@ from .state import to_mujoco
 from .tangent import wheel_poses
 
 REPORT_INTERVAL = 0.05
-# How often a bicycle is looked at whose ground needs no care: a wheel turns by far less than half a turn meanwhile.
+# Interval of the checks on ground that allows long ones [s]; a wheel turns by far less than half a turn in it.
 LOOK_INTERVAL = 0.01
 UNSTABLE = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
@@ -39,12 +39,12 @@ UNSTABLE = (
 
 @dataclass(frozen=True)
 class Recording:
-    """Samples of a ride, n of them.
+    """The n samples of a ride.
 
     Attributes
     ----------
     time : ndarray, shape (n,)
-        By MuJoCo's clock [s].
+        MuJoCo's time [s].
     qpos, qvel : ndarray, shapes (n, 10), (n, 9)
         MuJoCo's state.
     position, quaternion : ndarray, shapes (n, 4, 3), (n, 4, 4)
@@ -65,39 +65,40 @@ class Recording:
 
     @classmethod
     def empty(cls, n: int) -> Recording:
-        """Room for n samples."""
+        """Return arrays for n samples, filled with zeros."""
         shapes = ((n,), (n, 10), (n, 9), (n, 4, 3), (n, 4, 4), (n, 2, 3), (n, 2))
         return cls(*(np.zeros(shape) for shape in shapes))
 
     def first(self, n: int) -> Recording:
-        """The first n samples."""
+        """Return the first n samples."""
         return Recording(*(getattr(self, name)[:n] for name in self.__dataclass_fields__))
 
 
 @dataclass(frozen=True)
 class Rig:
-    """A model with its state, and how it touches the ground.
+    """A model with its state and its contact with the ground.
 
     Attributes
     ----------
     model : mujoco.MjModel
     data : mujoco.MjData
     bodies : list of int
-        MuJoCo's numbers of the four bodies, in the order of `BODIES`.
+        MuJoCo's ids of the four bodies, in the order of `BODIES`.
     wheels : dict of int
-        From MuJoCo's number of a wheel's geom to the wheel, 0 rear and 1 front.
+        Wheel, 0 rear and 1 front, by MuJoCo's id of its geom.
     follow : callable
-        To be called every ``stride`` steps and before the first; False if a wheel has no contact point.
+        Updates the contacts. To be called every ``stride`` steps and before the first; returns False if a wheel has no
+        contact point.
     stride : int
-        Counted from the start, so that a ride ends where it ends whatever the output times.
+        Counted from the start, so that the end of a ride does not depend on the output times.
     look : callable
-        To be called after ``follow``, with the time [s]; says why the ride ends there, or None.
+        Checks the rims. To be called after ``follow``, with the time [s]; returns why the ride ends there, or None.
     forces : callable
         Fills an array (2, 3) with the contact forces of the last evaluation, inertial axes [N].
     callbacks : callable
-        Gives the context in which the model may be stepped, with what is seen of the solver's convergence.
+        Returns the context in which the model may be stepped; it yields the solver's convergence.
     judged : bool
-        Whether that is all there is to see: after MuJoCo's noslip pass nobody can tell.
+        Whether that convergence is known; after MuJoCo's noslip pass it is not.
     """
 
     model: mujoco.MjModel
@@ -114,21 +115,21 @@ class Rig:
 
 @dataclass(frozen=True)
 class RideState:
-    """What became of a ride.
+    """Result of a ride.
 
     Attributes
     ----------
     recording : Recording
-        As many samples as were reached.
+        The samples that were reached.
     steps : int
     cpu_time : float
         Process CPU time of the steps [s].
     ended : str or None
         Why the ride ended early.
     unconverged_steps : int or None
-        Steps in which MuJoCo's contact solver stopped before it had converged; None where nobody can tell.
+        Steps in which MuJoCo's contact solver stopped before it had converged; None where this is not known.
     largest_residual : float or None
-        The most that it left, relative to the forces; None also where there is no solver.
+        Largest residual of that solver, relative to the forces; None also where there is no solver.
     """
 
     recording: Recording
@@ -140,7 +141,7 @@ class RideState:
 
 
 def set_start(problem: Problem, settings: StepSettings, touching: Touching) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """The model, and its state at the start of a problem.
+    """Return the model and its state at the start of a problem.
 
     Raises
     ------
@@ -157,7 +158,7 @@ def set_start(problem: Problem, settings: StepSettings, touching: Touching) -> t
 
 
 def look_at_rims(data: mujoco.MjData, problem: Problem, every: int = 1) -> Callable[[float], Ending | None]:
-    """Make the look at both rims of a `Rig`, which looks only at every so many calls.
+    """Return the function that checks both rims for a `Rig`; it does so in one of ``every`` calls.
 
     Raises
     ------
@@ -171,7 +172,7 @@ def look_at_rims(data: mujoco.MjData, problem: Problem, every: int = 1) -> Calla
     if not watch.needed:
         return lambda _: None
     calls, arguments = count(), (data.qpos, constants(problem.bicycle), watch.centre, watch.axle)
-    # Finding the types out at every call would take numba longer than MuJoCo its step.
+    # Inferring the types in every call would take numba longer than MuJoCo takes for a step.
     pose = partial(wheel_poses.compile(tuple(typeof(argument) for argument in arguments)), *arguments)
 
     def look(time: float) -> Ending | None:
@@ -184,12 +185,12 @@ def look_at_rims(data: mujoco.MjData, problem: Problem, every: int = 1) -> Calla
 
 
 def look_stride(step: float) -> int:
-    """Steps in `LOOK_INTERVAL`."""
+    """Return the number of steps in `LOOK_INTERVAL`."""
     return max(1, int(LOOK_INTERVAL / step))
 
 
 def rim_stride(problem: Problem, step: float) -> int:
-    """Steps between two looks at wheels whose ground needs no care but for their rims.
+    """Return the number of steps between two checks of the wheels where only their rims need checking.
 
     Where the ground is less than half as curved as a wheel, a rim touches twice only when the wheel nearly lies flat.
     """
@@ -199,17 +200,17 @@ def rim_stride(problem: Problem, step: float) -> int:
 
 
 def bodies(model: mujoco.MjModel) -> list[int]:
-    """MuJoCo's numbers of the four bodies, in the order of `BODIES`."""
+    """Return MuJoCo's ids of the four bodies, in the order of `BODIES`."""
     return [model.body(name).id for name in BODIES]
 
 
 def wheel_geoms(model: mujoco.MjModel) -> dict[int, int]:
-    """From MuJoCo's number of a wheel's geom to the wheel, 0 rear and 1 front."""
+    """Return the wheel, 0 rear and 1 front, by MuJoCo's id of its geom."""
     return {model.geom(name).id: k for k, name in enumerate(WHEELS)}
 
 
 def read_contact_forces(model: mujoco.MjModel, data: mujoco.MjData, wheels: dict[int, int], out: np.ndarray) -> None:
-    """Fill ``out`` (2, 3) with MuJoCo's contact forces on the wheels, inertial axes; zero without contact."""
+    """Fill ``out`` (2, 3) with MuJoCo's contact forces on the wheels, inertial axes [N]; zero without contact."""
     out[:] = 0
     wrench = np.empty(6)
     contacts = data.contact
@@ -220,10 +221,10 @@ def read_contact_forces(model: mujoco.MjModel, data: mujoco.MjData, wheels: dict
 
 
 def record_sample(rig: Rig, recording: Recording, k: int) -> None:
-    """Measure sample k at the present state.
+    """Record sample k at the current state.
 
-    Poses, forces and energies are stale after a step, so everything is computed anew. `mj_forward`
-    leaves the solver's warm start alone: the next step does not know that it was called.
+    Poses, forces and energies are outdated after a step, so everything is computed anew. `mj_forward` does not change
+    the solver's warm start, so this does not affect the next step.
     """
     data = rig.data
     mujoco.mj_forward(rig.model, data)
@@ -236,15 +237,15 @@ def record_sample(rig: Rig, recording: Recording, k: int) -> None:
 
 
 def find_trouble(data: mujoco.MjData, standing: bool) -> str | None:
-    """Why the ride cannot go on; None if it can."""
-    # MuJoCo looks at a state before it steps from it: the last one has not been seen yet.
+    """Return why the ride cannot continue; None if it can."""
+    # MuJoCo checks a state only before it steps from it: the last state has not been checked yet.
     if any(data.warning[kind].number for kind in UNSTABLE) or not np.all(np.isfinite([*data.qpos, *data.qvel])):
         return "MuJoCo's state became infinite or huge"
     return None if standing else "a wheel lies flat or has no contact point with the surface"
 
 
 def find_unconverged(convergence: SolverConvergence, step: float) -> str | None:
-    """Where MuJoCo's contact solver gave forces that are none; None if it did not."""
+    """Return when and how far MuJoCo's contact solver failed to converge; None if its forces are usable."""
     convergence.look()
     if convergence.wrong is None:
         return None
@@ -253,9 +254,9 @@ def find_unconverged(convergence: SolverConvergence, step: float) -> str | None:
 
 
 def advance(rig: Rig, step: float, steps: int, until: int) -> tuple[int, bool, Ending | None]:
-    """Go on from ``steps`` to ``until`` steps of length ``step``, or as far as the wheels roll on the ground.
+    """Step from ``steps`` to ``until`` steps of length ``step``, or until the wheels leave the ground.
 
-    Returns the steps, whether the wheels stand, and why the ride ends if a rim touches the ground twice.
+    Returns the number of steps, whether the wheels have contact, and why the ride ends if a rim touches twice.
     """
     while steps < until:
         more = min(until - steps, rig.stride - steps % rig.stride)
@@ -282,7 +283,7 @@ def no_report() -> Iterator[None]:
 
 
 def ride_rig(rig: Rig, step: float, counts: list[int], progress: Progress) -> RideState:
-    """Integrate from the state that a rig is in.
+    """Integrate from the current state of a rig.
 
     Parameters
     ----------
@@ -290,13 +291,13 @@ def ride_rig(rig: Rig, step: float, counts: list[int], progress: Progress) -> Ri
     step : float
         Time step [s].
     counts : list of int
-        Steps from the start to each output time.
+        Number of steps from the start to each output time.
     progress : callable
 
     Raises
     ------
     EngineError
-        If a wheel stands nowhere at the start, or MuJoCo's contact solver fails there.
+        If a wheel has no contact point at the start, or MuJoCo's contact solver fails there.
     """
     recording = Recording.empty(len(counts))
     with no_report(), rig.callbacks() as convergence:
@@ -308,40 +309,40 @@ def ride_rig(rig: Rig, step: float, counts: list[int], progress: Progress) -> Ri
         ended = find_unconverged(convergence, step)
         if ended is not None:
             raise EngineError(ended)
-        samples, steps, cpu_time, ended = _go_on(rig, step, counts, progress, recording, convergence)
+        samples, steps, cpu_time, ended = _continue_ride(rig, step, counts, progress, recording, convergence)
         return RideState(
             recording=recording.first(samples),
             steps=steps,
             cpu_time=cpu_time,
             ended=ended,
-            # The last sample is evaluated too, and begins a step that is not taken.
+            # The last sample is evaluated too; that evaluation belongs to a step that is not taken.
             unconverged_steps=min(convergence.unconverged, steps) if rig.judged else None,
             largest_residual=convergence.largest if rig.judged else None,
         )
 
 
-def _go_on(
+def _continue_ride(
     rig: Rig, step: float, counts: list[int], progress: Progress, recording: Recording, convergence: SolverConvergence
 ) -> tuple[int, int, float, str | None]:
-    """Ride on from the first sample; return the samples, the steps, their CPU time [s] and why it ended early."""
+    """Continue from the first sample; return samples, steps, their CPU time [s] and why the ride ended early."""
     steps, cpu_time, reported = 0, 0.0, 0
-    most = max(1, int(REPORT_INTERVAL / step))
+    steps_per_report = max(1, int(REPORT_INTERVAL / step))
     for k in range(1, len(counts)):
         while steps < counts[k]:
             convergence.begin(steps)
             begun = process_time()
-            steps, standing, touch = advance(rig, step, steps, min(steps + most, counts[k]))
+            steps, standing, touch = advance(rig, step, steps, min(steps + steps_per_report, counts[k]))
             cpu_time += process_time() - begun
             ended = find_trouble(rig.data, standing)
-            # A solver that has failed may be why the state is as it is.
+            # An unconverged solver may be the cause of other trouble, so it is reported first.
             if (stopped := find_unconverged(convergence, step)) is not None:
                 return k, steps, cpu_time, stopped
             if touch is not None and ended is None:
-                # It may lie before the last sample.
+                # The second touch may lie before the last sample.
                 return max(1, bisect_right(counts[:k], touch.time / step)), steps, cpu_time, touch.why
             if ended is not None:
                 return k, steps, cpu_time, f"{ended} at {steps * step:.6g} s"
-            if steps - reported >= most:
+            if steps - reported >= steps_per_report:
                 reported = steps
                 progress(steps * step)
         convergence.begin(steps)

@@ -1,14 +1,14 @@
-"""A coin that rolls in a circle: how to use the knife edges in a model of one's own.
+"""Roll a coin in a circle: an example of knife edges in a model of one's own.
 
     python -m velodrome.engines.mujoco.rolling_disc
 
-A thin disc of mass m, radius r and moments of inertia I1 (across) and I3 (about its axle) leans by an angle
-theta towards the centre of the circle, of radius rho, that its centre runs on. It does so steadily at
+A thin disc of mass m, radius r and moments of inertia I1 (about a diameter) and I3 (about its axle) leans by an angle
+theta towards the centre of the circle of radius rho on which its centre moves. The motion is steady at
 
     Omega^2 = m g r sin(theta) / (cos(theta) ((I3 / r + m r) rho + I1 sin(theta)))
 
-turns about its axle at -Omega (rho + r sin(theta)) / r relative to that, and never stops. MuJoCo's own
-contacts make it creep; on a knife edge it stays on its circle.
+with the disc spinning about its axle at -Omega (rho + r sin(theta)) / r relative to the rotation at Omega. MuJoCo's own
+contacts make the disc creep; on a knife edge it stays on its circle.
 """
 
 # MuJoCo's compiled bindings carry no types.
@@ -31,7 +31,7 @@ TOUCHING = {"wheel": "ground"}
 
 
 def disc_mjcf(step: float) -> str:
-    """The model: a free disc, and a plane that stands for the ground."""
+    """Return the model's XML: a free disc, and a plane that stands for the ground."""
     return f"""
 <mujoco model="disc">
   <option timestep="{step!r}" integrator="RK4" cone="elliptic" gravity="0 0 {-GRAVITY}" tolerance="1e-14"/>
@@ -52,15 +52,16 @@ def disc_mjcf(step: float) -> str:
 
 @dataclass(frozen=True)
 class Rolled:
-    """What became of a disc.
+    """Trajectory of a disc.
 
     Attributes
     ----------
     time : ndarray, shape (n,)
+        [s].
     position, axle : ndarray, shape (n, 3)
-        Its centre [m] and its axis.
+        Centre [m] and unit vector along the axle.
     energy : ndarray, shape (n,)
-        Kinetic and potential [J].
+        Kinetic plus potential energy [J].
     slip : ndarray, shape (n,)
         Speed of the material point at the contact [m/s].
     """
@@ -73,7 +74,7 @@ class Rolled:
 
 
 def steady_state(lean: float, circle: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """MuJoCo's state (7,), (6,) of steady rolling on the plane z = 0, and the rate Omega of going round [rad/s]."""
+    """Return MuJoCo's state (7,), (6,) of steady rolling on the plane z = 0, and the rate Omega [rad/s]."""
     sine, cosine = np.sin(lean), np.cos(lean)
     inertia = (AXIAL / RADIUS + MASS * RADIUS) * circle + ACROSS * sine
     rate = np.sqrt(MASS * GRAVITY * RADIUS * sine / (cosine * inertia))
@@ -90,18 +91,18 @@ def steady_state(lean: float, circle: float) -> tuple[np.ndarray, np.ndarray, fl
 def roll(
     qpos: np.ndarray, qvel: np.ndarray, surface: Surface, duration: float, step: float = 0.002, exact: bool = True
 ) -> Rolled:
-    """Let a disc roll.
+    """Simulate a rolling disc.
 
     Parameters
     ----------
     qpos, qvel : ndarray, shape (7,), (6,)
         MuJoCo's state at the start.
     surface : Surface
-        The ground; MuJoCo's own contacts know the plane z = 0 only.
+        The ground; MuJoCo's own contacts use the plane z = 0.
     duration, step : float
         [s]
     exact : bool
-        On a knife edge; otherwise with MuJoCo's own contacts of a thin cylinder.
+        Whether to roll on a knife edge; otherwise MuJoCo's own contacts of a thin cylinder are used.
     """
     model = mujoco.MjModel.from_xml_string(disc_mjcf(step))
     data = mujoco.MjData(model)
@@ -114,13 +115,13 @@ def roll(
     with knife_edges(model, data, surface, TOUCHING) if exact else nullcontext():
         for _ in range(round(duration / step) + 1):
             mujoco.mj_forward(model, data)
-            rows.append(_observe(model, data))
+            rows.append(_measure_disc(model, data))
             mujoco.mj_step(model, data)
     time, position, axle, energy, slip = (np.array(column) for column in zip(*rows, strict=True))
     return Rolled(time, position, axle, energy, slip)
 
 
-def _observe(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[float, np.ndarray, np.ndarray, float, float]:
+def _measure_disc(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[float, np.ndarray, np.ndarray, float, float]:
     mujoco.mj_energyPos(model, data)
     mujoco.mj_energyVel(model, data)
     slip = np.nan
@@ -132,7 +133,7 @@ def _observe(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[float, np.ndar
 
 
 def main() -> None:
-    """Roll one disc on its circle both ways and print what became of it."""
+    """Roll a disc on its circle with both kinds of contact and print how far it strays."""
     lean, circle, duration = 0.4, 1.0, 10.0
     qpos, qvel, rate = steady_state(lean, circle)
     print(f"a disc leans by {lean} rad and rolls on a circle of {circle} m at {rate:.4f} rad/s, {duration:g} s")

@@ -1,4 +1,4 @@
-"""Settings of MuJoCo's models: the choices that a user of MuJoCo has, and their defaults as ladders of care."""
+"""Settings of the MuJoCo models: MuJoCo's own choices, with defaults of increasing care."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ Impedances = tuple[
     Annotated[float, Field(ge=0, le=1)],
     Annotated[float, Field(ge=1)],
 ]
-# MuJoCo's own: least and largest impedance, width, midpoint and power of the way between them.
+# MuJoCo's default: least and largest impedance, and width, midpoint and power of the transition between them.
 IMPEDANCES = (0.9, 0.95, 0.001, 0.5, 2.0)
-# MuJoCo moves a larger impedance here without a word.
+# MuJoCo reduces larger impedances to this value without a message.
 LARGEST_IMPEDANCE = 0.9999
 SOLVER_ROUND_OFF = 2.0**-52
-FORCE_NOISE = 0.01  # the largest share of round-off that a contact force may have
-# Contact forces that may be off by more than this share of themselves are none.
+FORCE_NOISE = 0.01  # largest share of a contact force that round-off may make up
+# Contact forces with a larger relative error than this are unusable.
 WRONG = 0.01
-# Where a line search stops: of the mean inertia, which forces some 2 times of, a few roundings.
+# Slope at which a line search stops, relative to the mean inertia and to forces of about that size: a few roundings.
 SLOPE = 1e-14
 
 
@@ -35,7 +35,13 @@ Integrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
 class StepSettings(Settings):
     """How MuJoCo steps through time."""
 
-    step: float = Field(default=0.002, ge=1e-6, le=0.02, description="time step [s]; must divide the output interval")
+    step: float = Field(
+        default=0.002,
+        ge=1e-6,
+        le=0.02,
+        description="time step [s]; must divide the output interval",
+        json_schema_extra={"unit": "s"},
+    )
     integrator: Integrator = Field(
         default="RK4", description="MuJoCo's integrator; RK4 is of order 4, the others are of order 1"
     )
@@ -59,27 +65,44 @@ class ContactSettings(StepSettings):
         gt=0,
         le=1,
         description="time constant of the contacts (solref) [s], at least twice the step; twice the step if not given",
+        json_schema_extra={"unit": "s"},
     )
-    damping_ratio: float = Field(default=1.0, gt=0, le=100, description="damping ratio of the contacts (solref)")
+    damping_ratio: float = Field(
+        default=1.0, gt=0, le=100, description="damping ratio of the contacts (solref)", json_schema_extra={"unit": "1"}
+    )
     impedance: Impedances = Field(
         default=IMPEDANCES,
         description="impedance of the contacts (solimp): least, largest, width of the way between [m], midpoint, power",
+        json_schema_extra={"unit": "1, 1, m, 1, 1"},
     )
     impratio: float = Field(
         default=10.0,
         gt=0,
         le=1e6,
         description="how much harder friction is than the normal direction; from 10 on it hardly matters",
+        json_schema_extra={"unit": "1"},
     )
     cone: Literal["elliptic", "pyramidal"] = Field(default="elliptic", description="friction cone")
     friction: float = Field(
-        default=2.0, gt=0, le=100, description="coefficient of sliding friction, the same in all directions"
+        default=2.0,
+        gt=0,
+        le=100,
+        description="coefficient of sliding friction, the same in all directions",
+        json_schema_extra={"unit": "1"},
     )
     noslip_iterations: int = Field(
-        default=0, ge=0, le=1000, description="iterations of the pass that makes friction hard after the solver"
+        default=0,
+        ge=0,
+        le=1000,
+        description="iterations of the pass that makes friction hard after the solver",
+        json_schema_extra={"unit": "1"},
     )
     tolerance: float = Field(
-        default=1e-8, gt=0, le=1e-2, description="relative tolerance at which MuJoCo's contact solver stops"
+        default=1e-8,
+        gt=0,
+        le=1e-2,
+        description="relative tolerance at which MuJoCo's contact solver stops",
+        json_schema_extra={"unit": "1"},
     )
 
     @property
@@ -125,7 +148,7 @@ class ContactSettings(StepSettings):
 
     @model_validator(mode="after")
     def _contacts_are_resolved(self) -> Self:
-        # MuJoCo would raise a smaller one without a word.
+        # MuJoCo would raise a smaller one without a message.
         if self.contact_time < 2 * self.step:
             raise ValueError(
                 f"time_constant is {self.time_constant!r}; it must be at least twice the step, {2 * self.step!r}"
@@ -139,52 +162,75 @@ _ON_PLANES = "MuJoCo's integrator; on a curved surface RK4's stages see the grou
 
 
 class NativeSettings(ContactSettings):
-    """A careful user's: stiff contacts, hard friction, the elliptic cone."""
+    """Settings of a careful user: stiff contacts, hard friction, the elliptic cone."""
 
     integrator: Integrator = Field(default="implicitfast", description=_ON_PLANES)
 
 
 class DefaultSettings(ContactSettings):
-    """MuJoCo's own defaults, all of them."""
+    """MuJoCo's own defaults."""
 
     integrator: Integrator = Field(default="Euler", description=_ON_PLANES)
     time_constant: float | None = Field(
-        default=0.02, gt=0, le=1, description="time constant of the contacts (solref) [s], at least twice the step"
+        default=0.02,
+        gt=0,
+        le=1,
+        description="time constant of the contacts (solref) [s], at least twice the step",
+        json_schema_extra={"unit": "s"},
     )
     impratio: float = Field(
-        default=1.0, gt=0, le=1e6, description="how much harder friction is than the normal direction"
+        default=1.0,
+        gt=0,
+        le=1e6,
+        description="how much harder friction is than the normal direction",
+        json_schema_extra={"unit": "1"},
     )
     cone: Literal["elliptic", "pyramidal"] = Field(default="pyramidal", description="friction cone")
     friction: float = Field(
-        default=1.0, gt=0, le=100, description="coefficient of sliding friction, the same in all directions"
+        default=1.0,
+        gt=0,
+        le=100,
+        description="coefficient of sliding friction, the same in all directions",
+        json_schema_extra={"unit": "1"},
     )
 
 
 class ExactContactSettings(ContactSettings):
-    """MuJoCo's solver on exact contacts: its rows keep their form, and are nearly rigid."""
+    """Settings of MuJoCo's solver on exact contacts, whose rows keep MuJoCo's form and are nearly rigid."""
 
     # A row's error decays at 2 / time_constant, which the integrator must resolve; it adds no creep any more.
     time_constant: float | None = Field(
-        default=0.05, gt=0, le=1, description="time constant of the contacts (solref) [s], at least twice the step"
+        default=0.05,
+        gt=0,
+        le=1,
+        description="time constant of the contacts (solref) [s], at least twice the step",
+        json_schema_extra={"unit": "s"},
     )
     impedance: Impedances = Field(
         default=(LARGEST_IMPEDANCE, LARGEST_IMPEDANCE, 0.001, 0.5, 2.0),
         description="impedance of the contacts (solimp): least, largest, width of the way between [m], midpoint, power",
+        json_schema_extra={"unit": "1, 1, m, 1, 1"},
     )
     impratio: float = Field(
         default=1.0,
         gt=0,
         le=1e6,
         description="how much harder friction is than the normal direction; softness does as much for both",
+        json_schema_extra={"unit": "1"},
     )
     softness: float = Field(
         default=1e-5,
         ge=1e-9,
         le=1,
         description="factor on the softness that MuJoCo gives a contact row; what is left of it makes wheels slip",
+        json_schema_extra={"unit": "1"},
     )
     tolerance: float = Field(
-        default=1e-22, gt=0, le=1e-2, description="relative tolerance at which MuJoCo's contact solver stops"
+        default=1e-22,
+        gt=0,
+        le=1e-2,
+        description="relative tolerance at which MuJoCo's contact solver stops",
+        json_schema_extra={"unit": "1"},
     )
 
     @property
@@ -196,12 +242,13 @@ class ExactContactSettings(ContactSettings):
     def solver_options(self) -> dict[str, float]:
         """Options of MuJoCo's contact solver beside its tolerance, for rows as stiff as these.
 
-        Wheels that roll need one iteration from the start that `compiled.correct` gives. One that slides is found
-        along the curved edge of the cone, on which a step gets the shorter the stiffer the rows: by some hundred
-        iterations, where MuJoCo's own limit is 100. Between sliding and sticking the cost bends within so short a
-        stretch that a line search must halve its way there to the last digit, 52 times with up to three
-        evaluations each, where MuJoCo's own limit is 50 evaluations; one that ends before moves nothing, and the
-        solver stops at a force that may be anything. A line search stops at a slope of round-off in the forces.
+        Wheels that roll need one iteration from the start that `compiled.correct_reference` gives. The solution for a
+        wheel that slides is found along the curved edge of the cone, on which steps become shorter the stiffer the
+        rows are: this takes some hundred iterations, where MuJoCo's own limit is 100. Between sliding and sticking the
+        cost bends within so short an interval that a line search must bisect down to the last digit, 52 times with up
+        to three evaluations each, where MuJoCo's own limit is 50 evaluations. A line search that ends earlier makes no
+        progress, and the solver stops at arbitrary forces. A line search stops at a slope of the order of the forces'
+        round-off.
         """
         return {"iterations": 10_000, "ls_iterations": 200, "ls_tolerance": max(0.01, SLOPE / self.tolerance)}
 
@@ -220,5 +267,9 @@ class MultiplierSettings(StepSettings):
     """MuJoCo's tree and integrator, without its contacts."""
 
     stabilisation: float = Field(
-        default=20.0, ge=0, le=1000, description="rate at which gaps and slip are brought back to zero [1/s]"
+        default=20.0,
+        ge=0,
+        le=1000,
+        description="rate at which gaps and slip are brought back to zero [1/s]",
+        json_schema_extra={"unit": "1/s"},
     )

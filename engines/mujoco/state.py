@@ -1,4 +1,4 @@
-"""Between the suite's coordinates and MuJoCo's.
+"""Convert between the suite's coordinates and MuJoCo's.
 
     qpos = (D (3), quaternion of the rear frame (4), rear_angle, steer, front_angle)
     qvel = (velocity of D (3), angular velocity of the rear frame in its own axes (3), their rates)
@@ -21,7 +21,7 @@ HINGES = [REAR_ANGLE, STEER, FRONT_ANGLE]
 
 
 def to_mujoco(q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """MuJoCo's state of one state of the bicycle.
+    """Convert one state of the bicycle to MuJoCo's state.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def to_mujoco(q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def spin_matrix(q: np.ndarray) -> np.ndarray:
-    """Matrix (3, 3) from yaw, lean and pitch rates to the angular velocity in the rear frame's axes."""
+    """Return the matrix (3, 3) from yaw, lean and pitch rates to the angular velocity in the rear frame's axes."""
     cl, cp, sl, sp = np.cos(q[LEAN]), np.cos(q[PITCH]), np.sin(q[LEAN]), np.sin(q[PITCH])
     return np.array([[-cl * sp, cp, 0.0], [sl, 0.0, 1.0], [cl * cp, sp, 0.0]])
 
@@ -55,7 +55,7 @@ def spin_matrix(q: np.ndarray) -> np.ndarray:
 def from_mujoco(
     times: np.ndarray, qpos: np.ndarray, qvel: np.ndarray, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Generalised coordinates and rates of a trajectory.
+    """Convert a trajectory of MuJoCo's states to generalised coordinates and rates.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def from_mujoco(
     qpos : ndarray, shape (n, 10)
     qvel : ndarray, shape (n, 9)
     start : ndarray, shape (9,)
-        Coordinates at the start: they tell how many turns yaw and pitch have made.
+        Coordinates at the start, which determine the whole turns of yaw and pitch.
 
     Returns
     -------

@@ -1,12 +1,12 @@
-"""The surface's tangent planes below both wheels, as MuJoCo poses.
+"""Poses of the surface's tangent planes below both wheels, in MuJoCo's form.
 
-For each wheel the contact equations give the surface point u of closest approach and the normal n;
-the plane through u with its z axis along n has the quaternion of the shortest turn from z to n,
+For each wheel the contact equations give the surface point u of closest approach and the normal n.
+The plane through u with its z axis along n has the quaternion of the shortest rotation from z to n,
 
     (1 + n_z, -n_y, n_x, 0) / |...|
 
-A plane in MuJoCo touches the wheel in the rim point that lies deepest along n: that is the rim point of
-the contact equations, so distance and normal are those of the curved surface, exactly.
+A plane in MuJoCo touches the wheel at the rim point that lies deepest along n, which is the rim point of
+the contact equations: distance and normal are exactly those of the curved surface.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from ...reference.kernels.compilation import jit
 from ...reference.kernels.dynamics import find_contacts, wheels
 from ...reference.kernels.vector import dot
 
-# MuJoCo has no knife edge: its wheels are this thick on each side of their plane [m].
+# Half the thickness of a wheel, since MuJoCo has no knife edge [m].
 HALF_THICKNESS = 1e-4
 
 
 @jit
 def tangent_coordinates(qpos):
-    """Generalised coordinates (9,) of MuJoCo's ``qpos`` (10,)."""
+    """Return the generalised coordinates (9,) at MuJoCo's ``qpos`` (10,)."""
     w, x, y, z = qpos[3], qpos[4], qpos[5], qpos[6]
     q = np.empty(9)
     q[0], q[1], q[2] = qpos[0], qpos[1], qpos[2]
@@ -37,7 +37,7 @@ def tangent_coordinates(qpos):
 
 @jit
 def wheel_poses(qpos, c, centre, axle):
-    """Fill the wheels' centres and axles (2, 3) at ``qpos`` (10,)."""
+    """Fill the centres and axles (2, 3) of the wheels at ``qpos`` (10,)."""
     both = wheels(tangent_coordinates(qpos), c)
     for k in range(2):
         for i in range(3):
@@ -46,11 +46,11 @@ def wheel_poses(qpos, c, centre, axle):
 
 @jit
 def place_planes(qpos, c, function, parameters, p, position, quaternion):
-    """Fill the poses (2, 3), (2, 4) of both planes at ``qpos`` (10,); True where both wheels stand on one.
+    """Fill the poses (2, 3), (2, 4) of both planes at ``qpos`` (10,); return whether both wheels stand on one.
 
-    ``p`` (6,) are the contact parameters: a guess, replaced by the solution. False where a search
-    fails, or where a wheel lies flat, its centre less than its own thickness above the contact; once it
-    has gone through that, the search has followed the rim and the contact is above the centre.
+    ``p`` (6,) are the contact parameters: a guess, which the solution replaces. The result is False where a search
+    fails, or where a wheel lies flat, with its centre less than its own thickness above the contact. In later poses of
+    such a wheel the search has followed the rim, and the contact is above the centre.
     """
     q = tangent_coordinates(qpos)
     if not find_contacts(q, p, function, parameters, c):

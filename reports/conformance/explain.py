@@ -10,6 +10,7 @@ from ...reference.kinematics import COORDINATES
 
 # A fault explains a difference if it leaves no more than this share of it.
 EXPLAINED = 0.1
+_LONGEST_LAG = 2.0  # output intervals, which are about as long as the longest steps
 _UNITS = {180 / np.pi: "in degrees", np.pi / 180: "in radians twice over", 1e-3: "in thousands", 1e3: "in thousandths"}
 
 
@@ -40,7 +41,10 @@ def fit_factor(given: np.ndarray, expected: np.ndarray) -> float | None:
 
 
 def fit_lag(given: np.ndarray, expected: np.ndarray, time: np.ndarray) -> float | None:
-    """The time by which samples (n, ...) from the second on are late [s]; None if that explains no difference."""
+    """The time by which samples (n, ...) from the second on are late [s]; None if no lag explains their difference.
+
+    A lag longer than two output intervals is none, nor is one that explains no more than a constant does.
+    """
     if len(time) < 4:
         return None
     slope = np.gradient(expected, time, axis=0, edge_order=2)[1:]
@@ -48,16 +52,16 @@ def fit_lag(given: np.ndarray, expected: np.ndarray, time: np.ndarray) -> float 
     if not 0 < square < np.inf:
         return None
     lag = -float(np.sum(apart * slope)) / square
+    left, constant = size_of(apart + lag * slope), size_of(apart - apart.mean(axis=0))
     # A line from sample to sample errs by its curvature over the lag.
-    return lag if size_of(apart + lag * slope) <= EXPLAINED * size_of(apart) + _bend(expected, time, lag) else None
+    bend = 0.5 * lag * lag * size_of(np.gradient(slope, time[1:], axis=0))
+    explained = left <= EXPLAINED * size_of(apart) + bend and left <= constant
+    return lag if explained and abs(lag) <= _LONGEST_LAG * float(np.max(np.diff(time))) else None
 
 
-def _bend(expected: np.ndarray, time: np.ndarray, lag: float) -> float:
-    slope = np.gradient(expected, time, axis=0, edge_order=2)
-    return size_of(0.5 * lag * lag * np.gradient(slope, time, axis=0, edge_order=2)[1:])
-
-
-def explain_columns(given: np.ndarray, expected: np.ndarray, off: Sequence[int], names: Sequence[str]) -> Iterator[str]:
+def explain_columns(
+    given: np.ndarray, expected: np.ndarray, off: Sequence[int], names: Sequence[str], factors: bool = True
+) -> Iterator[str]:
     """Say of columns what they look like.
 
     Parameters
@@ -67,12 +71,14 @@ def explain_columns(given: np.ndarray, expected: np.ndarray, off: Sequence[int],
         The columns that are wrong.
     names : sequence of str
         Of all columns.
+    factors : bool
+        Whether to say what looks scaled.
     """
     for i in off:
-        yield _explain_column(given, expected, i, names)
+        yield _explain_column(given, expected, i, names, factors)
 
 
-def _explain_column(given: np.ndarray, expected: np.ndarray, i: int, names: Sequence[str]) -> str:
+def _explain_column(given: np.ndarray, expected: np.ndarray, i: int, names: Sequence[str], factors: bool) -> str:
     own, right = given[:, i], expected[:, i]
     said = f"{names[i]} is {own[0]:.6g}" + (f", not {right[0]:.6g}" if len(own) == 1 else " at first")
     if len(own) > 1:
@@ -83,7 +89,7 @@ def _explain_column(given: np.ndarray, expected: np.ndarray, i: int, names: Sequ
     for j in range(given.shape[1]):
         if j != i and explains(own, expected[:, j], right) and explains(given[:, j], right, expected[:, j]):
             return f"{said}: {names[i]} looks swapped with {names[j]}"
-    factor = fit_factor(own, right)
+    factor = fit_factor(own, right) if factors else None
     if factor is not None:
         for unit, words in _UNITS.items():
             if abs(factor / unit - 1) < EXPLAINED:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,7 +19,8 @@ from ...reference.stability import growth_rate, linearise
 from ...reference.surface import Paraboloid, Plane, Surface
 from ..measure import Scale
 
-_INTERVAL, _SAMPLES = 0.01, 24
+_INTERVAL = 0.01  # of the samples, about [s]
+SAMPLES = 24
 STEPS_AN_INTERVAL = 4  # divide every output interval, so that steps up to four times as long fit too
 _REAR_RATE = 14.0  # some 4.5 m/s, where a benchmark bicycle upright is stable
 _KNOTS = np.arange(-8.0, 8.1, 2.0)
@@ -46,14 +48,14 @@ OTHER_BICYCLE = replace(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """A problem and the reference's ride of it.
 
     Attributes
     ----------
-    name : str
-        Of the ground.
+    ground : str
+        One of `GROUNDS`.
     problem : Problem
     exact : Trajectory
         The reference's ride.
@@ -63,56 +65,78 @@ class Motion:
         Sizes of the motion, its growth rate included.
     """
 
-    name: str
+    ground: str
     problem: Problem
     exact: Trajectory
     round_off: Trajectory
     scale: Scale
 
     @property
+    def name(self) -> str:
+        """Of the ground, and of the bicycle if it is not the benchmark's."""
+        return self.ground if self.problem.bicycle == Bicycle() else f"{self.ground}, another bicycle"
+
+    @property
     def size(self) -> float:
         """Of the motion: the wheelbase [m]."""
         return self.problem.bicycle.wheelbase
 
-
-def output_times(step: float | None) -> np.ndarray:
-    """Times of the samples [s]: a grid that a step divides, also a four times longer one."""
-    interval = _INTERVAL
-    if step is not None:
-        coarse = STEPS_AN_INTERVAL * step
-        interval = coarse * max(1, round(np.ceil(_INTERVAL / coarse - 1e-9)))
-    return interval * np.arange(_SAMPLES + 1)
+    @property
+    def sizes(self) -> np.ndarray:
+        """Sizes of the nine coordinates, shape (9,) [m, rad]."""
+        return np.array([*3 * [self.size], *6 * [1.0]])
 
 
-def awkward_times(times: np.ndarray) -> np.ndarray:
-    """Half as many times whose interval no step divides that divides the interval of ``times``."""
-    return float(np.sqrt(2)) * times[: len(times) // 2]
+def output_interval(step: float | None) -> float:
+    """Interval of the samples [s]: some 10 ms that a step divides, also a four times longer one."""
+    if step is None:
+        return _INTERVAL
+    coarse = STEPS_AN_INTERVAL * step
+    return coarse * max(1, round(np.ceil(_INTERVAL / coarse - 1e-9)))
 
 
-def make_problem(surface: Surface, bicycle: Bicycle, times: np.ndarray) -> Problem:
-    """The start of a transient: everything leans, steers, turns and changes."""
+def awkward_interval(interval: float) -> float:
+    """An interval that no step divides that divides another one [s]."""
+    return float(np.sqrt(2)) * interval
+
+
+@lru_cache(maxsize=16)
+def make_problem(ground: str, bicycle: Bicycle, interval: float, samples: int) -> Problem:
+    """The start of a transient on one of the `GROUNDS`: everything leans, steers, turns and changes.
+
+    Parameters
+    ----------
+    ground : str
+    bicycle : Bicycle
+    interval : float
+        Between outputs [s].
+    samples : int
+        Outputs after the start.
+    """
+    surface = GROUNDS[ground]()
     rates = (0.4, -0.5, _REAR_RATE)
     q, qd = consistent_state(bicycle, surface, (1.3, -0.7), 0.15, -0.12, rates, yaw=2.2)
     # A wheel is symmetric about its axle: it may stand at any angle.
     q[[REAR_ANGLE, FRONT_ANGLE]] = 0.7, -0.4
-    return Problem(bicycle, surface, q, qd, times)
+    return Problem(bicycle, surface, q, qd, interval * np.arange(samples + 1))
 
 
-def make_motion(name: str, problem: Problem) -> Motion:
-    """Let the reference ride a problem.
+@lru_cache(maxsize=16)
+def make_motion(ground: str, bicycle: Bicycle, interval: float, samples: int = SAMPLES) -> Motion:
+    """Let the reference ride a problem of `make_problem`.
 
     Raises
     ------
     RuntimeError
         If the reference does not ride to the end.
     """
+    problem = make_problem(ground, bicycle, interval, samples)
     exact = _ride(problem)
     shifted = _ride(replace(problem, q=_ABOVE * problem.q, qd=_ABOVE * problem.qd))
-    bicycle, qd = problem.bicycle, problem.qd
     upright = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.0, 0.0, (0.0, 0.0, _REAR_RATE))
     growth = growth_rate(Plane(), linearise(bicycle, Plane(), *upright).eigenvalues, 0.0)
-    scale = Scale.of(bicycle, qd, bicycle.wheelbase, growth, float(problem.times[-1]))
-    return Motion(name, problem, exact, shifted, scale)
+    scale = Scale.of(bicycle, problem.qd, bicycle.wheelbase, growth, float(problem.times[-1]))
+    return Motion(ground, problem, exact, shifted, scale)
 
 
 def _ride(problem: Problem) -> Trajectory:

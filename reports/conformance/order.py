@@ -4,60 +4,91 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
+from ...engines.engine import why_failed
 from ..measure import SAME_BITS, extrapolate, observed_orders, order_limit
 from .explain import EXPLAINED
-from .maps import scaled_rate, violation
+from .maps import find_scaled_rate, violation
 from .report import Check, judge, skip
 from .rides import Ride
 
-FACTORS = (4.0, 2.0, 1.0)
+# Factors on the step; the second for a method that chooses its steps and whose noise hides the order of the first.
+LADDERS = ((4.0, 2.0, 1.0), (16.0, 8.0, 4.0))
 CLAIM = "its rides converge as the step is halved, to the reference's where its wheels are bound to roll"
 _LIMIT = "the order must be 1/2 or more; the extrapolated ride may be off by its noise and four times its uncertainty"
 _LEAST_ORDER = 0.5  # a sequence that converges more slowly does not, or not yet
 _ROOM = 4.0  # of the change by the last extrapolation, which the next powers of the step may leave
 
 
-def check_order(name: str, ride_at: Callable[[float], Ride]) -> Check:
+def check_order(name: str, refine: Callable[[float], Any], ride_with: Callable[[Any], Ride]) -> Check:
     """Check the order that rides with halved steps show, and what they converge to.
 
     Parameters
     ----------
     name : str
         Of the ground.
-    ride_at : callable
-        Rides with a factor on the step; ValueError where the settings allow no such step.
+    refine : callable
+        Gives settings with a factor on the step; ValueError where the engine takes no such step.
+    ride_with : callable
+        Rides with settings.
     """
-    name = f"order on {name}"
-    try:
-        rides = [ride_at(factor) for factor in FACTORS]
-    except ValueError as error:
-        return skip(name, CLAIM, " ".join(str(error).split()))
-    if any(np.array_equal(one.q, other.q) for one, other in pairwise(rides)):
-        return judge(name, CLAIM, [SAME_BITS])
-    finest = rides[-1]
-    sizes = np.array([*3 * [finest.motion.size], *6 * [1.0]])
+    name, told = f"order on {name}", ""
+    unseen: list[Ride] | None = None
+    for ladder in LADDERS:
+        try:
+            chosen = [refine(factor) for factor in ladder]
+        except ValueError as error:
+            told = told or " ".join(str(error).split())
+            continue
+        try:
+            rides = [ride_with(settings) for settings in chosen]
+        except Exception as error:  # another package's code may break in any way
+            return judge(name, CLAIM, [f"with another step it fails: {why_failed(error)}"])
+        if any(np.array_equal(one.q, other.q) for one, other in pairwise(rides)):
+            return judge(name, CLAIM, [SAME_BITS])
+        first, second = (float(np.abs(b - a).max()) for a, b in pairwise(_paths(rides)))
+        if order_limit(rides[-1].noise, (first, second)) is not None:
+            return _judge_order(name, rides)
+        unseen = rides if unseen is None else unseen
+    return skip(name, CLAIM, told) if unseen is None else _judge_noise(name, unseen)
+
+
+def _judge_noise(name: str, rides: Sequence[Ride]) -> Check:
+    """Judge rides whose order cannot be seen: they are as near to each other as to what they converge to."""
+    paths, finest = _paths(rides), rides[-1]
+    moved = float(np.abs(paths[-1] - paths[0]).max())
+    seen = f"its order cannot be seen: four times the step changes {moved:.2g}, its noise is {finest.noise:.2g}"
+    return _judge_limit(name, rides, paths[-1], moved, seen)
+
+
+def _paths(rides: Sequence[Ride]) -> list[np.ndarray]:
+    """Coordinates of rides relative to the motion's sizes, as long as the shortest ride."""
     samples = min(len(ride.q) for ride in rides)
-    paths, exact = [ride.q[:samples] / sizes for ride in rides], finest.exact.q[:samples] / sizes
-    first, second = (float(np.abs(b - a).max()) for a, b in pairwise(paths))
-    if order_limit(finest.noise, (first, second)) is None:
-        seen = f"its order cannot be seen: halving its steps changes {second:.2g}, and its noise is {finest.noise:.2g}"
-        # What the coarser steps change is still an error of the method.
-        value, uncertain = paths[-1], first
-    else:
-        order = observed_orders(paths)[-1]
-        seen = f"an order of {order:.3g} is seen"
-        if not order >= _LEAST_ORDER:
-            return judge(name, CLAIM, [f"{seen}; it does not converge"], tolerance=_LIMIT)
-        found = extrapolate(paths)
-        value, uncertain = found.value, found.uncertainty
+    return [ride.q[:samples] / ride.motion.sizes for ride in rides]
+
+
+def _judge_order(name: str, rides: Sequence[Ride]) -> Check:
+    """Judge rides whose steps change more than their noise."""
+    paths = _paths(rides)
+    order = observed_orders(paths)[-1]
+    seen = f"an order of {order:.3g} is seen"
+    if not order >= _LEAST_ORDER:
+        return judge(name, CLAIM, [f"{seen}: it does not converge"], tolerance=_LIMIT)
+    found = extrapolate(paths)
+    return _judge_limit(name, rides, found.value, found.uncertainty, seen)
+
+
+def _judge_limit(name: str, rides: Sequence[Ride], value: np.ndarray, uncertainty: float, seen: str) -> Check:
+    """Judge what rides converge to, known up to an uncertainty; contacts with friction have their own limit."""
+    finest = rides[-1]
     if finest.trajectory.friction is not None:
-        return judge(
-            name, CLAIM, [], [seen, "its contacts have friction: what it converges to is its own model's ride"]
-        )
-    off, allowed = float(np.abs(value - exact).max()), finest.noise + _ROOM * uncertain
+        told = "its contacts have friction: what it converges to is its own model's ride"
+        return judge(name, CLAIM, [], [seen, told])
+    exact = finest.exact.q[: len(value)] / finest.motion.sizes
+    off, allowed = float(np.abs(value - exact).max()), finest.noise + _ROOM * uncertainty
     if off <= allowed:
         return judge(name, CLAIM, [], [seen, f"what it converges to is {off:.2g} from the reference"])
     wrong = f"what it converges to is {off:.2g} of the motion's size from the reference, limit {allowed:.2g}"
@@ -71,5 +102,5 @@ def _explain(rides: Sequence[Ride], off: float) -> list[str]:
     slip = violation(motion, trajectory.q, trajectory.qd)
     if slip <= EXPLAINED * off:
         return ["its wheels roll: a mass, an inertia, a length or gravity looks different from the problem's"]
-    scaled = scaled_rate(motion, trajectory)
+    scaled = find_scaled_rate(finest)
     return [f"its wheels are off rolling by {slip:.2g} of their speed: look at the maps", *([scaled] if scaled else [])]

@@ -123,7 +123,7 @@ def _wrong_settings(engine: GuardedEngine) -> Iterator[str]:
     if not callable(getattr(settings, "refined", None)):
         yield "they have no refined(factor); velodrome.engines.engine.Settings has one"
     try:
-        noise = engine.step_noise(settings)
+        noise: object = engine.step_noise(settings)
     except Exception as error:  # another package's code may break in any way
         yield f"its step_noise breaks: {why_failed(error)}"
         return
@@ -145,3 +145,12 @@ def _frozen(settings: Any, name: str) -> bool:
     except (ValidationError, TypeError, AttributeError):
         return True
     return False
+
+
+def step_noise_of(engine: GuardedEngine, settings: Any) -> float:
+    """An engine's step noise, or round-off where it says nothing usable, which `check_settings` tells."""
+    try:
+        noise: object = engine.step_noise(settings)
+    except Exception:  # told by `check_settings`
+        return ROUND_OFF
+    return float(noise) if isinstance(noise, float) and 0 <= noise <= LARGEST_NOISE else ROUND_OFF

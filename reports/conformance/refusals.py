@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 from ...engines.admission import ride_engine
 from ...engines.engine import Problem, UnsuitableProblem, why_failed
 from ...engines.guard import GuardedEngine
-from .motions import awkward_times, make_motion
+from .motions import SAMPLES, Motion, awkward_interval, make_motion
 from .report import Check, judge
 from .rides import Ride
 
@@ -37,22 +36,23 @@ def check_refusals(
     """Check refusals of grounds, found before, and of output times that the step does not meet."""
     seen = [f"it rides on the {name}" if good else f"it refuses the {name}" for name, good in suitable.items()]
     found = list(wrong)
-    times = awkward_times(ride.motion.problem.times)
-    awkward = replace(ride.motion.problem, times=times)
+    own = ride.motion.problem
+    interval = awkward_interval(float(own.times[1]))
+    awkward = make_motion(ride.motion.ground, own.bicycle, interval, SAMPLES // 2)
     try:
-        engine.check(awkward, settings)
+        engine.check(awkward.problem, settings)
     except UnsuitableProblem:
         found.append(
             "output times beside its steps are no UnsuitableProblem, which stands for grounds; raise ValueError"
         )
     except ValueError as error:
         found += _wrong_words(error, "the refusal of output times")
-        seen.append(f"it refuses an output interval of {times[1]:.6g} s")
+        seen.append(f"it refuses an output interval of {interval:.6g} s")
     except Exception as error:  # another package's code may break in any way
         found.append(f"its check raises {why_failed(error)} for output times beside its steps; raise ValueError")
     else:
         found += _wrong_ride(engine, settings, ride, awkward)
-        seen.append(f"it rides with an output interval of {times[1]:.6g} s")
+        seen.append(f"it rides with an output interval of {interval:.6g} s")
     return judge(
         "refusals",
         "check refuses what cannot be run, a ground by UnsuitableProblem and times by ValueError, in one line; the "
@@ -69,18 +69,15 @@ def _wrong_words(error: Exception, what: str) -> Iterator[str]:
         yield f"{what} says {words[:80]!r}; it must say in one line what is wrong and what would be right"
 
 
-def _wrong_ride(engine: GuardedEngine, settings: Any, ride: Ride, awkward: Problem) -> Iterator[str]:
+def _wrong_ride(engine: GuardedEngine, settings: Any, ride: Ride, awkward: Motion) -> Iterator[str]:
     """What is wrong with the samples of a ride whose output times lie between steps."""
-    motion = make_motion(ride.motion.name, awkward)
+    accepted = f"check accepts an output interval of {awkward.problem.times[1]:.6g} s, and"
     try:
-        trajectory = ride_engine(engine, awkward, settings, lambda _: None)
+        trajectory = ride_engine(engine, awkward.problem, settings, lambda _: None)
     except Exception as error:  # another package's code may break in any way
-        yield f"check accepts an output interval of {awkward.times[1]:.6g} s, and the ride fails: {why_failed(error)}"
+        yield f"{accepted} the ride fails: {why_failed(error)}"
         return
-    found = Ride(motion, trajectory, ride.step_noise)
+    found = Ride(awkward, trajectory, ride.step_noise)
     allowed = ride.noise + _ROOM * ride.error
     if not found.error <= allowed:
-        yield (
-            f"check accepts an output interval of {awkward.times[1]:.6g} s, and samples between its steps are off by "
-            f"{found.error:.2g}, limit {allowed:.2g}"
-        )
+        yield (f"{accepted} samples between its steps are off by {found.error:.2g}, limit {allowed:.2g}")

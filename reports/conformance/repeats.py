@@ -10,6 +10,7 @@ from ..measure import state_error
 from .report import Check, judge, skip
 from .rides import Ride
 
+_FEWEST = 5  # samples in which two rides cannot agree by chance
 _MANY = 0.5  # of the numbers: that many are not equal to the last bit by chance
 
 
@@ -42,6 +43,8 @@ def check_own_work(ride: Ride, engine: str) -> Check:
     if engine == REFERENCE:
         return skip(name, claim, "it is the reference")
     n, wrong = len(ride.trajectory.time), []
+    if n < _FEWEST:
+        return skip(name, claim, f"its ride has fewer than {_FEWEST} samples")
     least = state_error(ride.motion.round_off.first(n), ride.motion.exact, ride.motion.scale)
     apart = state_error(ride.followed, ride.motion.exact, ride.motion.scale)
     if apart <= least:

@@ -14,11 +14,12 @@ from ...engines.coordinates import rotation_matrices
 from ...reference.bicycle import BODIES
 from ...reference.kinematics import WHEELS
 from ..measure import describe_mismatch
-from .explain import explains, fit_factor, fit_lag
+from .explain import EXPLAINED, explains, fit_factor, fit_lag
 from .report import Check, judge, skip
 from .rides import Ride
 
 LIMIT = "error of the start, step_noise and four times the error of the coordinates themselves"
+_OF_RATES = ("slip", "kinetic_energy")
 _REPORTS = ("contact_point", "gap", "slip", "kinetic_energy", "potential_energy")
 _ORDERS = {"(x, y, z, w)": [3, 0, 1, 2], "(z, y, x, w)": [3, 2, 1, 0], "(w, z, y, x)": [0, 3, 2, 1]}
 
@@ -40,13 +41,16 @@ def check_reports(ride: Ride) -> Check:
     given = [field for field in _REPORTS if getattr(ride.trajectory, field) is not None]
     if not given:
         return skip(name, claim, "it gives none")
-    wrong = []
+    wrong, seen = [], [f"it gives {', '.join(given)}"]
+    if ride.mismatch(["qd"]):
+        given = [field for field in given if field not in _OF_RATES]
+        seen.append("slip and kinetic energy are not judged: they follow from rates that are wrong")
     for one in ride.mismatch(given):
         wrong.append(describe_mismatch(one.as_json()))
         explanation = _explain_report(ride, one.quantity)
         if explanation is not None:
             wrong.append(explanation)
-    return judge(name, claim, wrong, [f"it gives {', '.join(given)}"], LIMIT)
+    return judge(name, claim, wrong, seen, LIMIT)
 
 
 def _explain_positions(ride: Ride) -> Iterator[str]:
@@ -118,9 +122,10 @@ def _explain_report(ride: Ride, field: str) -> str | None:
         stale = np.concatenate([right[:1], right[:-1]])
         if explains(given, stale, right):
             return f"its {words} looks stale, that of the sample before"
-        offset = float(np.median(given - right))
+        offset, factor = float(np.median(given - right)), fit_factor(given, right)
         if explains(given, right + offset, right):
-            return f"its {words} looks shifted by {offset:.6g} J: another datum than z = 0"
+            scaled = "" if factor is None else f", or scaled by {factor:.6g}: another mass or gravity"
+            return f"its {words} looks shifted by {offset:.6g} J: another datum than z = 0{scaled}"
     if explains(given, -right, right):
         return f"its {words} looks mirrored"
     if field != "kinetic_energy" and field != "potential_energy":
@@ -129,7 +134,7 @@ def _explain_report(ride: Ride, field: str) -> str | None:
         if field == "slip" and explains(given, right[..., ::-1], right):
             return "its slip looks to be (forward, lateral); the suite's is (lateral, forward)"
     factor = fit_factor(given, right)
-    if factor is not None:
+    if factor is not None and abs(factor) > EXPLAINED:
         return f"its {words} looks scaled by {factor:.6g}"
     lag = fit_lag(given, right, ride.trajectory.time)
     return None if lag is None else f"its {words} looks {lag:.3g} s late"

@@ -72,8 +72,7 @@ class Ride:
     @cached_property
     def error(self) -> float:
         """Largest error of the coordinates against the reference, relative to the motion's sizes."""
-        sizes = np.array([*3 * [self.motion.size], *6 * [1.0]])
-        return float(np.abs((self.q - self.exact.q) / sizes).max()) + START_ERROR
+        return float(np.abs((self.q - self.exact.q) / self.motion.sizes).max()) + START_ERROR
 
     def altered(self, **changes: np.ndarray) -> Ride:
         """The ride with other samples of some fields."""

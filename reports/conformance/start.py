@@ -11,21 +11,34 @@ from .rides import Ride, without_turns
 
 # A state goes through rotations and back: some dozens of products and sums, each rounded, none of them cancelling.
 _ROUNDINGS = 64
+_MANY = 3  # a map mistakes so many at once; what is off in more is moved as a whole
 
 
-def check_start(ride: Ride) -> Check:
-    """Check that the first sample is the problem's start, but for whole turns of the angles."""
+def check_start(ride: Ride, mapped: bool) -> Check:
+    """Check that the first sample is the problem's start, but for whole turns of the angles.
+
+    Parameters
+    ----------
+    ride : Ride
+    mapped : bool
+        Whether a map of its coordinates is wrong; an engine that puts its start back on the constraints then changes
+        all of it, and only what is mirrored or swapped is said.
+    """
     problem, given = ride.motion.problem, ride.trajectory
     wrong, worst = [], 0.0
-    for own, asked, names in (
-        (without_turns(given.q[0], problem.q), problem.q, list(COORDINATES)),
-        (given.qd[0], problem.qd, rate_names()),
+    for own, unturned, asked, names in (
+        (given.q[0], without_turns(given.q[0], problem.q), problem.q, list(COORDINATES)),
+        (given.qd[0], given.qd[0], problem.qd, rate_names()),
     ):
-        apart = np.abs(own - asked)
-        limit = _ROUNDINGS * ride.round_off * (1 + float(np.abs(asked).max()))
+        apart = np.abs(unturned - asked)
+        size = 1 + float(np.abs(asked).max())
+        limit, worst = _ROUNDINGS * ride.round_off * size, max(worst, float(apart.max()))
         off = [int(i) for i in np.flatnonzero(~(apart <= limit))]
-        worst = max(worst, float(apart.max()))
-        wrong += explain_columns(own[None], asked[None], off, names)
+        if len(off) > _MANY:
+            what = ", ".join(names[i] for i in off) if len(off) < len(names) else f"all, from {names[0]} on"
+            wrong.append(f"its first sample is off in {what}, by {apart.max():.2g} at the most: it moves its start")
+            off = [] if mapped else [int(np.argmax(apart))]
+        wrong += explain_columns(own[None], asked[None], off, names, factors=not mapped)
     return judge(
         f"start on {ride.motion.name}",
         "its first sample is the state that the problem starts from, but for whole turns",

@@ -1,4 +1,4 @@
-"""What the ground, the bicycle, the curves and the table of a run look like, whatever shows them."""
+"""Drawings of the ground, the bicycle, the curves and the table of a run, for pages and recordings alike."""
 
 from .bicycle_shape import Mesh, ball, body_meshes
 from .ground import LINE_LIFT, STEEPEST, GroundMesh, ground_disc, lift_points, make_ground

@@ -1,7 +1,7 @@
-"""What the bicycle looks like: meshes of its four bodies, built from its parameters.
+"""Meshes of the bicycle's four bodies, built from its parameters.
 
-The equations know two circles, a steering axis and four centres of mass. The tubes between them are
-drawing only, but they start and end where the parameters say: hubs, steering axis, fork offset.
+The equations contain two circles, a steering axis and four centres of mass. The tubes between them are
+for display only, but they start and end where the parameters say: hubs, steering axis, fork offset.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ import numpy as np
 
 from ...reference.bicycle import Bicycle
 
-# Radii of the drawn tubes, as shares of the mean wheel radius.
+# Radii of the drawn tubes, relative to the mean wheel radius.
 TYRE = 0.050
 RIM = 0.028
 TUBE = 0.052
 STAY = 0.030
 SPOKE = 0.011
 
-SPOKES = 8  # at 20 rad/s and 60 frames/s a wheel turns 19 degrees a frame: well below the 45 between spokes
+SPOKES = 8  # at 20 rad/s and 60 frames/s a wheel turns 19 degrees a frame: far less than the 45 between spokes
 SIDES = 12
 DARK, PLAIN, LIGHT = 0.42, 1.0, 1.6
 
@@ -46,14 +46,14 @@ class Mesh:
     shade: np.ndarray
 
     def inflated(self, distance: float) -> Mesh:
-        """The mesh with every point moved outwards by a distance [m].
+        """Return the mesh with every point moved outwards by a distance [m].
 
-        Bicycles that ride in one another need different sizes, or their surfaces fight for every pixel.
+        Bicycles drawn at the same place need different sizes, otherwise their surfaces flicker.
         """
         return Mesh(self.vertices + distance * self.normals, self.normals, self.triangles, self.shade)
 
     def coloured(self, colour: tuple[int, int, int]) -> np.ndarray:
-        """Vertex colours for a body colour, shape (n, 3), uint8."""
+        """Return the vertex colours for a body colour, shape (n, 3), uint8."""
         base = np.asarray(colour, float)
         dark = base * np.minimum(self.shade, 1)[:, None]
         light = (255 - base) * np.maximum(self.shade - 1, 0)[:, None]
@@ -82,9 +82,9 @@ def revolved(
     profile, slope : ndarray, shape (k, 2)
         Points (distance from the axis, height along it) [m] and their outward unit normals.
     origin, axis : ndarray, shape (3,)
-        Where height is zero [m]; unit vector.
+        Point where the height is zero [m]; unit vector.
     sides : int
-        Points around.
+        Number of points around the axis.
     shade : float
         See `Mesh`.
     """
@@ -105,14 +105,14 @@ def revolved(
 
 
 def torus(radius: float, thickness: float, axis: np.ndarray, shade: float = PLAIN) -> Mesh:
-    """A ring about the origin: radius of its centre line and of its section [m]."""
+    """Make a ring about the origin from the radii of its centre line and of its section [m]."""
     around = np.linspace(0, 2 * np.pi, SIDES + 1)
     slope = np.column_stack([np.cos(around), np.sin(around)])
     return revolved([radius, 0.0] + thickness * slope, slope, np.zeros(3), axis, 64, shade)
 
 
 def tube(start: np.ndarray, end: np.ndarray, thickness: float, shade: float = PLAIN, sides: int = SIDES) -> Mesh:
-    """A round-ended tube of a radius between two points [m]."""
+    """Make a tube with round ends and a radius between two points [m]."""
     length = float(np.linalg.norm(end - start))
     quarter = np.linspace(0, np.pi / 2, 4)
     around = np.concatenate([quarter - np.pi / 2, quarter])
@@ -123,13 +123,13 @@ def tube(start: np.ndarray, end: np.ndarray, thickness: float, shade: float = PL
 
 
 def ball(centre: np.ndarray, radius: float, shade: float = PLAIN) -> Mesh:
-    """A sphere [m]."""
+    """Make a sphere from its centre and radius [m]."""
     around = np.linspace(-np.pi / 2, np.pi / 2, 13)
     slope = np.column_stack([np.cos(around), np.sin(around)])
     return revolved(radius * slope, slope, centre, np.array([0.0, 0.0, 1.0]), 24, shade)
 
 
-def _wheel(radius: float, size: float) -> Mesh:
+def _wheel_mesh(radius: float, size: float) -> Mesh:
     axle = np.array([0.0, 1.0, 0.0])
     # The tyre's outermost circle is the knife edge itself.
     tyre, rim = TYRE * size, RIM * size
@@ -140,17 +140,17 @@ def _wheel(radius: float, size: float) -> Mesh:
         outwards = np.array([math.sin(angle), 0.0, math.cos(angle)])
         flange = 0.12 * size * (1 if k % 2 else -1) * axle
         parts.append(tube(flange, (radius - 2 * tyre) * outwards, SPOKE * size, LIGHT, 6))
-    # One reflector, so that a turn of the wheel can be counted.
+    # A single reflector, so that turns of the wheel can be counted.
     parts.append(ball(0.62 * radius * np.array([0.0, 0.0, 1.0]), 0.10 * size, LIGHT))
     return merge(parts)
 
 
 def _along_steer_axis(bicycle: Bicycle, distance: float) -> np.ndarray:
-    """Point of the steering axis at rest, a distance above D [m]."""
+    """Return the point of the steering axis at rest at a distance above D [m]."""
     return bicycle.reference_point + distance * bicycle.steer_axis
 
 
-def _rear_frame(bicycle: Bicycle, size: float) -> Mesh:
+def _rear_frame_mesh(bicycle: Bicycle, size: float) -> Mesh:
     axle = np.array([0.0, 1.0, 0.0])
     hub = bicycle.centre("rear_wheel")
     crown = 1.14 * bicycle.front_wheel_radius
@@ -174,12 +174,12 @@ def _rear_frame(bicycle: Bicycle, size: float) -> Mesh:
     nose, tail = saddle + 0.40 * forward, saddle - 0.28 * forward
     parts.append(tube(tail, nose, 0.10 * size, DARK))
     parts += [tube(tail + 0.2 * side * size * axle, nose, 0.07 * size, DARK) for side in (-1, 1)]
-    # The rider is a rigid part of the rear frame: its mass centre stands for him.
+    # The rider is a rigid part of the rear frame, represented by its centre of mass.
     parts.append(ball(bicycle.centre("rear_frame"), 0.20 * size, LIGHT))
     return merge(parts)
 
 
-def _front_frame(bicycle: Bicycle, size: float) -> Mesh:
+def _front_frame_mesh(bicycle: Bicycle, size: float) -> Mesh:
     axle = np.array([0.0, 1.0, 0.0])
     hub = bicycle.centre("front_wheel")
     crown = 1.14 * bicycle.front_wheel_radius
@@ -202,7 +202,7 @@ def _front_frame(bicycle: Bicycle, size: float) -> Mesh:
 
 
 def body_meshes(bicycle: Bicycle) -> dict[str, Mesh]:
-    """Mesh of each body in its own axes at rest, origin in its centre of mass.
+    """Make the mesh of each body in its own axes at rest, with the origin at its centre of mass.
 
     Parameters
     ----------
@@ -214,11 +214,11 @@ def body_meshes(bicycle: Bicycle) -> dict[str, Mesh]:
         Keys are `velodrome.reference.bicycle.BODIES`.
     """
     size = 0.5 * (bicycle.rear_wheel_radius + bicycle.front_wheel_radius)
-    frames = {"rear_frame": _rear_frame(bicycle, size), "front_frame": _front_frame(bicycle, size)}
+    frames = {"rear_frame": _rear_frame_mesh(bicycle, size), "front_frame": _front_frame_mesh(bicycle, size)}
     meshes = {
         body: Mesh(mesh.vertices - bicycle.centre(body), mesh.normals, mesh.triangles, mesh.shade)
         for body, mesh in frames.items()
     }
-    meshes["rear_wheel"] = _wheel(bicycle.rear_wheel_radius, size)
-    meshes["front_wheel"] = _wheel(bicycle.front_wheel_radius, size)
+    meshes["rear_wheel"] = _wheel_mesh(bicycle.rear_wheel_radius, size)
+    meshes["front_wheel"] = _wheel_mesh(bicycle.front_wheel_radius, size)
     return meshes

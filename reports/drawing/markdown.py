@@ -1,16 +1,16 @@
-"""Text of somebody else's making in Markdown: shown as it is."""
+"""Escaping of text from other sources for Markdown."""
 
 from __future__ import annotations
 
-# An underscore within a word is none, and neither is > within a line.
-_SIGNS = "\\`*|<[]"
+# An underscore within a word has no meaning in Markdown, and neither has > within a line.
+_SPECIAL = "\\`*|<[]"
 
 
 def escape_markdown(text: str) -> str:
-    """Text as a part of one line of Markdown, in which no letter is a sign."""
-    return "".join(f"\\{letter}" if letter in _SIGNS else letter for letter in make_printable(text))
+    """Escape a text for one line of Markdown, so that no character has a meaning."""
+    return "".join(f"\\{letter}" if letter in _SPECIAL else letter for letter in make_printable(text))
 
 
 def make_printable(text: str) -> str:
-    """Without control characters, which neither XML nor a line can carry."""
+    """Replace control characters, which neither XML nor a single line can contain, by spaces."""
     return "".join(letter if letter.isprintable() else " " for letter in text)

@@ -1,4 +1,4 @@
-"""One colour per engine, the same in every recording and figure."""
+"""One colour for each engine, the same in every recording and figure."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ Colour = tuple[int, int, int]
 
 REFERENCE_COLOUR: Colour = (232, 234, 238)
 
-# Ten hues of like lightness that stay apart on a dark ground, orange and blue first for the
-# common colour-blindnesses.
+# Ten hues of similar lightness that are distinct on a dark background, with orange and blue first, which remain
+# distinct with common colour blindness.
 PALETTE: tuple[Colour, ...] = (
     (255, 140, 50),
     (70, 160, 255),
@@ -27,19 +27,19 @@ PALETTE: tuple[Colour, ...] = (
 )
 
 
-_SALT = "816:"  # of those tried the first by which the suite's own engines get different slots
+_SALT = "816:"  # the first of those tried that gives the suite's own engines different slots
 
 
 def assign_colours(names: Iterable[str]) -> dict[str, Colour]:
     """Assign a colour to each engine name.
 
-    The reference is near white. Every other name takes the slot of its checksum, or the next free one,
-    so that an engine keeps its colour whichever others run beside it, unless two names collide.
+    The reference is near white. Every other name gets the slot of its checksum, or the next free one,
+    so that an engine has the same colour whatever other engines run, unless two names collide.
 
     Parameters
     ----------
     names : iterable of str
-        Engine names; their order settles who yields in a collision.
+        Engine names; in a collision the first one keeps its slot.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def assign_colours(names: Iterable[str]) -> dict[str, Colour]:
             assigned[name] = REFERENCE_COLOUR
             continue
         if len(taken) == len(PALETTE):
-            taken.clear()  # more engines than hues: start a second round
+            taken.clear()  # more engines than hues: use them a second time
         slot = zlib.crc32(f"{_SALT}{name}".encode()) % len(PALETTE)
         while slot in taken:
             slot = (slot + 1) % len(PALETTE)

@@ -1,4 +1,4 @@
-"""The curves of a recording: which quantity, under what title, computed how."""
+"""The curves of a run: their quantities, titles and values."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...reference.kinematics import FRONT_ANGLE, LEAN, REAR_ANGLE, STEER, WHEELS
 from ...reference.surface import Surface
 from ..measure import START_ERROR, Mode, Modes, normal_force, required_friction
 
-# Sizes below this are round-off of quantities of order one: they have no logarithm worth a point.
+# Smaller magnitudes are round-off of quantities of order one, and their logarithms are not drawn.
 SMALLEST_SIZE = 1e-16
 
 NANOSECONDS = 1e9
@@ -28,10 +28,9 @@ class RideData:
     trajectories : mapping of str to Trajectory
         By engine name, in the order of display.
     before : mapping of str to str
-        Where two runs are shown together: from the name of a trajectory to that of the earlier one that it is
-        held against.
+        For two runs shown together: the name of the earlier trajectory that each trajectory is compared with.
     modes : Modes or None
-        Of the motion that all started from.
+        Modes of the motion that all rides started from.
     """
 
     surface: Surface
@@ -51,7 +50,7 @@ PlotCurve = tuple[np.ndarray, np.ndarray]  # times [s] and values
 
 @dataclass(frozen=True)
 class Plot:
-    """One view of curves, one curve an engine.
+    """A view with one curve for each engine.
 
     Attributes
     ----------
@@ -60,13 +59,13 @@ class Plot:
     title : str
         Quantity and unit.
     values : callable
-        (ride, trajectory) to samples of shape (n,); NaN where there is none, None where the engine
-        does not give the quantity.
+        Returns samples of shape (n,) for (ride, trajectory); NaN where there is no value, None where the engine
+        does not report the quantity.
     span : float
-        Least height of the axis, so that round-off of a constant does not fill the view; 0 leaves
-        the axis to the viewer.
+        Smallest height of the axis, so that round-off of a constant does not fill the view; with 0 the viewer
+        chooses the axis.
     expected : callable, optional
-        ride to the curve that theory expects, or None.
+        Returns the curve that theory predicts for a ride, or None.
     """
 
     key: str
@@ -77,7 +76,7 @@ class Plot:
 
 
 def drawable_values(ride: RideData, plot: Plot) -> dict[str, np.ndarray]:
-    """Values of a plot by engine; what an engine does not give, or gives no number of, has no entry."""
+    """Return the values of a plot by engine, without engines that do not report it or have no finite value."""
     found = {}
     for name, run in ride.trajectories.items():
         values = plot.values(ride, run)
@@ -87,31 +86,31 @@ def drawable_values(ride: RideData, plot: Plot) -> dict[str, np.ndarray]:
 
 
 def to_nanoseconds(time: np.ndarray) -> np.ndarray:
-    """Times [s] rounded to whole nanoseconds, int64."""
+    """Round times [s] to whole nanoseconds, int64."""
     return np.round(np.asarray(time, float) * NANOSECONDS).astype(np.int64)
 
 
 def log_size(values: np.ndarray) -> np.ndarray:
-    """log10 of the size of values; NaN where the size is round-off or the value not finite."""
+    """Return log10 of the magnitude of values; NaN where it is round-off or the value not finite."""
     size = np.abs(values)
     out = np.full(size.shape, np.nan)
-    kept = np.isfinite(size) & (size > SMALLEST_SIZE)
-    out[kept] = np.log10(size[kept])
+    valid = np.isfinite(size) & (size > SMALLEST_SIZE)
+    out[valid] = np.log10(size[valid])
     return out
 
 
 def position_error(ride: RideData, trajectory: Trajectory) -> np.ndarray | None:
-    """Distance of D from the reference's [m], shape (n,), NaN at times the reference lacks."""
-    return _distance(trajectory, ride.reference)
+    """Return the distance of D from the reference's [m], shape (n,), NaN at times that the reference lacks."""
+    return _distance_between(trajectory, ride.reference)
 
 
 def position_change(ride: RideData, trajectory: Trajectory) -> np.ndarray | None:
-    """Distance of D from the earlier run's [m], shape (n,), NaN at times that run lacks."""
+    """Return the distance of D from the earlier run's [m], shape (n,), NaN at times that this run lacks."""
     name = next((name for name, run in ride.trajectories.items() if run is trajectory), None)
-    return _distance(trajectory, ride.trajectories.get(ride.before.get(name or "", "")))
+    return _distance_between(trajectory, ride.trajectories.get(ride.before.get(name or "", "")))
 
 
-def _distance(trajectory: Trajectory, other: Trajectory | None) -> np.ndarray | None:
+def _distance_between(trajectory: Trajectory, other: Trajectory | None) -> np.ndarray | None:
     if other is None or trajectory is other:
         return None
     _, ours, theirs = np.intersect1d(to_nanoseconds(trajectory.time), to_nanoseconds(other.time), return_indices=True)
@@ -121,7 +120,7 @@ def _distance(trajectory: Trajectory, other: Trajectory | None) -> np.ndarray | 
 
 
 def energy_change(_: RideData, trajectory: Trajectory) -> np.ndarray | None:
-    """Change of kinetic and potential energy since the start, as a share of the start's size [-]."""
+    """Return the change of kinetic plus potential energy since the start, relative to the start's magnitude [-]."""
     if trajectory.kinetic_energy is None or trajectory.potential_energy is None:
         return None
     energy = trajectory.kinetic_energy + trajectory.potential_energy
@@ -129,17 +128,17 @@ def energy_change(_: RideData, trajectory: Trajectory) -> np.ndarray | None:
 
 
 def pushing_force(ride: RideData, trajectory: Trajectory) -> np.ndarray | None:
-    """Part of the contact forces along the surface's normal, shape (n, 2) [N]."""
+    """Return the component of the contact forces along the surface's normal, shape (n, 2) [N]."""
     return normal_force(trajectory, ride.surface)
 
 
 def friction_used(ride: RideData, trajectory: Trajectory) -> np.ndarray | None:
-    """Tangential over normal contact force, shape (n, 2); NaN where the ground does not push."""
+    """Return the tangential over the normal contact force, shape (n, 2); NaN where the ground does not push."""
     normal = normal_force(trajectory, ride.surface)
     return None if normal is None else np.where(normal > 0, required_friction(trajectory, ride.surface), np.nan)
 
 
-def _column(get: Values, index: int) -> Values:
+def _select_column(get: Values, index: int) -> Values:
     def values(ride: RideData, trajectory: Trajectory) -> np.ndarray | None:
         both = get(ride, trajectory)
         return None if both is None else both[:, index]
@@ -147,7 +146,7 @@ def _column(get: Values, index: int) -> Values:
     return values
 
 
-def _log(get: Values) -> Values:
+def _take_log(get: Values) -> Values:
     def values(ride: RideData, trajectory: Trajectory) -> np.ndarray | None:
         linear = get(ride, trajectory)
         return None if linear is None else log_size(linear)
@@ -163,11 +162,11 @@ def _slip(_: RideData, trajectory: Trajectory) -> np.ndarray | None:
     return None if trajectory.slip is None else np.linalg.norm(trajectory.slip, axis=-1)
 
 
-ERROR = Plot("log_position_error", "log10 distance of D from the reference [m]", _log(position_error))
-CHANGE = Plot("log_position_change", "log10 distance of D from the earlier run [m]", _log(position_change))
+ERROR = Plot("log_position_error", "log10 distance of D from the reference [m]", _take_log(position_error))
+CHANGE = Plot("log_position_change", "log10 distance of D from the earlier run [m]", _take_log(position_change))
 RADIUS = Plot("radius", "distance of D from the z axis [m]", lambda _, run: np.hypot(run.q[:, 0], run.q[:, 1]), 0.05)
 ENERGY = Plot("energy_change", "relative energy change [-]", energy_change, 1e-6)
-LOG_ENERGY = Plot("log_energy_change", "log10 relative energy change [-]", _log(energy_change))
+LOG_ENERGY = Plot("log_energy_change", "log10 relative energy change [-]", _take_log(energy_change))
 
 STATES = (
     Plot("lean", "lean [rad]", lambda _, run: run.q[:, LEAN], 0.02),
@@ -179,23 +178,26 @@ STATES = (
 )
 FORCES = (
     *(
-        Plot(f"{w}_normal_force", f"{w} normal force [N]", _column(pushing_force, k), 10.0)
+        Plot(f"{w}_normal_force", f"{w} normal force [N]", _select_column(pushing_force, k), 10.0)
         for k, w in enumerate(WHEELS)
     ),
     *(
-        Plot(f"{w}_friction", f"{w} tangential / normal force [-]", _column(friction_used, k), 0.05)
+        Plot(f"{w}_friction", f"{w} tangential / normal force [-]", _select_column(friction_used, k), 0.05)
         for k, w in enumerate(WHEELS)
     ),
 )
 CONSTRAINTS = (
-    *(Plot(f"{w}_log_gap", f"log10 {w} gap [m]", _column(_log(_gap), k)) for k, w in enumerate(WHEELS)),
-    *(Plot(f"{w}_log_slip", f"log10 {w} slip [m/s]", _column(_log(_slip), k)) for k, w in enumerate(WHEELS)),
+    *(Plot(f"{w}_log_gap", f"log10 {w} gap [m]", _select_column(_take_log(_gap), k)) for k, w in enumerate(WHEELS)),
+    *(
+        Plot(f"{w}_log_slip", f"log10 {w} slip [m/s]", _select_column(_take_log(_slip), k))
+        for k, w in enumerate(WHEELS)
+    ),
 )
 PLOTS = (ERROR, CHANGE, RADIUS, LOG_ENERGY, ENERGY, *STATES, *FORCES, *CONSTRAINTS)
 
 
 def mode_plots(modes: Modes | None) -> tuple[Plot, ...]:
-    """A plot a mode: its amplitude, and how it would grow or decay by the linear law."""
+    """Make one plot per mode: its amplitude, and its growth or decay by the linear law."""
     return () if modes is None else tuple(_mode_plot(modes, k, mode) for k, mode in enumerate(modes.modes))
 
 
@@ -207,10 +209,10 @@ def _mode_plot(modes: Modes, k: int, mode: Mode) -> Plot:
         run = ride.reference or next(iter(ride.trajectories.values()))
         begin = float(modes.amplitude(mode, run)[0])
         if begin < START_ERROR:
-            return None  # not excited but by round-off
+            return None  # not excited, except by round-off
         law = np.log10(begin) + mode.eigenvalue.real * run.time / np.log(10)
-        kept = law <= 0  # the law is that of small angles: far below 1
-        return run.time[kept], law[kept]
+        valid = law <= 0  # the law holds for amplitudes far below 1
+        return run.time[valid], law[valid]
 
     what = "rear rate" if mode.unit == "rad/s" else "angle"
     return Plot(f"mode_{k}", f"{mode.title}: log10 {what} [{mode.unit}]", values, expected=expected)

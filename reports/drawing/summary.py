@@ -1,4 +1,4 @@
-"""The run in words and one table, computed from the metrics: Markdown for the recording."""
+"""The run as text with one table, from the metrics: Markdown for the recording."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ...engines.engine import REFERENCE
 from ..measure import describe_mismatch
 from .markdown import escape_markdown
 
-# (title, unit, metric, part of a metric that has parts).
+# (title, unit, metric, part of a metric that has parts)
 COLUMNS: tuple[tuple[str, str, str, str | None], ...] = (
     ("position error", "m", "position_error", "max"),
     ("rotation error", "rad", "orientation_error", "max"),
@@ -23,7 +23,7 @@ COLUMNS: tuple[tuple[str, str, str, str | None], ...] = (
 
 
 def format_cell(metrics: Mapping[str, Any], metric: str, part: str | None) -> str:
-    """Format a metric for a table: two digits, a dash where there is none."""
+    """Format a metric for a table: two digits, a dash where there is no value."""
     value = metrics.get(metric)
     if isinstance(value, Mapping):
         value = value.get(part)
@@ -31,7 +31,7 @@ def format_cell(metrics: Mapping[str, Any], metric: str, part: str | None) -> st
 
 
 def make_remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]:
-    """Say what a reader must know before trusting an engine's row."""
+    """List what a reader must know before trusting an engine's row."""
     lines = []
     if metrics["fell_at"] is not None:
         lines.append(f"{name} fell at {metrics['fell_at']:.2f} s; its figures are those up to there")
@@ -49,7 +49,7 @@ def make_remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list
         lines.append(f"{name} ended early: {metrics['ended']}")
     if _equals_reference(metrics):
         lines.append(f"{name}: its ride equals the reference's to the last bit, so nothing was compared")
-    # Folders of earlier versions do not have it.
+    # Folders of earlier versions do not have this metric.
     if metrics.get("unconverged_steps"):
         residual = metrics.get("largest_residual")
         left = "" if residual is None else f", with a relative residual of up to {residual:.2g}"
@@ -61,7 +61,7 @@ def make_remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list
         later = metrics["settled_force_error"]
         rest = "" if later is None else f"; once settled it is {later:.2g}"
         lines.append(f"{name}: the force error is largest in the first sample{rest}")
-    # Folders of earlier versions do not have it.
+    # Folders of earlier versions do not have this metric.
     lines += [f"{name}: {describe_mismatch(report)}" for report in metrics.get("inconsistent_reports") or ()]
     if metrics["not_finite"]:
         lines.append(f"{name}: not finite in some samples: {', '.join(metrics['not_finite'])}")
@@ -73,7 +73,7 @@ def make_remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list
 
 
 def _equals_reference(metrics: Mapping[str, Any]) -> bool:
-    """Whether the path, the frame's orientation and the wheel's rate have no error at all over the whole ride."""
+    """Return whether path, orientation of the frame and rate of the wheel have no error over the whole ride."""
     errors = [metrics.get("position_error"), metrics.get("orientation_error"), {"max": metrics.get("rear_rate_error")}]
     whole = metrics["ended"] is None and metrics["fell_at"] is None
     return whole and all(error is not None and error["max"] == 0 for error in errors)
@@ -88,7 +88,7 @@ def make_summary(
     duration: float,
     steady: bool = True,
 ) -> str:
-    """Markdown summary of a run.
+    """Write the Markdown summary of a run.
 
     Parameters
     ----------
@@ -98,11 +98,11 @@ def make_summary(
     failures : mapping
         Reason by the name of an engine that gave no trajectory.
     verdicts : sequence of mapping
-        As `velodrome.scenarios.run.runner.judge_run` gives them.
+        As returned by `velodrome.scenarios.run.runner.judge_run`.
     growth_rate : float
-        Of the motion's own disturbances [1/s].
+        Growth rate of the motion's own disturbances [1/s].
     duration : float
-        Of the run [s].
+        Duration of the run [s].
     steady : bool
         See `describe_stability`.
 
@@ -111,7 +111,7 @@ def make_summary(
     str
     """
     lines = [f"# {escape_markdown(title)}", "", describe_stability(growth_rate, steady), ""]
-    # Engines as columns: they are fewer than quantities, and the recording's tab is narrow.
+    # Engines are columns: there are fewer of them than quantities, and the recording's tab is narrow.
     lines += ["| | " + " | ".join(escape_markdown(name) for name in measured) + " |", "|---|" + "---:|" * len(measured)]
     for name, unit, metric, part in COLUMNS:
         cells = (format_cell(values, metric, part) for values in measured.values())
@@ -129,21 +129,21 @@ def make_summary(
 
 
 def format_verdict(verdict: Mapping[str, Any]) -> str:
-    """One line on one verdict."""
+    """Format a verdict as one line."""
     value = "not done" if verdict["value"] is None else f"{verdict['value']:.3g}"
     word = "holds" if verdict["holds"] else "falls short"
     return f"{verdict['engine']}: {verdict['quantity']} {value}, limit {verdict['limit']:.3g}: {word}"
 
 
 def describe_stability(growth_rate: float, steady: bool = True) -> str:
-    """One sentence on a motion's disturbances.
+    """Describe the fate of a motion's disturbances in one sentence.
 
     Parameters
     ----------
     growth_rate : float
-        Of the motion [1/s]; of the same start on the level plane where it is not ``steady``.
+        Growth rate of the motion [1/s]; that of the same start on the level plane if it is not ``steady``.
     steady : bool
-        Whether the ground lets it be: no motion is on ground without symmetry about the z axis.
+        Whether the motion is steady; no motion is on ground without symmetry about the z axis.
     """
     if not steady:
         fate = f"decay at {-growth_rate:.4g} 1/s" if growth_rate < 0 else f"grow like exp({growth_rate:.4g} t / s)"

@@ -1,4 +1,4 @@
-"""Figures on paper: solution families, the atlas, work-precision."""
+"""Figures for print: solution families, the atlas, work-precision."""
 
 from .atlas import growth_figure, stable_figure
 from .eigenvalues import eigenvalue_figure

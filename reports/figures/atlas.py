@@ -1,4 +1,4 @@
-"""Figures of the atlas: where circular motions are stable over alpha and rear rate, and how fast others are left."""
+"""Figures of the atlas: stable circular motions over alpha and rear rate, and the growth rates of the others."""
 
 from __future__ import annotations
 
@@ -25,59 +25,59 @@ from .style import FAMILY_COLOURS, GREY, INK, new_figure, use_style, write_figur
 Columns = Mapping[str, np.ndarray]
 
 STABLE = "#2b6cb0"
-_HIGHEST = 35.0  # rear rate drawn [rad/s]: beyond, two families run on without an event
+_HIGHEST = 35.0  # largest rear rate drawn [rad/s]: beyond, two families continue without an event
 _PIXELS = 480
 _SLOW, _FAST = 0.1, 100.0  # growth rates of the colour scale [1/s]
 _NORM, _COLOURS = LogNorm(_SLOW, _FAST), "YlOrRd"
-_CAUSES = {"hopf": "-", "energy": ":", "end": "--"}
-_WORDS = {"hopf": "a complex pair crosses (Hopf)", "energy": "the energy is extreme", "end": "the family ends"}
+_CAUSE_LINES = {"hopf": "-", "energy": ":", "end": "--"}
+_CAUSE_LABELS = {"hopf": "a complex pair crosses (Hopf)", "energy": "the energy is extreme", "end": "the family ends"}
 _TICKS = (0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
 
 
 def growth_figure(path: Path, columns: Columns, document: Mapping[str, Any]) -> None:
-    """Write the growth rate over alpha and rear rate, a panel a family.
+    """Write the growth rate over alpha and rear rate, one panel per family.
 
     Parameters
     ----------
     path : Path
-        File to write, whole or not at all; its ending gives the format.
+        File to write, completely or not at all; its ending gives the format.
     columns, document : mapping
-        Of the atlas, as `velodrome atlas` writes them.
+        Columns and document of the atlas, as `velodrome atlas` writes them.
     """
     with use_style(), rc_context({"hatch.linewidth": 0.4}):
         figure = new_figure(6.2)
         panels = figure.subplots(2, 2, sharex=True, sharey=True)
         for axes, family in zip(panels.flat, FAMILIES, strict=True):
-            _panel(axes, columns, document, family)
+            _draw_panel(axes, columns, document, family)
         for axes in panels[1]:
             axes.set_xlabel("shape of the bowl α [1/m], root scale")
         for axes in panels[:, 0]:
             axes.set_ylabel("rear-wheel rate ωr [rad/s]")
-        _colour_bar(figure, panels)
+        _draw_colour_bar(figure, panels)
         figure.legend(handles=list(_growth_legend(document)), loc="outside lower center", ncols=2)
         title = "Circular motions and the growth rate of disturbances (of several at one rate the least is shown)"
         figure.suptitle(title, x=0.01, ha="left", fontsize=9)
-        # Last, since all else moves the axes.
+        # Labels come last, since all other items move the axes.
         for axes, family in zip(panels.flat, FAMILIES, strict=True):
-            _name_alphas(axes, _critical(document, family), "rear_rate")
+            _label_alphas(axes, _critical_points(document, family), "rear_rate")
         write_figure(path, figure)
 
 
-def _panel(axes: Axes, columns: Columns, document: Mapping[str, Any], family: int) -> None:
+def _draw_panel(axes: Axes, columns: Columns, document: Mapping[str, Any], family: int) -> None:
     alphas, rates = np.array(document["alphas"]), np.linspace(0.0, _HIGHEST, _PIXELS)
     growth, pushed = sheet(columns, family, alphas, rates)
     axes.pcolormesh(alphas, rates, growth.clip(_SLOW / 2), norm=_NORM, cmap=_COLOURS, rasterized=True)
     stable = np.where(growth < 0, 1.0, np.nan)
     axes.pcolormesh(alphas, rates, stable, cmap=ListedColormap([STABLE]), rasterized=True)
-    _hatch(axes, alphas, rates, np.isfinite(growth) & ~pushed)
-    _root_scale(axes, float(alphas[-1]))
+    _draw_hatching(axes, alphas, rates, np.isfinite(growth) & ~pushed)
+    _set_root_scale(axes, float(alphas[-1]))
     axes.set_ylim(0, _HIGHEST)
     axes.set_title(f"family {family}", loc="left", color=FAMILY_COLOURS[family], fontweight="bold")
-    _boundaries(axes, document, family)
-    _touching(axes, document, family)
+    _draw_boundaries(axes, document, family)
+    _mark_touching(axes, document, family)
 
 
-def _colour_bar(figure: Figure, panels: np.ndarray) -> None:
+def _draw_colour_bar(figure: Figure, panels: np.ndarray) -> None:
     bar = figure.colorbar(ScalarMappable(_NORM, _COLOURS), ax=panels, extend="both", shrink=0.75, aspect=30, pad=0.02)
     bar.set_label("growth rate [1/s]")
     bar.ax.yaxis.set_major_locator(FixedLocator([0.1, 0.3, 1, 3, 10, 30, 100]))
@@ -86,7 +86,7 @@ def _colour_bar(figure: Figure, panels: np.ndarray) -> None:
 
 
 def stable_figure(path: Path, columns: Columns, document: Mapping[str, Any]) -> None:
-    """Write the stable regions, over alpha and rear rate and over alpha and lean; arguments as `growth_figure`."""
+    """Write the stable regions, over alpha and rear rate and over alpha and lean; arguments as in `growth_figure`."""
     with use_style():
         figure = new_figure(3.9)
         panels = figure.subplots(1, 2, sharex=True)
@@ -94,37 +94,37 @@ def stable_figure(path: Path, columns: Columns, document: Mapping[str, Any]) -> 
             panels, ("rear_rate", "lean"), ("rear-wheel rate ωr [rad/s]", "lean θ₀ [rad]"), "ab", strict=True
         ):
             for boundary in document["stable"]:
-                _region(axes, columns, boundary, name)
+                _draw_region(axes, columns, boundary, name)
             axes.set_xlabel("shape of the bowl α [1/m]")
             axes.set_ylabel(label)
             axes.set_xlim(left=0)
             axes.grid()
             axes.set_title(f"({tag})", loc="left")
         for axes, name in zip(panels, ("rear_rate", "lean"), strict=True):
-            _name_alphas(axes, [b["vanishing"] for b in document["stable"] if b["vanishing"] is not None], name)
+            _label_alphas(axes, [b["vanishing"] for b in document["stable"] if b["vanishing"] is not None], name)
         figure.legend(handles=list(_stable_legend(document)), loc="outside lower center", ncols=3)
         figure.suptitle("Stable circular motions of the hands-free bicycle", x=0.01, ha="left", fontsize=10)
         write_figure(path, figure)
 
 
 def sheet(columns: Columns, family: int, alphas: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Growth rate over rear rate and alpha; where a family has several motions, of the one that has the least.
+    """Interpolate the growth rate over rear rate and alpha; of several motions of a family, take the smallest.
 
     Parameters
     ----------
     columns : mapping of str to ndarray
-        Of the atlas.
+        Columns of the atlas.
     family : int
     alphas : ndarray, shape (k,)
     rates : ndarray, shape (m,)
-        Rear rates, rising.
+        Rear rates, in rising order.
 
     Returns
     -------
     growth : ndarray, shape (m, k)
         nan where the family has no motion.
     pushed : ndarray of bool, shape (m, k)
-        Whether the ground pushes both wheels.
+        Whether the ground pushes on both wheels.
     """
     out, pushed = np.full((len(rates), len(alphas)), np.nan), np.zeros((len(rates), len(alphas)), bool)
     chosen = columns["family"] == family
@@ -132,23 +132,23 @@ def sheet(columns: Columns, family: int, alphas: np.ndarray, rates: np.ndarray) 
     starts, stops = np.searchsorted(alpha, alphas, "left"), np.searchsorted(alpha, alphas, "right")
     for column, (start, stop) in enumerate(zip(starts, stops, strict=True)):
         r, g = rate[start:stop], growth[start:stop]
-        # Between neighbours of the curve the growth rate is interpolated.
+        # The growth rate is interpolated between neighbours on the curve.
         low, high = np.minimum(r[:-1], r[1:]), np.maximum(r[:-1], r[1:])
         segment, at = np.nonzero((low[:, None] <= rates) & (rates < high[:, None]))
         share = (rates[at] - r[segment]) / (r[segment + 1] - r[segment])
         values = g[segment] + share * (g[segment + 1] - g[segment])
-        order = np.argsort(-values)  # of all that fall on one place the last stays
+        order = np.argsort(-values)  # of several values in one place the last, the smallest, stays
         out[at[order], column] = values[order]
         pushed[at[order], column] = physical[start:stop][segment[order]]
     return out, pushed
 
 
-def _hatch(axes: Axes, alphas: np.ndarray, rates: np.ndarray, where: np.ndarray) -> None:
+def _draw_hatching(axes: Axes, alphas: np.ndarray, rates: np.ndarray, where: np.ndarray) -> None:
     if where.any():
         axes.contourf(alphas, rates, where.astype(float), levels=[0.5, 1.5], colors="none", hatches=["////"])
 
 
-def _root_scale(axes: Axes, largest: float) -> None:
+def _set_root_scale(axes: Axes, largest: float) -> None:
     axes.set_xscale("function", functions=(lambda x: np.sqrt(np.maximum(x, 0)), np.square))
     axes.set_xlim(0, largest)
     axes.xaxis.set_major_locator(FixedLocator([tick for tick in _TICKS if tick <= largest]))
@@ -156,8 +156,8 @@ def _root_scale(axes: Axes, largest: float) -> None:
     axes.xaxis.set_minor_locator(NullLocator())
 
 
-def _pieces(boundary: Mapping[str, Any], side: str, name: str) -> Iterator[tuple[str, np.ndarray]]:
-    """One side of a region as lines of one cause each, down to the point where it vanishes: (cause, (n, 2))."""
+def _split_by_cause(boundary: Mapping[str, Any], side: str, name: str) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield one side of a region as lines of one cause each, up to the point where it vanishes: (cause, (n, 2))."""
     line = list(zip(boundary["alpha"], boundary[side][name], strict=True))
     causes = list(boundary[side]["cause"])
     if boundary["vanishing"] is not None:
@@ -169,16 +169,16 @@ def _pieces(boundary: Mapping[str, Any], side: str, name: str) -> Iterator[tuple
 
 
 def _draw_sides(axes: Axes, boundary: Mapping[str, Any], name: str, colour: str, width: float) -> None:
-    """Draw both sides of a region; a cause that holds at one alpha alone, as on the plane, is a mark."""
+    """Draw both sides of a region; a cause that applies at a single alpha, as on the plane, is a mark."""
     for side in ("start", "end"):
-        for cause, line in _pieces(boundary, side, name):
+        for cause, line in _split_by_cause(boundary, side, name):
             if len(line) == 1:
                 axes.plot(*line.T, "s", color="white", mec=colour, mew=width, ms=4, clip_on=False, zorder=6)
             else:
-                axes.plot(*line.T, color=colour, lw=width, ls=_CAUSES[cause])
+                axes.plot(*line.T, color=colour, lw=width, ls=_CAUSE_LINES[cause])
 
 
-def _boundaries(axes: Axes, document: Mapping[str, Any], family: int) -> None:
+def _draw_boundaries(axes: Axes, document: Mapping[str, Any], family: int) -> None:
     for boundary in document["stable"]:
         if boundary["family"] != family:
             continue
@@ -188,20 +188,20 @@ def _boundaries(axes: Axes, document: Mapping[str, Any], family: int) -> None:
             axes.plot(end["alpha"], end["rear_rate"], "*", color=INK, ms=8, mec="white", mew=0.6)
 
 
-def _name_alphas(axes: Axes, points: Sequence[Mapping[str, Any]], name: str) -> None:
-    """Write the alpha of critical points beside them."""
+def _label_alphas(axes: Axes, points: Sequence[Mapping[str, Any]], name: str) -> None:
+    """Write the alpha of critical points next to them."""
     labels = [Label(f"α = {point['alpha']:.3g}", (point["alpha"], point[name])) for point in points]
     for text in place_labels(axes, labels):
         text.set(fontsize=7, path_effects=[withStroke(linewidth=2, foreground="white")])
 
 
-def _critical(document: Mapping[str, Any], family: int) -> list[Mapping[str, Any]]:
+def _critical_points(document: Mapping[str, Any], family: int) -> list[Mapping[str, Any]]:
     ends = [b["vanishing"] for b in document["stable"] if b["family"] == family and b["vanishing"] is not None]
     touching = [point for point in document["touching"] if family in point["families"]]
     return [point for point in ends + touching if point["rear_rate"] < _HIGHEST]
 
 
-def _touching(axes: Axes, document: Mapping[str, Any], family: int) -> None:
+def _mark_touching(axes: Axes, document: Mapping[str, Any], family: int) -> None:
     for point in document["touching"]:
         if family in point["families"] and point["rear_rate"] < _HIGHEST:
             axes.plot(point["alpha"], point["rear_rate"], "D", color="white", mec=INK, mew=0.8, ms=5, clip_on=False)
@@ -216,7 +216,7 @@ def _growth_legend(document: Mapping[str, Any]) -> Iterator[Any]:
     yield Line2D([], [], ls="", marker="D", color="white", mec=INK, ms=5, label="two curves touch and exchange parts")
 
 
-def _region(axes: Axes, columns: Columns, boundary: Mapping[str, Any], name: str) -> None:
+def _draw_region(axes: Axes, columns: Columns, boundary: Mapping[str, Any], name: str) -> None:
     colour = FAMILY_COLOURS[boundary["family"]]
     alphas, low, high = [], [], []
     stable = columns["stable"] & (columns["family"] == boundary["family"])
@@ -243,15 +243,15 @@ def _stable_legend(document: Mapping[str, Any]) -> Iterator[Any]:
 
 
 def _cause_legend(document: Mapping[str, Any]) -> Iterator[Any]:
-    """What ends a section: along a line, or at one alpha alone."""
+    """Yield legend entries for what ends a section, along a line or at a single alpha."""
     pieces = [
         (cause, len(line))
         for boundary in document["stable"]
         for side in ("start", "end")
-        for cause, line in _pieces(boundary, side, "lean")
+        for cause, line in _split_by_cause(boundary, side, "lean")
     ]
     for cause in sorted({cause for cause, length in pieces if length > 1}):
-        yield Line2D([], [], color=INK, ls=_CAUSES[cause], label=f"end of stability: {_WORDS[cause]}")
+        yield Line2D([], [], color=INK, ls=_CAUSE_LINES[cause], label=f"end of stability: {_CAUSE_LABELS[cause]}")
     for cause in sorted({cause for cause, length in pieces if length == 1}):
-        mark = {"marker": "s", "color": "white", "mec": INK, "ms": 4, "ls": ""}
-        yield Line2D([], [], **mark, label=f"on the plane alone: {_WORDS[cause]}")
+        mark: dict[str, Any] = {"marker": "s", "color": "white", "mec": INK, "ms": 4, "ls": ""}
+        yield Line2D([], [], **mark, label=f"on the plane alone: {_CAUSE_LABELS[cause]}")

@@ -1,4 +1,4 @@
-"""Solution families, drawn as in Xiong et al. (2020), Figures 2 to 5 and 7."""
+"""Figures of solution families, as in Xiong et al. (2020), Figures 2 to 5 and 7."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ POINT_MEANINGS = {
     "flat": "limit",
 }
 _SPEEDS = (0, 5, 10, 15, 20, 30, 50, 100)  # on the upper axis [rad/s]
-# Left, bottom, width, height of the magnified part, as shares of a panel: where no curve of small alpha runs.
+# Left, bottom, width, height of the magnified part, relative to a panel: where no curve of small alpha lies.
 _LENSES = {"lean": (0.045, 0.575, 0.36, 0.33), "steer": (0.615, 0.19, 0.36, 0.31)}
-_LONGEST = 40  # letters for the ground
+_LONGEST = 40  # largest number of characters for the ground
 _STABLE, _PLAIN, _PULLED = 4.6, 1.4, 1.0  # widths of lines [pt]
 
 
@@ -45,13 +45,13 @@ def family_figure(
     Parameters
     ----------
     path : Path
-        File to write, whole or not at all; its ending gives the format.
+        File to write, completely or not at all; its ending gives the format.
     document : mapping
-        As `velodrome families` gives it.
+        As returned by `velodrome families`.
     front_radius : float
         Radius of the front wheel [m].
     marks : mapping, optional
-        More motions to mark: name to ``lean``, ``steer`` and ``front_rate``.
+        Further motions to mark, by name: ``lean``, ``steer`` and ``front_rate``.
     """
     with use_style():
         write_figure(path, solution_figure(document, front_radius, marks or {}))
@@ -60,7 +60,7 @@ def family_figure(
 def solution_figure(
     document: Mapping[str, Any], front_radius: float, marks: Mapping[str, Mapping[str, float]]
 ) -> Figure:
-    """Draw lean and steer of all families over the scaled front speed; call within `figure_style.style`."""
+    """Draw lean and steer of all families over the scaled front speed; call within `use_style`."""
     drawn = make_curves(document["families"], front_radius)
     points = find_named_points(document["families"], front_radius)
     points += [
@@ -71,52 +71,54 @@ def solution_figure(
     figure = new_figure(3.75)
     panels = figure.subplots(1, 2)
     for axes, angle, tag in zip(panels, ANGLES, "ab", strict=True):
-        _frame(axes, angle, front_radius)
-        axes.text(0.03, 0.965, f"({tag})  {_where(document)}", transform=axes.transAxes, va="top", fontsize=8.5)
+        _draw_frame(axes, angle, front_radius)
+        axes.text(
+            0.03, 0.965, f"({tag})  {_describe_ground(document)}", transform=axes.transAxes, va="top", fontsize=8.5
+        )
         for curve in drawn:
-            _draw(axes, curve, angle)
-        _mark(axes, points, angle)
-    _legend(figure, drawn, points)
+            _draw_curve(axes, curve, angle)
+        _mark_points(axes, points, angle)
+    _draw_legend(figure, drawn, points)
     for axes, angle in zip(panels, ANGLES, strict=True):
         badges = [
-            Badge("+".join(str(number) for number in curve.families), curve.line(angle), _colour(curve))
+            Badge("+".join(str(number) for number in curve.families), curve.line(angle), _curve_colour(curve))
             for curve in drawn
         ]
         _magnify(axes, drawn, points, angle)
-        place_labels(axes, _labels(points, angle), badges)
+        place_labels(axes, _make_labels(points, angle), badges)
     return figure
 
 
-def _labels(points: Sequence[NamedPoint], angle: str) -> list[Label]:
+def _make_labels(points: Sequence[NamedPoint], angle: str) -> list[Label]:
     return [Label(point.name, (point.speed, getattr(point, angle))) for point in points if point.name]
 
 
 def _magnify(axes: Axes, drawn: Sequence[SolutionCurve], points: Sequence[NamedPoint], angle: str) -> None:
-    """Show cusps and stable sections again, larger: they are small, and the families nearly touch there."""
+    """Show cusps and stable sections enlarged: they are small, and the families nearly touch there."""
     stable = [curve.line(angle, *section) for curve in drawn for section in curve.stable]
     cusps = [(point.speed, getattr(point, angle)) for point in points if point.kind == "cusp"]
     if not stable or not cusps:
         return
-    seen = np.concatenate([*stable, cusps])
-    low, high = seen.min(axis=0), seen.max(axis=0)
+    magnified = np.concatenate([*stable, cusps])
+    low, high = magnified.min(axis=0), magnified.max(axis=0)
     low, high = low - 0.18 * (high - low), high + 0.12 * (high - low)
     lens = axes.inset_axes(_LENSES[angle], xlim=(low[0], high[0]), ylim=(low[1], high[1]), xticks=[], yticks=[])
     for curve in drawn:
-        _draw(lens, curve, angle)
+        _draw_curve(lens, curve, angle)
     inside = [
         point
         for point in points
         if low[0] < point.speed < high[0] and low[1] < getattr(point, angle) < high[1] and not point.limit
     ]
-    # No markers on cusps: they would cover what the lens is for.
-    _mark(lens, [point for point in inside if point.kind == "motion"], angle)
-    place_labels(lens, _labels(inside, angle))
+    # No markers on cusps: they would cover what is magnified.
+    _mark_points(lens, [point for point in inside if point.kind == "motion"], angle)
+    place_labels(lens, _make_labels(inside, angle))
     for connector in axes.indicate_inset_zoom(lens, edgecolor=GREY, lw=0.6).connectors or ():
         connector.set_visible(False)
 
 
-def _where(document: Mapping[str, Any]) -> str:
-    """The ground in words; a simple fraction as the paper writes it."""
+def _describe_ground(document: Mapping[str, Any]) -> str:
+    """Describe the ground; a simple fraction is written as in the paper."""
     alpha = document["alpha"]
     if alpha is None:
         fields = document["surface"].items()
@@ -126,7 +128,7 @@ def _where(document: Mapping[str, Any]) -> str:
     return "α = 0" if alpha == 0 else f"α = {fraction if simple else f'{alpha:.6g}'} m⁻¹"
 
 
-def _frame(axes: Axes, angle: str, front_radius: float) -> None:
+def _draw_frame(axes: Axes, angle: str, front_radius: float) -> None:
     axes.set_xlim(0, np.pi / 2)
     axes.set_ylim(*RANGES[angle])
     axes.set_xlabel("arctan($R_f$ |$ω_f$| / 4 m/s) [rad]")
@@ -139,12 +141,12 @@ def _frame(axes: Axes, angle: str, front_radius: float) -> None:
     upper.set_xlabel("|$ω_f$| [rad/s]")
 
 
-def _colour(curve: SolutionCurve) -> str:
+def _curve_colour(curve: SolutionCurve) -> str:
     return FAMILY_COLOURS[curve.families[0]]
 
 
-def _draw(axes: Axes, curve: SolutionCurve, angle: str) -> None:
-    colour = _colour(curve)
+def _draw_curve(axes: Axes, curve: SolutionCurve, angle: str) -> None:
+    colour = _curve_colour(curve)
     for low, high, pushed in curve.pieces():
         line = curve.line(angle, low, high)
         if not pushed:
@@ -159,30 +161,30 @@ def _draw(axes: Axes, curve: SolutionCurve, angle: str) -> None:
     for point in curve.limits:
         if point.kind == "flat":
             end = curve.line(angle)[0 if point.first else -1]
-            way = np.array([end, (point.speed, getattr(point, angle))])
-            axes.plot(*way.T, color=colour, lw=0.9, ls=":", gid="limit")
+            to_limit = np.array([end, (point.speed, getattr(point, angle))])
+            axes.plot(*to_limit.T, color=colour, lw=0.9, ls=":", gid="limit")
 
 
-def _mark(axes: Axes, points: Sequence[NamedPoint], angle: str) -> None:
+def _mark_points(axes: Axes, points: Sequence[NamedPoint], angle: str) -> None:
     for point in points:
         axes.plot(
             [point.speed],
             [getattr(point, angle)],
             ls="",
-            **_face(point),
+            **_marker_style(point),
             clip_on=False,
             zorder=7,
             gid=point.kind,
         )
 
 
-def _face(point: NamedPoint) -> dict[str, Any]:
-    """Marker of a point: open where it is only a limit."""
+def _marker_style(point: NamedPoint) -> dict[str, Any]:
+    """Return the marker of a point; it is open for a limit."""
     marker = MARKERS.get(point.kind, "o" if point.kind == "flat" else "D")
     return {"marker": marker, "ms": 4.6, "mfc": "white" if point.limit else INK, "mec": INK, "mew": 0.9}
 
 
-def _legend(figure: Figure, drawn: Sequence[SolutionCurve], points: Sequence[NamedPoint]) -> None:
+def _draw_legend(figure: Figure, drawn: Sequence[SolutionCurve], points: Sequence[NamedPoint]) -> None:
     numbers = sorted({number for curve in drawn for number in curve.families})
     handles: list[Line2D] = [Line2D([], [], color=FAMILY_COLOURS[k], lw=2, label=f"family {k}") for k in numbers]
     if any(curve.stable for curve in drawn):
@@ -190,7 +192,7 @@ def _legend(figure: Figure, drawn: Sequence[SolutionCurve], points: Sequence[Nam
     if any(not pushed for curve in drawn for _, _, pushed in curve.pieces()):
         handles.append(Line2D([], [], color=GREY, lw=_PULLED, dashes=(4, 2.2), label="a wheel pulled"))
     for kind, meaning in POINT_MEANINGS.items():
-        shown = [point for point in points if point.kind == kind]
-        if shown:
-            handles.append(Line2D([], [], ls="", label=meaning, **_face(shown[0])))
+        marked = [point for point in points if point.kind == kind]
+        if marked:
+            handles.append(Line2D([], [], ls="", label=meaning, **_marker_style(marked[0])))
     figure.legend(handles=handles, loc="outside lower center", ncols=math.ceil(len(handles) / 2), columnspacing=1.4)

@@ -1,4 +1,4 @@
-"""Where labels go on a plot: near what they name, off the curves and off one another."""
+"""Placement of labels on a plot: near what they name, off the curves and off one another."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.text import Annotation
 
-_REACHES = (8.0, 11.0, 15.0, 20.0, 26.0)  # distance of a label from its point [pt]
-_DIRECTIONS = np.radians(np.arange(45.0, 405.0, 22.5))  # upper right first: where the eye expects it
+_REACHES = (8.0, 11.0, 15.0, 20.0, 26.0)  # distances of a label from its point that are tried [pt]
+_DIRECTIONS = np.radians(np.arange(45.0, 405.0, 22.5))  # beginning at the upper right, where readers expect it
 _MARGIN = 1.5  # kept free around a label [pt]
-_SPACING = 2.0  # of the points that stand for a curve [pt]
-_LEADER = 17.0  # a label further away is tied to its point by a line [pt]
+_SPACING = 2.0  # of the points that represent a curve [pt]
+_LEADER = 17.0  # distance from which a label is connected to its point by a line [pt]
 
 
 @dataclass(frozen=True)
 class Label:
-    """A text that names a point: placed beside it."""
+    """A text that names a point and is placed beside it."""
 
     text: str
     point: tuple[float, float]
@@ -28,7 +28,7 @@ class Label:
 
 @dataclass(frozen=True)
 class Badge:
-    """A text that names a curve: placed on it, at one of the curve's points, shape (n, 2)."""
+    """A text that names a curve and is placed on it, at one of the curve's points, shape (n, 2)."""
 
     text: str
     points: np.ndarray
@@ -41,7 +41,7 @@ def place_labels(axes: Axes, labels: Sequence[Label], badges: Sequence[Badge] = 
     Parameters
     ----------
     axes : Axes
-        With all curves and markers drawn and all limits set.
+        Must have all curves and markers drawn and all limits set.
     labels : sequence of Label
     badges : sequence of Badge
 
@@ -53,36 +53,36 @@ def place_labels(axes: Axes, labels: Sequence[Label], badges: Sequence[Badge] = 
     figure: Any = axes.figure
     figure.draw_without_rendering()  # the layout engine moves the axes only now
     scale = 72 / figure.dpi
-    obstacles = _curves(axes) * scale
+    obstacles = _curve_points(axes) * scale
     frame = np.array(axes.bbox.extents) * scale
     taken: list[np.ndarray] = [np.array(child.bbox.extents) * scale for child in axes.child_axes]
     written = []
     for label in labels:
-        text, size = _written(axes, label.text, label.point, scale)
+        text, size = _write_text(axes, label.text, label.point, scale)
         at = axes.transData.transform(label.point) * scale
-        offset = _beside(at, size, obstacles, taken, frame)
+        offset = _place_label(at, size, obstacles, taken, frame)
         text.xyann = tuple(offset)
         if np.hypot(*offset) > _LEADER:
             edge = offset * (1 - np.min(size / 2 / np.maximum(np.abs(offset), 1e-9)))
             leader = {"arrowstyle": "-", "lw": 0.5, "shrinkA": 0, "shrinkB": 3}
             line = axes.annotate("", label.point, tuple(edge), textcoords="offset points", arrowprops=leader)
             line.set_in_layout(False)
-        taken.append(_box(at + offset, size))
+        taken.append(_make_box(at + offset, size))
         written.append(text)
     for badge in badges:
-        text, size = _written(axes, badge.text, badge.points[0], scale, badge.colour)
+        text, size = _write_text(axes, badge.text, badge.points[0], scale, badge.colour)
         places = axes.transData.transform(badge.points) * scale
-        chosen = _along(places, size + 4, obstacles, taken, frame)
+        chosen = _place_badge(places, size + 4, obstacles, taken, frame)
         text.xy = tuple(badge.points[chosen])
-        taken.append(_box(places[chosen], size + 4))
+        taken.append(_make_box(places[chosen], size + 4))
         written.append(text)
     return written
 
 
-def _written(
+def _write_text(
     axes: Axes, words: str, point: Any, scale: float, colour: str | None = None
 ) -> tuple[Annotation, np.ndarray]:
-    """The text at its point and its width and height [pt]."""
+    """Write a text at its point; return it and its width and height [pt]."""
     kind: dict[str, Any] = {"fontsize": 9, "zorder": 9}
     if colour is not None:
         box = {"boxstyle": "round,pad=0.18", "fc": "white", "ec": colour, "lw": 0.9}
@@ -95,18 +95,18 @@ def _written(
     return text, np.array([extent.width, extent.height]) * scale
 
 
-def _curves(axes: Axes) -> np.ndarray:
-    """Points on everything drawn as a line or a marker, in display coordinates, shape (n, 2)."""
+def _curve_points(axes: Axes) -> np.ndarray:
+    """Return points on all lines and markers in display coordinates, shape (n, 2)."""
     points = [np.empty((0, 2))]
     for line in axes.lines:
-        shown = line.get_transform().transform(line.get_xydata())
-        shown = shown[np.all(np.isfinite(shown), axis=1)]
-        points.append(shown if line.get_linestyle() == "None" else _filled(shown))
+        vertices = line.get_transform().transform(line.get_xydata())
+        vertices = vertices[np.all(np.isfinite(vertices), axis=1)]
+        points.append(vertices if line.get_linestyle() == "None" else _fill_gaps(vertices))
     return np.concatenate(points)
 
 
-def _filled(points: np.ndarray) -> np.ndarray:
-    """A polyline's vertices, with points between them so that no gap is wider than the spacing."""
+def _fill_gaps(points: np.ndarray) -> np.ndarray:
+    """Add points to a polyline so that no gap is wider than the spacing."""
     between = [
         a + (b - a) * np.linspace(0, 1, int(np.hypot(*(b - a)) // _SPACING) + 2)[1:-1, None]
         for a, b in pairwise(points)
@@ -114,48 +114,48 @@ def _filled(points: np.ndarray) -> np.ndarray:
     return np.concatenate([points, *between])
 
 
-def _box(centre: np.ndarray, size: np.ndarray) -> np.ndarray:
+def _make_box(centre: np.ndarray, size: np.ndarray) -> np.ndarray:
     return np.concatenate([centre - size / 2 - _MARGIN, centre + size / 2 + _MARGIN])
 
 
-def _covered(box: np.ndarray, points: np.ndarray) -> int:
+def _count_covered(box: np.ndarray, points: np.ndarray) -> int:
     return int(np.all((points > box[:2]) & (points < box[2:]), axis=1).sum())
 
 
-def _clashes(box: np.ndarray, taken: Sequence[np.ndarray], frame: np.ndarray) -> int:
-    """How many texts a box overlaps; leaving the frame counts as one."""
+def _count_clashes(box: np.ndarray, taken: Sequence[np.ndarray], frame: np.ndarray) -> int:
+    """Count the texts that a box overlaps; leaving the frame counts as one."""
     overlaps = sum(bool(np.all((box[:2] < other[2:]) & (other[:2] < box[2:]))) for other in taken)
     return overlaps + bool(np.any(box[:2] < frame[:2]) or np.any(box[2:] > frame[2:]))
 
 
-def _beside(
+def _place_label(
     at: np.ndarray, size: np.ndarray, obstacles: np.ndarray, taken: Sequence[np.ndarray], frame: np.ndarray
 ) -> np.ndarray:
-    """Offset of a label from its point: the nearest that covers nothing, or the one that covers least."""
+    """Find a label's offset from its point: the nearest that covers nothing, or the one that covers least."""
 
     def cost(offset: np.ndarray) -> tuple[int, int]:
-        box = _box(at + offset, size)
-        return _clashes(box, taken, frame), _covered(box, obstacles)
+        box = _make_box(at + offset, size)
+        return _count_clashes(box, taken, frame), _count_covered(box, obstacles)
 
-    # A long word needs more room sideways than upwards.
+    # A long text needs more room sideways than upwards.
     directions = np.column_stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
     stretch = directions * np.maximum(size / 2 - 4, 0)
     offsets = [reach * d + s for reach in _REACHES for d, s in zip(directions, stretch, strict=True)]
     return min(offsets, key=cost)
 
 
-def _along(
+def _place_badge(
     places: np.ndarray, size: np.ndarray, obstacles: np.ndarray, taken: Sequence[np.ndarray], frame: np.ndarray
 ) -> int:
-    """Index of the place for a badge on a curve: clear of other curves, then near the middle."""
+    """Find the index of a badge's place on a curve: clear of other curves, then near the middle."""
     steps = np.hypot(*np.diff(places, axis=0).T)
     arc = np.concatenate([[0.0], np.cumsum(steps)]) / max(float(steps.sum()), 1e-9)
 
-    boxes = [_box(place, size) for place in places]
-    covered = [_covered(box, obstacles) for box in boxes]
-    alone = max(1, min(covered))  # points of a single curve below a badge
+    boxes = [_make_box(place, size) for place in places]
+    covered = [_count_covered(box, obstacles) for box in boxes]
+    alone = max(1, min(covered))  # number of points of a single curve below a badge
 
     def cost(i: int) -> tuple[int, int, float]:
-        return _clashes(boxes[i], taken, frame), round(covered[i] / alone), abs(arc[i] - 0.5)
+        return _count_clashes(boxes[i], taken, frame), round(covered[i] / alone), abs(arc[i] - 0.5)
 
     return min(range(len(places)), key=cost)

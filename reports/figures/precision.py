@@ -1,4 +1,4 @@
-"""Figure of a work-precision study: error over step, and over what it costs."""
+"""Figure of a work-precision study: error over step and over CPU time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..measure import compared_time
 from .style import GREY, INK, new_figure, use_style, write_figure
 
 _MARKERS = "os^Dvp*hX<>"
-_DARKER = 0.72  # the engines' colours are made for a dark ground
+_DARKER = 0.72  # the engines' colours are chosen for a dark background
 
 
 def precision_figure(path: Path, document: Mapping[str, Any]) -> None:
@@ -24,9 +24,9 @@ def precision_figure(path: Path, document: Mapping[str, Any]) -> None:
     Parameters
     ----------
     path : Path
-        Its ending gives the format.
+        Path of the file; its ending gives the format.
     document : mapping
-        As `velodrome precision` gives it.
+        As returned by `velodrome precision`.
     """
     with use_style():
         figure = new_figure(3.1)
@@ -34,7 +34,7 @@ def precision_figure(path: Path, document: Mapping[str, Any]) -> None:
         shades = assign_colours(document["engines"])
         for marker, (name, entry) in zip(_MARKERS, document["engines"].items(), strict=False):
             shade = INK if name == REFERENCE else tuple(_DARKER * part / 255 for part in shades[name])
-            _draw(left, right, name, entry, shade, marker)
+            _draw_engine(left, right, name, entry, shade, marker)
         for ax, label in ((left, "step [s]"), (right, "CPU time [s]")):
             ax.set(xscale="log", yscale="log", xlabel=label)
             ax.grid(True)
@@ -42,11 +42,11 @@ def precision_figure(path: Path, document: Mapping[str, Any]) -> None:
         handles, labels = left.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=max(1, min(len(labels), 3)))
         title = f"{document['scenario']}, {compared_time(document):.3g} s"
-        figure.suptitle(title, x=0.99, ha="right", fontsize=8.5, parse_math=False)  # a file's name may have a $
+        figure.suptitle(title, x=0.99, ha="right", fontsize=8.5, parse_math=False)  # a file's name may contain a $
         write_figure(path, figure)
 
 
-def _draw(left: Axes, right: Axes, name: str, entry: Mapping[str, Any], shade: Any, marker: str) -> None:
+def _draw_engine(left: Axes, right: Axes, name: str, entry: Mapping[str, Any], shade: Any, marker: str) -> None:
     points = entry["points"]
     if not points:
         return
@@ -57,7 +57,7 @@ def _draw(left: Axes, right: Axes, name: str, entry: Mapping[str, Any], shade: A
     right.plot(cost, error, color=shade, marker=marker, ms=4)
     limit = entry["richardson_error"]
     if name != REFERENCE and limit is not None and limit > 0:
-        # Where the steps lead to: at the left edge of the engine's own points.
+        # The limit of small steps, drawn at the left of the engine's own points.
         left.plot([step.min() / 2], [limit], color=shade, marker=marker, ms=4, mfc="none", ls="none")
         left.annotate(
             "limit", (step.min() / 2, limit), xytext=(5, -3), textcoords="offset points", color=GREY, fontsize=6.5

@@ -8,22 +8,22 @@ from typing import Any
 
 import numpy as np
 
-SCALE = 4.0  # of the front wheel's speed in the paper's abscissa [m/s]
+SCALE = 4.0  # speed in the paper's abscissa, for the front wheel [m/s]
 
 
 def scaled_speed(front_rate: float | np.ndarray, front_radius: float) -> Any:
-    """The paper's abscissa, arctan(R |w| / 4).
+    """Return the paper's abscissa, arctan(R |w| / 4).
 
-    The paper plots families 1 and 3 over arctan(R w / 4). On family 2 the front wheel turns backward and
-    it says that it plots -arctan(R w / 4); on family 4 it does so too, as its points G and H coincide in
-    the figures only so. The sign at the pivoting motion is free.
+    The paper plots families 1 and 3 over arctan(R w / 4). On family 2 the front wheel turns backward, and the paper
+    says that it plots -arctan(R w / 4); it must do so on family 4 too, since its points G and H coincide in
+    the figures. The sign at the pivoting motion is arbitrary.
     """
     return np.arctan(front_radius * np.abs(front_rate) / SCALE)
 
 
 @dataclass(frozen=True)
 class NamedPoint:
-    """A point to mark: the paper's letter (or none), its kind, its place, and whether it is only a limit."""
+    """A point to mark: the paper's letter (or none), its kind, its position, and whether it is only a limit."""
 
     name: str
     kind: str
@@ -41,7 +41,7 @@ class SolutionCurve:
     Attributes
     ----------
     families : tuple of int
-        Whose it is; two where families have joined.
+        Families that it belongs to; two where families have joined.
     speed, lean, steer : ndarray, shape (n,)
         Abscissa [1] and angles [rad].
     push : ndarray, shape (n,)
@@ -49,7 +49,7 @@ class SolutionCurve:
     stable : tuple of (float, float)
         Lyapunov-stable sections, as positions along the curve in samples.
     limits : tuple of NamedPoint
-        What the curve tends to at its ends.
+        Points that the curve tends to at its ends.
     """
 
     families: tuple[int, ...]
@@ -61,7 +61,7 @@ class SolutionCurve:
     limits: tuple[NamedPoint, ...]
 
     def line(self, angle: str, low: float = 0.0, high: float | None = None) -> np.ndarray:
-        """Points (speed, angle) between two positions along the curve, shape (k, 2)."""
+        """Return points (speed, angle) between two positions along the curve, shape (k, 2)."""
         samples = np.arange(len(self.speed))
         high = float(samples[-1]) if high is None else high
         inside = samples[(samples > low) & (samples < high)]
@@ -69,7 +69,7 @@ class SolutionCurve:
         return np.column_stack([np.interp(places, samples, row) for row in (self.speed, getattr(self, angle))])
 
     def pieces(self) -> list[tuple[float, float, bool]]:
-        """Parts in which both wheels are pushed, and others: start, end, whether pushed."""
+        """Split the curve by whether both wheels are pushed; return (start, end, whether pushed) of each part."""
         pushed = self.push > 0
         turns = np.flatnonzero(pushed[1:] != pushed[:-1])
         crossings = turns + self.push[turns] / (self.push[turns] - self.push[turns + 1])
@@ -79,31 +79,33 @@ class SolutionCurve:
 
 
 def make_curves(families: Sequence[Mapping[str, Any]], front_radius: float) -> list[SolutionCurve]:
-    """Curves of the families of a document, each once even where two families share one."""
+    """Make the curves of a document's families, each once even where two families share one."""
     found: dict[tuple, SolutionCurve] = {}
     for family in families:
-        curve = _curve(family, front_radius)
-        # Two families share a curve where they own it both and it ends alike.
+        curve = _make_curve(family, front_radius)
+        # Two families share a curve that belongs to both and has the same ends.
         key = (curve.families, *family["ends"]) if len(curve.families) > 1 else (len(found),)
         found.setdefault(key, curve)
     return list(found.values())
 
 
-def _curve(family: Mapping[str, Any], front_radius: float) -> SolutionCurve:
+def _make_curve(family: Mapping[str, Any], front_radius: float) -> SolutionCurve:
     points = family["points"]
     rate, lean, steer = (np.array(points[name]) for name in ("front_rate", "lean", "steer"))
     push = np.minimum(points["normal_force_rear"], points["normal_force_front"])
     sections = []
     for section in family["stable_sections"]:
         ends = zip(section["lean"], section["steer"], strict=True)
-        low, high = sorted(_position(lean, steer, *end) for end in ends)
+        low, high = sorted(_position_along(lean, steer, *end) for end in ends)
         sections.append((low, high))
     speed = scaled_speed(rate, front_radius)
-    return SolutionCurve(_owners(family), speed, lean, steer, push, tuple(sections), _limits(family, speed))
+    return SolutionCurve(
+        _owning_families(family), speed, lean, steer, push, tuple(sections), _find_curve_limits(family, speed)
+    )
 
 
-def _position(lean: np.ndarray, steer: np.ndarray, at_lean: float, at_steer: float) -> float:
-    """Where along a polyline a point lies, in samples."""
+def _position_along(lean: np.ndarray, steer: np.ndarray, at_lean: float, at_steer: float) -> float:
+    """Return the position of a point along a polyline, in samples."""
     path = np.column_stack([lean, steer])
     step, arm = np.diff(path, axis=0), np.array([at_lean, at_steer]) - path[:-1]
     share = np.clip(np.einsum("ij,ij->i", arm, step) / np.einsum("ij,ij->i", step, step), 0, 1)
@@ -111,16 +113,16 @@ def _position(lean: np.ndarray, steer: np.ndarray, at_lean: float, at_steer: flo
     return nearest + float(share[nearest])
 
 
-def _ends(family: Mapping[str, Any]) -> list[tuple[int, str]]:
-    """Index of the end sample and what the curve ends in, for both ends."""
+def _index_ends(family: Mapping[str, Any]) -> list[tuple[int, str]]:
+    """Return the index of the end sample and the kind of end, for both ends."""
     return list(zip((0, -1), family["ends"], strict=True))
 
 
-def _owners(family: Mapping[str, Any]) -> tuple[int, ...]:
-    """Families that a curve belongs to, by what it ends in: A is of family 1, E of 2, F of 3, G of 3 and H of 4."""
+def _owning_families(family: Mapping[str, Any]) -> tuple[int, ...]:
+    """Return the families of a curve by its ends: A belongs to family 1, E to 2, F and G to 3, H to 4."""
     lean, steer = family["points"]["lean"], family["points"]["steer"]
     owners = {family["family"]}
-    for index, end in _ends(family):
+    for index, end in _index_ends(family):
         if end == "static":
             owners.add(1)
         elif end == "flat":
@@ -131,14 +133,14 @@ def _owners(family: Mapping[str, Any]) -> tuple[int, ...]:
     return tuple(sorted(owners))
 
 
-def _limits(family: Mapping[str, Any], speed: np.ndarray) -> tuple[NamedPoint, ...]:
-    """E and F at the frame's corners; B and C where circles grow without bound, until they are solved for."""
+def _find_curve_limits(family: Mapping[str, Any], speed: np.ndarray) -> tuple[NamedPoint, ...]:
+    """Return limits: E and F at the frame's corners; B and C where circles grow without bound, until solved for."""
     points, special = family["points"], family["special_points"]
     solved = {name for name, point in special.items() if point["kind"] == "straight"}
-    large = [index for index, end in _ends(family) if end == "large circle"]
+    large = [index for index, end in _index_ends(family) if end == "large circle"]
     fastest = max(large, key=lambda index: speed[index]) if large else None
     found = []
-    for index, end in _ends(family):
+    for index, end in _index_ends(family):
         lean, steer = points["lean"][index], points["steer"][index]
         if end == "flat":
             name, angles = ("E", (np.pi / 2, np.pi)) if lean > 0 else ("F", (-np.pi / 2, 0.0))
@@ -151,7 +153,7 @@ def _limits(family: Mapping[str, Any], speed: np.ndarray) -> tuple[NamedPoint, .
 
 
 def find_limits(drawn: Sequence[SolutionCurve]) -> list[NamedPoint]:
-    """What all curves tend to, each once; of circles that tend to one letter's angles the fastest bear it."""
+    """Return the limits of all curves, each once; of large circles with equal angles only the fastest is lettered."""
     found: dict[tuple, NamedPoint] = {}
     for point in (limit for curve in drawn for limit in curve.limits):
         found.setdefault((point.name, round(point.speed, 6), round(point.lean, 6)), point)
@@ -160,7 +162,7 @@ def find_limits(drawn: Sequence[SolutionCurve]) -> list[NamedPoint]:
 
 
 def find_named_points(families: Sequence[Mapping[str, Any]], front_radius: float) -> list[NamedPoint]:
-    """Points with the paper's letters; those that lie on one another share a label, as G and H do."""
+    """Return the points with the paper's letters; points that coincide share a label, as G and H do."""
     found: dict[tuple, NamedPoint] = {}
     for family in families:
         for name, point in family["special_points"].items():

@@ -1,4 +1,4 @@
-"""One style for every printed figure, and the way it reaches the disk."""
+"""Common style of all printed figures, and writing them to files."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from matplotlib.figure import Figure
 
 from ...engines.files import write_whole
 
-WIDTH = 7.2  # of a page with two columns [inch]: text below stays readable at half of it
+WIDTH = 7.2  # width of a page with two columns [inch]: text stays readable at half of it
 
 INK, GREY, PALE = "#1a1a1a", "#6b6b6b", "#d9d9d9"
-# Okabe and Ito's hues, which the common colour-blindnesses keep apart; one a solution family.
+# Okabe and Ito's colours, which remain distinct with common colour blindness; one for each solution family.
 FAMILY_COLOURS = {1: "#0072B2", 2: "#D55E00", 3: "#009E73", 4: "#CC79A7"}
 
 _STYLE: Any = {
-    "font.family": "DejaVu Sans",  # comes with matplotlib: the same letters on every machine
+    "font.family": "DejaVu Sans",  # included in matplotlib: the same glyphs on every machine
     "font.size": 8,
     "axes.labelsize": 8.5,
     "axes.titlesize": 8.5,
@@ -42,9 +42,9 @@ _STYLE: Any = {
     "legend.frameon": False,
     "legend.handlelength": 1.8,
     "lines.linewidth": 1.4,
-    "figure.dpi": 72,  # a point is a pixel: label placement counts in points
+    "figure.dpi": 72,  # a point is a pixel: label placement works in points
     "savefig.dpi": 200,
-    "svg.hashsalt": "velodrome",  # the same drawing gives the same file
+    "svg.hashsalt": "velodrome",  # the same figure gives the same file
     "svg.fonttype": "path",
 }
 _NO_DATE: dict[str, dict[str, Any]] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
@@ -52,26 +52,26 @@ _NO_DATE: dict[str, dict[str, Any]] = {".svg": {"Date": None}, ".pdf": {"Creatio
 
 @contextmanager
 def use_style() -> Iterator[None]:
-    """Draw and write within this: the style holds inside, and matplotlib is left as it was."""
+    """Use the style for drawing and writing; a context that leaves matplotlib's settings as they were."""
     with rc_context(_STYLE):
         yield
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
-    """An empty figure of a size in inches, its axes laid out so that nothing overlaps.
+    """Make an empty figure of a size in inches, with axes laid out without overlap.
 
-    It is not known to pyplot: no window, nothing to close.
+    pyplot does not know it: there is no window, and it need not be closed.
     """
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def write_figure(path: Path, figure: Figure) -> None:
-    """Write a figure, whole or not at all.
+    """Write a figure, completely or not at all.
 
     Parameters
     ----------
     path : Path
-        Its ending gives the format: ``.svg``, ``.pdf`` or ``.png``.
+        Path of the file; its ending gives the format: ``.svg``, ``.pdf`` or ``.png``.
     figure : Figure
     """
     with write_whole(path) as partial:

@@ -1,4 +1,4 @@
-"""Measurements on rides: errors, drift, falls, friction, modes, orders, and what round-off allows them to differ by."""
+"""Measure rides: errors, drift, falls, friction, modes, orders, and the differences that round-off allows."""
 
 from .consistency import LARGEST_NOISE, TURNING, Mismatch, describe_mismatch, evaluate_ride, find_mismatches
 from .convergence import extrapolate, observed_orders

@@ -1,21 +1,21 @@
-"""Whether what an engine says of itself agrees with its coordinates.
+"""Check that an engine's reports agree with its coordinates.
 
-Poses, contact points, gaps, slip and energies follow from the coordinates and rates; what an engine reports of them,
-and its rates as derivatives of its coordinates, must agree. How closely follows from what is measured anyway: the
-reports, rates and coordinates of one computation approximate one motion, so none of them is much further off than the
-others. With E(t) the largest error of the coordinates against the reference up to the time t, relative to the motion's
-size, a report may differ by
+Body poses, contact points, gaps, slip and energies follow from the coordinates and rates. What an engine reports of
+them must agree with these, and its rates must be the derivatives of its coordinates. The tolerance follows from
+quantities that are measured anyway: reports, rates and coordinates of one computation approximate one motion, so none
+of them has a much larger error than the others. With E(t) the largest error of the coordinates against the reference up
+to the time t, relative to the size of the motion, a report may differ by
 
     size of the quantity x (noise + ROOM x E(t)),    noise = error of the start + relative error that a step may add
 
-and nothing but noise at the start, where E is 0: joints that drift and velocities that an integrator leaves off their
-constraints are errors of the engine's method, and come with errors of its coordinates of the same order.
+and at the start, where E is 0, by the noise alone. Joints that drift and velocities that an integrator leaves off their
+constraints are errors of the engine's method, and occur together with errors of its coordinates of the same order.
 
-The rates are held against the coordinates by quadrature: q[k+1] - q[k] less the integral of the polynomial through six
-samples of the rates, both as differences from the reference's, which has the same quadrature error. What is left may be
-the quadrature's own error, taken as its changes with four and with two samples, and size x (noise + ROOM x E(t)) at
-the ends of an output interval and times the motion's fastest rate along it, by which velocities err.
-So a fault that is smaller than what the engine's own error leaves open is not told from it.
+The rates are compared with the coordinates by quadrature: q[k+1] - q[k] minus the integral of the polynomial through
+six samples of the rates, both as differences from the reference's, which has the same quadrature error. The rest may be
+as large as the quadrature's own error, estimated by its changes with four and with two samples, plus
+size x (noise + ROOM x E(t)) at the ends of an output interval, plus the same times the motion's fastest rate over the
+interval, since velocities have this error. A fault smaller than this tolerance is not detected.
 """
 
 from __future__ import annotations
@@ -33,27 +33,29 @@ from ...reference.kinematics import COORDINATES, FRONT_ANGLE, REAR_ANGLE, WHEELS
 from ...reference.surface import Surface
 from .limits import START_ERROR
 
-# Ratio of two errors of one computation. A method of order 1 leaves in its first steps as much between rates and
-# coordinates as in the coordinates themselves (1.0); the engines here need 1.2, and no more than 0.5 in any report.
+# Largest ratio of two errors of one computation. A method of order 1 leaves in its first steps as much between rates
+# and coordinates as in the coordinates themselves (1.0). The engines here need 1.2, and at most 0.5 in any report.
 ROOM = 4.0
-# An engine cannot claim more room than this by its step noise.
+# Largest step noise that an engine may claim.
 LARGEST_NOISE = 1e-6
-_SAMPLES = 6  # of the quadrature: its error goes with the seventh power of the output interval
-_FEWEST = 4  # samples of a ride from which the quadrature's error can be seen
+_SAMPLES = 6  # samples per polynomial; the quadrature's error is of seventh order in the output interval
+_FEWEST = 4  # least number of samples of a ride that shows the quadrature's error
 
 _WHEELS = tuple(f"{wheel}_wheel" for wheel in WHEELS)
-# Known up to whole turns.
+# Coordinates that are defined up to whole turns.
 TURNING = [YAW, REAR_ANGLE, FRONT_ANGLE]
 
 
 def evaluate_ride(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> Trajectory:
-    """The ride with poses, contact points, gaps, slip and energies as they follow from its coordinates and rates.
+    """Return a ride with the poses, contact points, gaps, slip and energies that follow from its coordinates and rates.
 
-    Where a wheel has no closest approach its contact point, gap and slip are NaN; forces stay the engine's.
+    Where a wheel has no closest approach, its contact point, gap and slip are NaN. Forces stay the engine's.
     """
-    seen = observe(bicycle, surface, trajectory.q, trajectory.qd)
-    lost = np.zeros(len(trajectory.q), bool) if seen.found else _lost(trajectory, bicycle, surface)
-    point, gap, slip = (_without(values, lost) for values in (seen.point, seen.gap, seen.slip))
+    observed = observe(bicycle, surface, trajectory.q, trajectory.qd)
+    lost = (
+        np.zeros(len(trajectory.q), bool) if observed.found else _samples_without_contact(trajectory, bicycle, surface)
+    )
+    point, gap, slip = (_replace_by_nan(values, lost) for values in (observed.point, observed.gap, observed.slip))
     return replace(
         trajectory,
         body_position=body_positions(bicycle, trajectory.q),
@@ -61,24 +63,24 @@ def evaluate_ride(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) ->
         contact_point=point,
         gap=gap,
         slip=slip,
-        kinetic_energy=seen.kinetic_energy,
-        potential_energy=seen.potential_energy,
+        kinetic_energy=observed.kinetic_energy,
+        potential_energy=observed.potential_energy,
     )
 
 
-def _lost(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> np.ndarray:
-    """Samples in which a closest approach could not be computed, shape (n,)."""
+def _samples_without_contact(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> np.ndarray:
+    """Return the samples in which a closest approach could not be computed, boolean of shape (n,)."""
     states = zip(trajectory.q, trajectory.qd, strict=True)
     return np.array([not observe(bicycle, surface, q[None], qd[None]).found for q, qd in states])
 
 
-def _without(values: np.ndarray, lost: np.ndarray) -> np.ndarray:
+def _replace_by_nan(values: np.ndarray, lost: np.ndarray) -> np.ndarray:
     return np.where(lost.reshape(-1, *[1] * (values.ndim - 1)), np.nan, values) if lost.any() else values
 
 
 @dataclass(frozen=True)
 class Mismatch:
-    """How far a report of an engine is from what follows from its coordinates, where it is furthest in its limit.
+    """Difference of an engine's report from its coordinates, at the sample where it is largest relative to its limit.
 
     Attributes
     ----------
@@ -90,7 +92,7 @@ class Mismatch:
         In ``unit``.
     unit : str
     time : float
-        Of the sample [s].
+        Time of the sample [s].
     """
 
     quantity: str
@@ -102,56 +104,57 @@ class Mismatch:
 
     @property
     def holds(self) -> bool:
-        """Whether the report agrees."""
+        """Whether the report agrees within its limit."""
         return self.difference <= self.limit
 
     @property
     def share(self) -> float:
-        """The difference in units of its limit."""
+        """Difference relative to its limit."""
         if self.difference == 0:
             return 0.0
         return self.difference / self.limit if self.limit > 0 else np.inf
 
     def as_json(self) -> dict[str, Any]:
-        """Fields as JSON values."""
+        """Return the fields as JSON values."""
         return asdict(self)
 
 
 def describe_mismatch(report: Mapping[str, Any]) -> str:
-    """Say in words what of an engine's reports differs from what, by how much and when, from `Mismatch.as_json`."""
+    """Describe in words a mismatch given by `Mismatch.as_json`: what differs from what, by how much and when."""
     part, unit = report["part"].replace("_", " "), report["unit"].removeprefix("1")
     if report["quantity"] == "qd":
-        what, other = f"the rate of its {part}", "the derivative of that coordinate"
+        subject, expected = f"the rate of its {part}", "the derivative of that coordinate"
     else:
-        what = "its " + report["quantity"].removeprefix("body_").replace("_", " ") + (f" of the {part}" if part else "")
-        other = "what follows from its coordinates"
+        name = report["quantity"].removeprefix("body_").replace("_", " ")
+        subject = f"its {name}" + (f" of the {part}" if part else "")
+        expected = "what follows from its coordinates"
     difference, limit = (f"{report[key]:.2g} {unit}".rstrip() for key in ("difference", "limit"))
-    return f"{what} is {difference} from {other} at {report['time']:.4g} s, limit {limit}"
+    return f"{subject} is {difference} from {expected} at {report['time']:.4g} s, limit {limit}"
 
 
 def find_mismatches(
     reported: Trajectory, followed: Trajectory, exact: Trajectory | None, size: float, step_noise: float
 ) -> list[Mismatch]:
-    """Hold an engine's reports and rates against its coordinates.
+    """Compare an engine's reports and rates with its coordinates.
 
     Parameters
     ----------
     reported : Trajectory
-        As the engine gave it, up to its fall.
+        The engine's ride, up to its fall.
     followed : Trajectory
-        The same ride as `evaluate_ride` gives it.
+        The same ride as returned by `evaluate_ride`.
     exact : Trajectory or None
-        The reference, sampled at the same times as far as both go. Without one no rates are judged, and reports at
-        the start only, but for the reference itself.
+        The reference, sampled at the same times as far as both go. Without it no rates are compared, and reports only
+        at the start, except for the reference itself.
     size : float
-        Of the motion: radius of its circle, or wheelbase [m].
+        Size of the motion: radius of its circle, or wheelbase [m].
     step_noise : float
         Relative error that a step may add beyond its method.
 
     Returns
     -------
     list of Mismatch
-        One a report that is given, and one for the rates of four samples or more.
+        One per report that is given, and one for the rates of rides with four samples or more.
     """
     samples = len(reported.time) if exact is None else min(len(reported.time), len(exact.time))
     reported, followed = reported.first(samples), followed.first(samples)
@@ -162,100 +165,134 @@ def find_mismatches(
         error = np.full(samples, 0.0 if reported.engine == REFERENCE else np.inf)
     error[0] = 0.0
     noise = START_ERROR + min(step_noise, LARGEST_NOISE)
-    found = [_furthest(*report, reported.time) for report in _reports(reported, followed, noise + ROOM * error, size)]
+    reports = _compare_reports(reported, followed, noise + ROOM * error, size)
+    found = [_find_worst(report, reported.time) for report in reports]
     if exact is None or samples < _FEWEST:
         return found
-    return [*found, _rates(reported, exact.first(samples), (noise + ROOM * error[1:, None]) * sizes)]
+    return [*found, _compare_rates(reported, exact.first(samples), (noise + ROOM * error[1:, None]) * sizes)]
 
 
 def largest_speed(trajectory: Trajectory) -> float:
-    """Largest speed of D [m/s]."""
+    """Return the largest speed of D [m/s]."""
     return float(_lengths(trajectory.qd[:, :3]).max())
 
 
 def coordinate_differences(trajectory: Trajectory, exact: Trajectory) -> np.ndarray:
-    """Coordinates less those of another ride at least as long, (n, 9); whole turns of yaw and wheels do not count."""
-    return _less_turns(trajectory.q - exact.q[: len(trajectory.q)])
+    """Return a ride's coordinates (n, 9) minus those of another ride at least as long, without whole turns."""
+    return _remove_turns(trajectory.q - exact.q[: len(trajectory.q)])
 
 
-def _less_turns(apart: np.ndarray) -> np.ndarray:
-    apart[:, TURNING] -= 2 * np.pi * np.round(apart[:, TURNING] / (2 * np.pi))
-    return apart
+def _remove_turns(differences: np.ndarray) -> np.ndarray:
+    differences[:, TURNING] -= 2 * np.pi * np.round(differences[:, TURNING] / (2 * np.pi))
+    return differences
 
 
-Report = tuple[str, tuple[str, ...], str, np.ndarray, np.ndarray]  # quantity, parts, unit, difference and limit (n, k)
+@dataclass(frozen=True)
+class Report:
+    """Differences of one reported quantity from the coordinates.
+
+    Attributes
+    ----------
+    quantity : str
+    parts : tuple of str
+        Names of the quantity's k parts.
+    unit : str
+    difference : ndarray, shape (n, k)
+        Of n samples, in ``unit``.
+    limit : ndarray
+        In ``unit``; its shape broadcasts to that of the difference.
+    """
+
+    quantity: str
+    parts: tuple[str, ...]
+    unit: str
+    difference: np.ndarray
+    limit: np.ndarray
 
 
-def _reports(reported: Trajectory, followed: Trajectory, room: np.ndarray, size: float) -> Iterator[Report]:
-    """Differences of the reports that are given, and their limits from the relative ``room`` of each sample."""
+def _compare_reports(reported: Trajectory, followed: Trajectory, room: np.ndarray, size: float) -> Iterator[Report]:
+    """Yield the differences of the given reports, with limits from the relative ``room`` (n,) of each sample."""
     room = room[:, None]
     speed = largest_speed(followed)
-    # Velocities err by the error of coordinates times the motion's fastest rate.
-    moving = speed + size * float(np.abs(followed.qd[:, YAW:]).max())
+    # Velocities have the error of the coordinates times the motion's fastest rate.
+    speed_scale = speed + size * float(np.abs(followed.qd[:, YAW:]).max())
     parts = (followed.kinetic_energy, followed.potential_energy)
     energy = np.sum([np.abs(part) for part in parts if part is not None], axis=0)[:, None]
-    turned = np.minimum(*(_lengths(reported.body_quaternion + sign * followed.body_quaternion) for sign in (-1, 1)))
-    # A position is known to a few units in its last place, an orientation to those of the largest angle.
-    last = 16 * np.finfo(float).eps * (np.abs(followed.q).max() + size)
-    yield "body_position", BODIES, "m", _lengths(reported.body_position - followed.body_position), size * room + last
-    yield "body_quaternion", BODIES, "1", turned, room + last
-    for name, unit, scale in (("contact_point", "m", size), ("gap", "m", size), ("slip", "m/s", moving)):
-        given, found = getattr(reported, name), getattr(followed, name)
+    signed = (_lengths(reported.body_quaternion + sign * followed.body_quaternion) for sign in (-1, 1))
+    rotation = np.minimum(*signed)
+    # Round-off: a few units in the last place of a position, and of the largest angle for an orientation.
+    round_off = 16 * np.finfo(float).eps * (np.abs(followed.q).max() + size)
+    position = _lengths(reported.body_position - followed.body_position)
+    yield Report("body_position", BODIES, "m", position, size * room + round_off)
+    yield Report("body_quaternion", BODIES, "1", rotation, room + round_off)
+    for name, unit, scale in (("contact_point", "m", size), ("gap", "m", size), ("slip", "m/s", speed_scale)):
+        given, expected = getattr(reported, name), getattr(followed, name)
         if given is not None:
-            apart = np.abs(given - found) if name == "gap" else _lengths(given - found)
-            yield name, _WHEELS, unit, apart, scale * room + last
+            difference = np.abs(given - expected) if name == "gap" else _lengths(given - expected)
+            yield Report(name, _WHEELS, unit, difference, scale * room + round_off)
     # Kinetic energy is quadratic in the speeds.
-    faster = 2 * moving / speed if speed > 0 else 2.0
-    for name, scale in (("kinetic_energy", faster * energy), ("potential_energy", energy)):
+    energy_scale = 2 * speed_scale / speed if speed > 0 else 2.0
+    for name, scale in (("kinetic_energy", energy_scale * energy), ("potential_energy", energy)):
         given = getattr(reported, name)
         if given is not None:
-            yield name, ("",), "J", np.abs(given - getattr(followed, name))[:, None], scale * room
+            difference = np.abs(given - getattr(followed, name))[:, None]
+            yield Report(name, ("",), "J", difference, scale * room)
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:
     return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
 
 
-def _furthest(
-    quantity: str, parts: tuple[str, ...], unit: str, apart: np.ndarray, limit: np.ndarray, time: np.ndarray
-) -> Mismatch:
-    """The sample and part furthest in its limit; a difference to what is no number is said elsewhere and is none."""
-    apart = np.minimum(np.where(np.isnan(apart), 0.0, apart), np.finfo(float).max)
-    limit = np.broadcast_to(limit, apart.shape)
+def _find_worst(report: Report, time: np.ndarray) -> Mismatch:
+    """Return the sample and part with the largest difference relative to its limit.
+
+    Values that are not finite are reported elsewhere: NaN counts as no difference here.
+    """
+    difference = np.minimum(np.where(np.isnan(report.difference), 0.0, report.difference), np.finfo(float).max)
+    limit = np.broadcast_to(report.limit, difference.shape)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        share = np.where(apart > 0, apart / limit, 0.0)
-    sample, part = np.unravel_index(np.argmax(share), apart.shape)
+        share = np.where(difference > 0, difference / limit, 0.0)
+    sample, part = np.unravel_index(np.argmax(share), difference.shape)
     return Mismatch(
-        quantity, parts[part], float(apart[sample, part]), float(limit[sample, part]), unit, float(time[sample])
+        quantity=report.quantity,
+        part=report.parts[part],
+        difference=float(difference[sample, part]),
+        limit=float(limit[sample, part]),
+        unit=report.unit,
+        time=float(time[sample]),
     )
 
 
-def _rates(reported: Trajectory, exact: Trajectory, room: np.ndarray) -> Mismatch:
-    """The rate furthest from its coordinate's derivative, means over output intervals; ``room`` (n - 1, 9) [m, rad]."""
+def _compare_rates(reported: Trajectory, exact: Trajectory, room: np.ndarray) -> Mismatch:
+    """Return the rate furthest from its coordinate's derivative, as means over output intervals.
+
+    ``room`` (n - 1, 9) is the tolerance of the coordinates [m, rad].
+    """
     time, q, qd = reported.time, coordinate_differences(reported, exact), reported.qd - exact.qd
     with np.errstate(over="ignore", invalid="ignore"):
-        way = _integrals(time, qd, _SAMPLES)
-        unsure = sum(np.abs(way - _integrals(time, qd, fewer)) for fewer in (2, _SAMPLES - 2))
-    left = np.abs(_less_turns(np.diff(q, axis=0) - way))
-    # Rates whose integrals overflow are nobody's derivatives.
-    overflowed = ~np.isfinite(unsure + left)
-    unsure, left = np.where(overflowed, 0.0, unsure), np.where(overflowed, np.inf, left)
-    last = 16 * np.finfo(float).eps * np.abs(reported.q).max(axis=0)
+        integral = _integrate_samples(time, qd, _SAMPLES)
+        quadrature_error = sum(np.abs(integral - _integrate_samples(time, qd, fewer)) for fewer in (2, _SAMPLES - 2))
+    rest = np.abs(_remove_turns(np.diff(q, axis=0) - integral))
+    # Rates whose integrals overflow are the derivatives of no coordinates.
+    overflowed = ~np.isfinite(quadrature_error + rest)
+    quadrature_error, rest = np.where(overflowed, 0.0, quadrature_error), np.where(overflowed, np.inf, rest)
+    round_off = 16 * np.finfo(float).eps * np.abs(reported.q).max(axis=0)
     interval = np.diff(time)[:, None]
     room = room * (1 + float(np.abs(reported.qd[:, YAW:]).max()) * interval)
-    found = _furthest("qd", COORDINATES, "rad/s", left / interval, (room + last + unsure) / interval, time[1:])
-    return replace(found, unit="m/s") if found.part in COORDINATES[:3] else found
+    report = Report("qd", COORDINATES, "rad/s", rest / interval, (room + round_off + quadrature_error) / interval)
+    worst = _find_worst(report, time[1:])
+    return replace(worst, unit="m/s") if worst.part in COORDINATES[:3] else worst
 
 
-def _integrals(time: np.ndarray, values: np.ndarray, samples: int) -> np.ndarray:
-    """Integrals from sample to sample of the polynomials through the nearest so many samples, (n - 1, k)."""
+def _integrate_samples(time: np.ndarray, values: np.ndarray, samples: int) -> np.ndarray:
+    """Return the integrals (n - 1, k) between samples of the polynomials through the nearest ``samples`` samples."""
     n, interval = len(time), np.diff(time)
     samples = min(samples, n)
     first = np.clip(np.arange(n - 1) - (samples // 2 - 1), 0, n - samples)
     nearest = first[:, None] + np.arange(samples)
     nodes = (time[nearest] - time[:-1, None]) / interval[:, None]
     moments = 1 / np.arange(1, samples + 1)
-    # On an even grid all stencils but those at the ends are one.
+    # On an even grid all stencils except those at the ends are the same.
     _, kinds, kind = np.unique(np.round(nodes, 9), axis=0, return_index=True, return_inverse=True)
     powers = nodes[kinds, None, :] ** np.arange(samples)[:, None]
     weights = np.linalg.solve(powers, np.broadcast_to(moments, (len(kinds), samples))[..., None])[..., 0]

@@ -1,4 +1,4 @@
-"""What a sequence of results with halved steps tells: the order seen, and the limit."""
+"""Observe the order of a sequence of results with halved steps, and extrapolate its limit."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class RichardsonLimit:
     Attributes
     ----------
     value : ndarray
-        Of the shape of the sequence's members.
+        Array of the shape of the sequence's members.
     uncertainty : float
-        Largest change that the last extrapolation made.
+        Largest change by the last extrapolation.
     """
 
     value: np.ndarray
@@ -28,9 +28,9 @@ class RichardsonLimit:
 
 
 def observed_orders(values: Sequence[np.ndarray]) -> list[float]:
-    """Order seen by each three successive members, log2 |v1 - v0| / |v2 - v1|.
+    """Return the order observed in each three successive members, log2 |v1 - v0| / |v2 - v1|.
 
-    No reference enters: an engine that converges to another limit shows its order all the same.
+    This needs no reference: an engine that converges to another limit shows its order all the same.
 
     Parameters
     ----------
@@ -40,19 +40,19 @@ def observed_orders(values: Sequence[np.ndarray]) -> list[float]:
     Returns
     -------
     list of float
-        Two shorter than the sequence; NaN where two members are equal.
+        Two fewer than the sequence has members; NaN where two members are equal.
     """
-    moves = [_size(b - a) for a, b in pairwise(values)]
+    moves = [_largest_entry(b - a) for a, b in pairwise(values)]
     return [float(np.log2(a / b)) if a > 0 and b > 0 else np.nan for a, b in pairwise(moves)]
 
 
 def extrapolate(values: Sequence[np.ndarray]) -> RichardsonLimit:
-    """Richardson's extrapolation of a sequence with halved steps.
+    """Extrapolate a sequence with halved steps by Richardson's method.
 
-    Each column of the table removes the power that its own last three entries show, rounded to an integer
-    as an expansion in powers of the step has it. The last column, whose power cannot be seen any more,
-    removes the next one. Extrapolation ends where it changes the result by more than the column before
-    did: what is left there is no power of the step but round-off or unconverged iterations.
+    Each column of the table removes the power of the step that its own last three entries show, rounded to an integer,
+    as in an expansion in powers of the step. The last column shows no power any more and removes the next one.
+    Extrapolation ends where it changes the result by more than the column before did: the rest is then not a power
+    of the step but round-off or unconverged iterations.
 
     Parameters
     ----------
@@ -61,25 +61,25 @@ def extrapolate(values: Sequence[np.ndarray]) -> RichardsonLimit:
 
     Returns
     -------
-    Limit
+    RichardsonLimit
     """
     column = [np.asarray(value, float) for value in values]
-    best = RichardsonLimit(column[-1], _size(column[-1] - column[-2]))
+    best = RichardsonLimit(column[-1], _largest_entry(column[-1] - column[-2]))
     power = 0
     while len(column) > 1:
-        seen = observed_orders(column[-3:])
-        if seen and not seen[0] > _LEAST_ORDER:
+        orders = observed_orders(column[-3:])
+        if orders and not orders[0] > _LEAST_ORDER:
             break
-        if not seen and power == 0:
+        if not orders and power == 0:
             break  # two members show no order at all
-        power = max(round(seen[0]), power + 1) if seen else power + 1
+        power = max(round(orders[0]), power + 1) if orders else power + 1
         column = [b + (b - a) / (2**power - 1) for a, b in pairwise(column)]
-        moved = _size(column[-1] - (column[-2] if len(column) > 1 else best.value))
+        moved = _largest_entry(column[-1] - (column[-2] if len(column) > 1 else best.value))
         if moved >= best.uncertainty:
             break
         best = RichardsonLimit(column[-1], moved)
     return best
 
 
-def _size(values: np.ndarray) -> float:
+def _largest_entry(values: np.ndarray) -> float:
     return float(np.abs(values).max())

@@ -1,4 +1,4 @@
-"""Normal forces of a ride, the friction that it needs, and whether a contact with a given coefficient has it."""
+"""Normal forces of a ride, the friction that it requires, and where a given coefficient is insufficient."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ...reference.surface import Surface, unit_normals
 
 
 def normal_force(trajectory: Trajectory, surface: Surface) -> np.ndarray | None:
-    """Part of the contact forces along the surface's upward normal, shape (n, 2) [N]; None where they are not given."""
+    """Return the contact forces along the surface's upward normal, shape (n, 2) [N]; None where they are not given."""
     if trajectory.contact_force is None or trajectory.contact_point is None:
         return None
     point = trajectory.contact_point
@@ -17,42 +17,42 @@ def normal_force(trajectory: Trajectory, surface: Surface) -> np.ndarray | None:
 
 
 def required_friction(trajectory: Trajectory, surface: Surface) -> np.ndarray:
-    """Least coefficient of friction for the contact forces of a trajectory, wheel by wheel.
+    """Return the least coefficient of friction for the contact forces of a trajectory, wheel by wheel.
 
     Parameters
     ----------
     trajectory : Trajectory
-        With contact points and forces; the reference's tell what rolling without slip needs.
+        Has contact points and forces; those of the reference give the friction for rolling without slip.
     surface : Surface
 
     Returns
     -------
     ndarray, shape (n, 2)
-        Tangential over normal force; infinite where the ground would have to pull.
+        Tangential over normal force; infinite where the ground would have to pull, 0 without any force.
 
     Raises
     ------
     ValueError
-        If it has no contact points or forces.
+        If the trajectory has no contact points or forces.
     """
     if trajectory.contact_point is None or trajectory.contact_force is None:
         raise ValueError(f"{trajectory.engine} gives no contact forces")
     point, force = trajectory.contact_point, trajectory.contact_force
     normal = unit_normals(surface, point[..., 0], point[..., 1])
     pressure = np.sum(force * normal, axis=-1)
-    sideways = np.linalg.norm(force - pressure[..., None] * normal, axis=-1)
-    # Where a wheel is in the air nothing is needed either.
-    ratio = np.divide(sideways, pressure, out=np.full(pressure.shape, np.inf), where=pressure > 0)
-    return np.where((pressure == 0) & (sideways == 0), 0.0, ratio)
+    tangential = np.linalg.norm(force - pressure[..., None] * normal, axis=-1)
+    # A wheel in the air needs no friction.
+    ratio = np.divide(tangential, pressure, out=np.full(pressure.shape, np.inf), where=pressure > 0)
+    return np.where((pressure == 0) & (tangential == 0), 0.0, ratio)
 
 
 def cone_is_left(friction: float, rolling: Trajectory, surface: Surface) -> float | None:
-    """First time at which rolling needs more friction than there is [s]; None if it never does.
+    """Return the first time at which rolling needs more friction than there is [s]; None if it never does.
 
     Parameters
     ----------
     friction : float
-        The contact's coefficient.
+        Coefficient of friction of the contact.
     rolling : Trajectory
         The reference's ride.
     surface : Surface

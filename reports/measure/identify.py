@@ -1,13 +1,13 @@
-"""The reduced linear system about a motion as an engine itself has it, measured from its flow.
+"""Identify an engine's own reduced linear system about a motion from its flow.
 
-Each of the seven independent variables of `velodrome.reference.stability` is disturbed both ways, and the derivatives
+Each of the seven independent variables of `velodrome.reference.stability` is disturbed both ways. The derivatives
 M1, M2 of the state at times T/2 and 3 T/2 give the flow between them,
 
     Phi = M2 M1^-1 = exp(J T)
 
-The time before lets an engine's own fast states, such as the depth of a soft contact, follow the bicycle's. J
-is taken at halved steps and extrapolated: what differs from the reference then is the model's, not the
-step's.
+In the time before T/2, an engine's own fast states, such as the depth of a soft contact, adapt to those of the bicycle.
+J is measured at halved steps and extrapolated, so that differences from the reference are due to the model and not to
+the step.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from ...reference.kinematics import PITCH, YAW
 from ...reference.stability import independent, sorted_eigenvalues
 from .convergence import extrapolate, observed_orders
 
-INTERVAL = 0.2  # short enough that the fastest oscillation known, 7 rad/s, turns by less than half a turn [s]
-# Of x, y, lean, steer and their rates, rear rate [m, rad, rad/s]. The stencil's error is of sixth order in
-# them (of fourth order it left 8e-5 of an eigenvalue at P3); an engine's noise is divided by them.
+INTERVAL = 0.2  # [s]; short enough that the fastest oscillation known, 7 rad/s, turns by less than half a turn
+# Disturbances of x, y, lean, steer and their rates, and the rear rate [m, rad, rad/s]. The stencil's error is of sixth
+# order in them (a fourth-order one left 8e-5 of an eigenvalue at P3); an engine's noise is divided by them.
 DISTURBANCES = np.array([5e-3, 5e-3, 1e-3, 1e-3, 5e-3, 5e-3, 1e-2])
 _STENCIL = ((1, 45 / 60), (-1, -45 / 60), (2, -9 / 60), (-2, 9 / 60), (3, 1 / 60), (-3, -1 / 60))
 STENCIL_WEIGHT = sum(abs(weight) for _, weight in _STENCIL)
@@ -36,7 +36,7 @@ IDENTIFY_LEVELS = 3
 
 @dataclass(frozen=True)
 class Identified:
-    """An engine's own reduced linear system.
+    """Reduced linear system of an engine.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Identified:
     eigenvalues : ndarray, shape (7,), complex
         In the order of `velodrome.reference.stability.eigenvalue_order` [1/s].
     order : float
-        Order in the step that the entries show; NaN where they do not move.
+        Observed order in the step of the entries; NaN where they do not change.
     """
 
     jacobian: np.ndarray
@@ -69,11 +69,11 @@ def identify(
     ----------
     engine : Engine
     settings : Settings
-        Those of the coarsest level; each further one halves the step.
+        Settings of the coarsest level; each further level halves the step.
     problem : Problem
-        Its start is the motion: circular, or straight and upright. Its times are not used.
+        It starts on the motion, which is circular, or straight and upright. Its times are not used.
     progress : callable
-        Called with the share of the work done, 0 to 1.
+        Called with the completed share of the work, 0 to 1.
     levels : int
         At least 2.
 
@@ -84,7 +84,7 @@ def identify(
     Raises
     ------
     EngineError
-        If the engine does not ride so long.
+        If the engine does not ride through 1.5 times the interval T.
     ValueError
         If the disturbed states do not exist, or the engine refuses the settings.
     """
@@ -104,7 +104,7 @@ def identify(
 
 
 def interval_of(settings: Settings) -> float:
-    """Interval T of the flow: about `INTERVAL`, an even number of the settings' steps [s]."""
+    """Return the interval T of the flow: about `INTERVAL`, an even number of the settings' steps [s]."""
     step = getattr(settings, "step", None)
     return INTERVAL if step is None else max(1, round(INTERVAL / step / 2)) * 2 * step
 
@@ -116,21 +116,21 @@ def jacobian_at(
     interval: float,
     progress: Callable[[float], None] = lambda _: None,
 ) -> np.ndarray:
-    """Reduced Jacobian (7, 7) of an engine at the settings' own step, from an interval of flow [s]; see `identify`."""
+    """Return an engine's reduced Jacobian (7, 7) at the settings' own step from ``interval`` [s]; see `identify`."""
     flow = np.zeros((2, 7, 7))
     for j in range(7):
         for i, (multiple, weight) in enumerate(_STENCIL):
             size = multiple * DISTURBANCES[j]
-            flow[:, :, j] += weight / DISTURBANCES[j] * _ride(engine, settings, problem, interval, j, size)
+            flow[:, :, j] += weight / DISTURBANCES[j] * _ride_disturbed(engine, settings, problem, interval, j, size)
             progress((j * len(_STENCIL) + i + 1) / (7 * len(_STENCIL)))
-    over = flow[1] @ np.linalg.inv(flow[0])
-    return np.real(logm(over)) / interval
+    propagator = flow[1] @ np.linalg.inv(flow[0])
+    return np.real(logm(propagator)) / interval
 
 
-def _ride(
+def _ride_disturbed(
     engine: Engine, settings: Settings, problem: Problem, interval: float, variable: int, size: float
 ) -> np.ndarray:
-    """Independent variables after half an interval and another whole one, shape (2, 7)."""
+    """Return a disturbed ride's independent variables after half an interval and one interval later, shape (2, 7)."""
     v = independent(problem.q, problem.qd)
     v[variable] += size
     yaw = float(problem.q[YAW])

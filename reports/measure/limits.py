@@ -1,12 +1,12 @@
-"""What round-off, unconverged iterations and a motion's growth allow a gated quantity to move.
+"""Limits of the changes of gated quantities, derived from round-off, unconverged iterations and a motion's growth.
 
 The same engine with the same settings repeats its values up to round-off and to what its iterations leave
-unconverged; anything beyond is a change of the engine. So no percentage is set by hand: with
+unconverged; any larger difference is a change of the engine. So no percentage is set by hand: with
 
     noise = (error of the start + relative error a step may add x steps) x exp(max(growth rate, 0) x duration)
 
-the state may differ by ``noise`` relative to the motion's own sizes, and each quantity by its sensitivity to
-the state times that.
+the state may differ by ``noise`` relative to the motion's own sizes, and each quantity by this times its sensitivity
+to the state.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from ...reference.bicycle import Bicycle
 from ...reference.kinematics import REAR_ANGLE
 from ...reference.stability import eigenvalue_order
 
-# A bounded disturbance |e| <= b over a duration T tilts a least-squares line by 3 b / T at the most.
+# A disturbance bounded by b over a duration T changes the slope of a least-squares line by at most 3 b / T.
 _SLOPE = 3.0
 
-# The start is a root of equations known to round-off, some 1e-13 of their rows, and their condition is
+# The start is a root of equations that is found up to round-off, some 1e-13 of their rows. Their condition number is
 # the inverse of the Jacobian's least singular value, some 1e2.
 START_ERROR = 1e-11
 ROUND_OFF = 2.0**-52
 
-# An order that cannot be told from its neighbours says nothing.
-_TELLING_ORDER = 0.5
+# An order with a larger uncertainty than this cannot be told from its neighbours.
+_LARGEST_ORDER_LIMIT = 0.5
 
 
 @dataclass(frozen=True)
 class Scale:
-    """Sizes of a gated ride that turn a relative state error into each quantity's.
+    """Sizes of a gated ride that convert a relative state error to the error of each quantity.
 
     Attributes
     ----------
@@ -43,13 +43,13 @@ class Scale:
     rear_rate : float
         Rear-wheel rate [rad/s].
     growth_rate : float
-        Of disturbances [1/s].
+        Growth rate of disturbances [1/s].
     duration : float
-        Of the ride that is measured [s].
+        Duration of the measured part of the ride [s].
     gravity : float
         [m/s^2].
     height : float
-        Of the rear frame's centre of mass when upright [m].
+        Upright height of the rear frame's centre of mass [m].
     """
 
     radius: float
@@ -62,22 +62,22 @@ class Scale:
 
     @classmethod
     def of(cls, bicycle: Bicycle, qd: np.ndarray, radius: float, growth_rate: float, duration: float) -> Scale:
-        """Sizes of a ride from its rates (9,) at the start."""
+        """Return the sizes of a ride from its rates (9,) at the start."""
         speed, rear_rate = float(np.hypot(qd[0], qd[1])), float(abs(qd[REAR_ANGLE]))
         return cls(radius, speed, rear_rate, growth_rate, duration, bicycle.gravity, bicycle.rear_frame_z)
 
     @property
     def turned(self) -> float:
-        """What a wheel turns in the ride, or a radian [rad]."""
+        """Angle by which a wheel turns in the ride, at least a radian [rad]."""
         return max(1.0, self.rear_rate * self.duration)
 
     @property
     def rates(self) -> np.ndarray:
-        """Sizes of the nine rates, shape (9,)."""
+        """Sizes of the nine rates, shape (9,) [m/s, rad/s]."""
         return np.array([*3 * [self.speed], *6 * [self.rear_rate]])
 
     def away(self, time: float) -> float:
-        """How far an error of the state carries D away in a time [s], in radii: one of the speed all the way."""
+        """Return by how many radii a relative error of the state, taken as one of the speed, moves D in a time [s]."""
         return 1 + self.speed * time / self.radius
 
     @property
@@ -87,7 +87,7 @@ class Scale:
 
 
 def noise(scale: Scale, step_noise: float, steps: int, fell: bool = False) -> float:
-    """Relative error of the state at the end of a ride.
+    """Return the relative error of the state at the end of a ride.
 
     Parameters
     ----------
@@ -97,18 +97,18 @@ def noise(scale: Scale, step_noise: float, steps: int, fell: bool = False) -> fl
     steps : int
         Steps of the ride.
     fell : bool
-        Whether the bicycle fell, on which disturbances grow as on a pendulum that falls.
+        Whether the bicycle fell, where disturbances grow as on a falling pendulum.
     """
     growth = max(scale.growth_rate, scale.falling_rate if fell else 0.0, 0.0)
     return (START_ERROR + step_noise * steps) * math.exp(growth * scale.duration)
 
 
 def step_force(scale: Scale, step_noise: float, step: float) -> float:
-    """Contact force that the noise of a single step makes, relative to the weight.
+    """Return the contact force due to the noise of a single step, relative to the weight.
 
-    A wheel that is off by the noise times the motion's radius and put right within the step takes the acceleration
-    distance / (beta step^2), which contacts show that have not settled yet. Of the stable implicit methods of Newmark's
-    family beta is 1/4 or more.
+    A wheel displaced by the noise times the motion's radius and corrected within the step has the acceleration
+    distance / (beta step^2). Contacts that have not settled yet show this force. The stable implicit methods of
+    Newmark's family have a beta of 1/4 or more.
 
     Parameters
     ----------
@@ -122,17 +122,17 @@ def step_force(scale: Scale, step_noise: float, step: float) -> float:
 
 
 def ride_limits(scale: Scale, noise: float, step_force: float = 0.0, borders: int = 0) -> dict[str, float]:
-    """Limits of the quantities of one ride.
+    """Return the limits of the quantities of one ride.
 
     Parameters
     ----------
     scale : Scale
     noise : float
-        Relative error of its state.
+        Relative error of the state.
     step_force : float
-        Contact force that the noise of a single step makes, by `step_force`.
+        Contact force due to the noise of a single step, from `step_force`.
     borders : int
-        Borders between pieces of the ground that the wheels cross.
+        Number of borders between pieces of the ground that the wheels cross.
 
     Returns
     -------
@@ -153,50 +153,50 @@ def ride_limits(scale: Scale, noise: float, step_force: float = 0.0, borders: in
         "max_gap": noise * scale.radius,
         "max_slip": noise * scale.speed,
         "mean_slip": noise * scale.speed,
-        # A share of limits of its own, see `velodrome.reports.measure.consistency`.
+        # Already relative to limits of its own, see `velodrome.reports.measure.consistency`.
         "report_mismatch": 1.0,
-        # Forces follow accelerations, whose sensitivity to the state is the square of its fastest rate, the
-        # wheels', and which are measured against the weight.
+        # Forces follow accelerations, whose sensitivity to the state is the square of its fastest rate, that of the
+        # wheels, and are relative to the weight.
         "contact_force_error": force,
         "settled_force_error": force,
         "rms_force_error": force,
-        # The frame comes down at the speed of a fall from its height.
+        # The frame reaches the ground at the speed of a fall from its height.
         "fell_at": noise * scale.radius / math.sqrt(2 * scale.gravity * scale.height),
-        # Where a step is accepted or not by its error, one may stand at the very tolerance, and so may one at every
-        # border, where a high derivative of the ground jumps.
+        # Where the error decides whether a step is accepted, one step may lie exactly at the tolerance, and so may one
+        # at every border, where a high derivative of the ground jumps.
         "steps": 1.0 + borders,
     }
 
 
 def order_limit(error: float, moves: tuple[float, float]) -> float | None:
-    """Limit of an observed order log2(moves[0] / moves[1]).
+    """Return the limit of an observed order log2(moves[0] / moves[1]).
 
     Parameters
     ----------
     error : float
-        Of each of the three results that the moves are differences of, in their unit.
+        Error of each of the three results whose differences are the moves, in their unit.
     moves : tuple of float
         Size of the change by each halving of the step.
 
     Returns
     -------
     float or None
-        None where the moves are so small that no order can be seen.
+        None where the changes are too small to show an order.
     """
     if min(moves) <= 0:
         return None
     limit = 2 * error * (1 / moves[0] + 1 / moves[1]) / math.log(2)
-    return limit if limit < _TELLING_ORDER else None
+    return limit if limit < _LARGEST_ORDER_LIMIT else None
 
 
 def eigenvalue_limits(
     jacobian: np.ndarray, scale: Scale, noise: float, disturbances: np.ndarray, weight: float, interval: float
 ) -> np.ndarray:
-    """Limits of eigenvalues that are measured from the flow, see `velodrome.reports.measure.identify`.
+    """Return the limits of eigenvalues that are measured from the flow, see `velodrome.reports.measure.identify`.
 
     With M1, M2 the derivatives of the state at T/2 and 3 T/2, Phi = M2 / M1 and lambda = log(w Phi v) / T for left
-    and right eigenvectors w and v; so errors d of M1 and M2 move it by w d v (1 + |exp(lambda T)|) |exp(-3/2 lambda
-    T)| / T at the most.
+    and right eigenvectors w and v. Errors d of M1 and M2 therefore change lambda by at most
+    w d v (1 + |exp(lambda T)|) |exp(-3/2 lambda T)| / T.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def eigenvalue_limits(
     noise : float
         Relative error of a ride's state.
     disturbances : ndarray, shape (7,)
-        By which the independent variables are disturbed.
+        Disturbances of the independent variables.
     weight : float
         Sum of the absolute weights of the difference formula.
     interval : float

@@ -1,7 +1,7 @@
-"""What a trajectory is worth: errors against the reference, drift, slip, energy.
+"""Measure a trajectory: errors against the reference, drift, slip and energy.
 
-Poses, contact points, gaps, slip and energies are those that follow from its coordinates and rates. What the engine
-reports of them is held against these, see `velodrome.reports.measure.consistency`.
+Poses, contact points, gaps, slip and energies are those that follow from its coordinates and rates. The engine's own
+reports of them are compared with these, see `velodrome.reports.measure.consistency`.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ def compute_metrics(
     step_noise: float = ROUND_OFF,
     followed: Trajectory | None = None,
 ) -> dict[str, Any]:
-    """Measure a trajectory, up to its fall if it falls.
+    """Return the metrics of a trajectory, up to its fall if it falls.
 
     Parameters
     ----------
     trajectory : Trajectory
     reference : Trajectory or None
-        What it is held against, sampled at the same times (at least as long); None for the reference
+        The trajectory's reference, sampled at the same times (at least as long); None for the reference
         itself.
     bicycle : Bicycle
     surface : Surface
@@ -51,18 +51,18 @@ def compute_metrics(
         Largest real part of the motion's eigenvalues that symmetry does not fix [1/s].
     size : float
         Radius of the circle, or the wheelbase for a straight motion [m].
-    circular : bool
+    Whether the motion circles the z axis, so that radius and phase are defined.
         Whether the motion circles the z axis, so that radius and phase mean something.
     step_noise : float
         Relative error that a step of the engine may add beyond its method.
     followed : Trajectory, optional
-        The trajectory as `velodrome.reports.measure.consistency.evaluate_ride` gives it, where that is at hand.
+        The trajectory as returned by `velodrome.reports.measure.consistency.evaluate_ride`, if already computed.
 
     Returns
     -------
     dict
-        The quantities of ``metrics.json``, JSON values; None where an engine does not give what a
-        quantity needs, or the quantity has no meaning.
+        The quantities of ``metrics.json`` as JSON values; None where an engine does not give what a
+        quantity needs, or where the quantity is not defined.
     """
     reported = trajectory
     simulated = float(reported.time[-1] - reported.time[0])
@@ -71,14 +71,14 @@ def compute_metrics(
     trajectory = until_fall(trajectory, bicycle, surface)
     reported = reported.first(len(trajectory.time))
     reference = None if reference is None else until_fall(reference, bicycle, surface)
-    result = _errors(trajectory, reference)
-    result |= _drifts(trajectory, reference, circular)
-    result |= _energy(trajectory)
-    result |= _constraints(trajectory)
+    result = _error_metrics(trajectory, reference)
+    result |= _drift_metrics(trajectory, reference, circular)
+    result |= _energy_metrics(trajectory)
+    result |= _constraint_metrics(trajectory)
     result["not_finite"] = reported.not_finite()
     found = find_mismatches(reported, trajectory, reference, size, step_noise)
     result["inconsistent_reports"] = [mismatch.as_json() for mismatch in found if not mismatch.holds]
-    result |= _friction(trajectory, trajectory if reference is None else reference, surface)
+    result |= _friction_metrics(trajectory, trajectory if reference is None else reference, surface)
     result |= {
         "steps": trajectory.steps,
         "unconverged_steps": trajectory.unconverged_steps,
@@ -90,11 +90,11 @@ def compute_metrics(
         "ended": trajectory.ended,
     }
     result["horizon"] = None if reference is None else find_horizon(trajectory, reference, growth_rate, size)
-    return {name: _finite(value) for name, value in result.items()}
+    return {name: _replace_non_finite(value) for name, value in result.items()}
 
 
 def flatten_metrics(metrics: Mapping[str, Any]) -> dict[str, Any]:
-    """Metrics as columns: ``position_error`` becomes ``position_error_max`` and ``_end``, names one text or None."""
+    """Return metrics as columns: ``position_error`` becomes ``position_error_max`` and ``_end``, a list one text."""
     found: dict[str, Any] = {}
     for name, value in metrics.items():
         if isinstance(value, Mapping):
@@ -109,49 +109,49 @@ def flatten_metrics(metrics: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def to_number(value: float) -> float | None:
-    """What JSON can carry of a number: None if it is none."""
+    """Return a number as JSON can hold it: None if it is not finite."""
     return float(value) if np.isfinite(value) else None
 
 
-def _finite(value: Any) -> Any:
-    """Replace what JSON cannot carry: a number that is none becomes None."""
+def _replace_non_finite(value: Any) -> Any:
+    """Replace numbers that are not finite, which JSON cannot hold, by None."""
     if isinstance(value, dict):
-        return {name: _finite(part) for name, part in value.items()}
+        return {name: _replace_non_finite(part) for name, part in value.items()}
     if isinstance(value, list):
-        return [_finite(part) for part in value]
+        return [_replace_non_finite(part) for part in value]
     return to_number(value) if isinstance(value, float) else value
 
 
 def position_errors(trajectory: Trajectory, reference: Trajectory) -> np.ndarray:
-    """Distance of D from the reference's, sample by sample, shape (n,) [m]."""
-    n = _common(trajectory, reference)
+    """Return the distance of D from the reference's at each sample, shape (n,) [m]."""
+    n = _common_samples(trajectory, reference)
     return np.linalg.norm(trajectory.q[:n, :3] - reference.q[:n, :3], axis=1)
 
 
 def orientation_errors(trajectory: Trajectory, reference: Trajectory) -> np.ndarray:
-    """Angle between the rear frames, sample by sample, shape (n,) [rad]."""
-    n = _common(trajectory, reference)
+    """Return the angle between the rear frames at each sample, shape (n,) [rad]."""
+    n = _common_samples(trajectory, reference)
     a, b = trajectory.body_quaternion[:n, 0], reference.body_quaternion[:n, 0]
-    # 2 asin(|a - +-b| / 2) resolves small angles, which the arc cosine of a product does not.
+    # 2 asin(|a - +-b| / 2) resolves small angles; the arc cosine of a product does not.
     chord = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
     return 4 * np.arcsin(np.minimum(chord / 2, 1.0))
 
 
 def rate_error(trajectory: Trajectory, reference: Trajectory) -> float | None:
-    """Largest difference of any of the nine rates from the reference's, relative to the motion's sizes.
+    """Return the largest difference of any of the nine rates from the reference's, relative to the motion's sizes.
 
-    Rates of D are measured by the reference's largest speed, the others by its largest angular rate. None where the
+    Rates of D are relative to the reference's largest speed, the others to its largest angular rate. None where the
     reference stands still.
     """
-    n = _common(trajectory, reference)
+    n = _common_samples(trajectory, reference)
     sizes = np.array([largest_speed(reference)] * 3 + [float(np.abs(reference.qd[:, YAW:]).max())] * 6)
     moving = sizes > 0
     difference = np.abs(trajectory.qd[:n] - reference.qd[:n])[:, moving]
     return float((difference / sizes[moving]).max()) if moving.any() else None
 
 
-def _friction(trajectory: Trajectory, rolling: Trajectory, surface: Surface) -> dict[str, float | None]:
-    """Friction that rolling needs by the reference's forces, and from when on the engine has too little."""
+def _friction_metrics(trajectory: Trajectory, rolling: Trajectory, surface: Surface) -> dict[str, float | None]:
+    """Return the friction that rolling needs by the reference's forces, and when the engine first has too little."""
     result: dict[str, float | None] = dict.fromkeys(("required_friction", "friction", "friction_left_at"))
     result["friction"] = trajectory.friction
     if rolling.contact_force is not None and rolling.contact_point is not None:
@@ -162,16 +162,16 @@ def _friction(trajectory: Trajectory, rolling: Trajectory, surface: Surface) -> 
 
 
 def least_normal_force(trajectory: Trajectory, surface: Surface) -> float | None:
-    """Least normal contact force [N]; negative where the ground would have to pull, as no contact can."""
+    """Return the least normal contact force [N]; negative where the ground would have to pull, which no contact can."""
     normal = normal_force(trajectory, surface)
     return None if normal is None else float(normal.min())
 
 
 def find_horizon(trajectory: Trajectory, reference: Trajectory, growth_rate: float, size: float) -> float | None:
-    """Time up to which the comparison means anything [s]; None where the motion amplifies no error.
+    """Return the time up to which the comparison is meaningful [s]; None where the motion amplifies no error.
 
-    An error grows like e0 exp(growth_rate t), e0 = C h^p. e0 is the largest that the samples allow while
-    the error is small against the motion, and the horizon is where the law reaches the motion's size.
+    An error grows like e0 exp(growth_rate t), e0 = C h^p. e0 is taken as the largest value that the samples allow while
+    the error is small relative to the motion. The horizon is the time at which this law reaches the motion's size.
     """
     if growth_rate <= 0:
         return None
@@ -179,44 +179,44 @@ def find_horizon(trajectory: Trajectory, reference: Trajectory, growth_rate: flo
     time = trajectory.time[: len(error)]
     small = (error > 0) & (error < 1e-2 * size)
     if not small.any():
-        # Meaningless from the start, or without any error at all.
+        # The error is large from the start, or there is no error at all.
         return 0.0 if error.max() > 0 else None
     seed = float(np.max(np.log(error[small]) - growth_rate * time[small]))
     law = max(0.0, float(np.log(size) - seed) / growth_rate)
-    # Other causes may be faster than the law: an engine's own drift, a fall.
+    # Other causes may act faster than the law: an engine's own drift, a fall.
     beyond = np.flatnonzero(error >= size)
     return min(law, float(time[beyond[0]])) if len(beyond) else law
 
 
-def _common(trajectory: Trajectory, reference: Trajectory) -> int:
+def _common_samples(trajectory: Trajectory, reference: Trajectory) -> int:
     n = min(len(trajectory.time), len(reference.time))
     if not np.array_equal(trajectory.time[:n], reference.time[:n]):
         raise ValueError(f"{trajectory.engine} and {reference.engine} are not sampled at the same times")
     return n
 
 
-def _extremes(values: np.ndarray) -> dict[str, float]:
+def _largest_and_last(values: np.ndarray) -> dict[str, float]:
     return {"max": float(values.max()), "end": float(values[-1])}
 
 
-def _errors(trajectory: Trajectory, reference: Trajectory | None) -> dict[str, Any]:
-    names = ("position_error", "orientation_error", "rate_error", "rear_rate_error", "contact_force_error")
-    names += ("contact_force_error_at", "settled_force_error")
+def _error_metrics(trajectory: Trajectory, reference: Trajectory | None) -> dict[str, Any]:
+    names = ["position_error", "orientation_error", "rate_error", "rear_rate_error", "contact_force_error"]
+    names += ["contact_force_error_at", "settled_force_error"]
     result: dict[str, Any] = dict.fromkeys(names)
     if reference is None:
         return result
-    n = _common(trajectory, reference)
+    n = _common_samples(trajectory, reference)
     rate = np.abs(trajectory.qd[:n, REAR_ANGLE] - reference.qd[:n, REAR_ANGLE])
-    result["position_error"] = _extremes(position_errors(trajectory, reference))
-    result["orientation_error"] = _extremes(orientation_errors(trajectory, reference))
+    result["position_error"] = _largest_and_last(position_errors(trajectory, reference))
+    result["orientation_error"] = _largest_and_last(orientation_errors(trajectory, reference))
     result["rate_error"] = rate_error(trajectory, reference)
     result["rear_rate_error"] = float(rate.max())
     if trajectory.contact_force is not None and reference.contact_force is not None:
         difference = np.linalg.norm(trajectory.contact_force[:n] - reference.contact_force[:n], axis=2)
-        # Relative to the largest force that the reference ever needs.
+        # Relative to the largest force of the reference.
         largest = np.linalg.norm(reference.contact_force[:n], axis=2).max()
         result["contact_force_error"] = float(difference.max() / largest)
-        # Contacts that start unsettled are worst in the first sample, which says little of the ride.
+        # Contacts that start unsettled have their largest error in the first sample, which is not typical of the ride.
         if difference.max() > 0:
             result["contact_force_error_at"] = float(trajectory.time[difference.max(axis=1).argmax()])
         settled = trajectory.time[:n] >= SETTLED_SHARE
@@ -226,18 +226,18 @@ def _errors(trajectory: Trajectory, reference: Trajectory | None) -> dict[str, A
 
 
 def _slope(time: np.ndarray, values: np.ndarray) -> float:
-    """Slope of the least-squares line [1/s]."""
+    """Return the slope of the least-squares line, in the values' unit per second."""
     centred = time - time.mean()
     return float(centred @ (values - values.mean()) / (centred @ centred))
 
 
-def _drifts(trajectory: Trajectory, reference: Trajectory | None, circular: bool) -> dict[str, float | None]:
-    """Rates at which radius, phase and rear-wheel rate leave the reference's."""
+def _drift_metrics(trajectory: Trajectory, reference: Trajectory | None, circular: bool) -> dict[str, float | None]:
+    """Return the rates at which radius, phase and rear-wheel rate drift from the reference's."""
     names = ("radius_drift_rate", "phase_drift_rate", "rear_rate_drift_rate")
     result: dict[str, float | None] = dict.fromkeys(names)
-    if reference is None or _common(trajectory, reference) < 2:
+    if reference is None or _common_samples(trajectory, reference) < 2:
         return result
-    n = _common(trajectory, reference)
+    n = _common_samples(trajectory, reference)
     time = trajectory.time[:n]
     result["rear_rate_drift_rate"] = _slope(time, trajectory.qd[:n, REAR_ANGLE] - reference.qd[:n, REAR_ANGLE])
     if circular:
@@ -249,7 +249,7 @@ def _drifts(trajectory: Trajectory, reference: Trajectory | None, circular: bool
     return result
 
 
-def _energy(trajectory: Trajectory) -> dict[str, float | None]:
+def _energy_metrics(trajectory: Trajectory) -> dict[str, float | None]:
     assert trajectory.kinetic_energy is not None
     assert trajectory.potential_energy is not None
     energy = trajectory.kinetic_energy + trajectory.potential_energy
@@ -261,7 +261,7 @@ def _energy(trajectory: Trajectory) -> dict[str, float | None]:
     }
 
 
-def _constraints(trajectory: Trajectory) -> dict[str, float]:
+def _constraint_metrics(trajectory: Trajectory) -> dict[str, float]:
     assert trajectory.gap is not None
     assert trajectory.slip is not None
     speed = np.linalg.norm(trajectory.slip, axis=2)

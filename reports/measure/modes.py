@@ -1,4 +1,4 @@
-"""How strongly each mode of a motion is excited along a ride.
+"""Measure how strongly each mode of a motion is excited along a ride.
 
 On a circular motion the independent variables v (`velodrome.reference.stability.VARIABLES`) are constant, and a small
 deviation d from them obeys d' = J d. With left and right eigenvectors w, r of J, w r = 1, the amplitude of a mode
@@ -6,10 +6,10 @@ is
 
     a = w d,    d = sum of a r,    |a| ~ exp(Re(lambda) t)
 
-A pair of complex modes turns in its plane and counts as one, twice the size. r is scaled so that a is the mode's
-own share of an angle, the larger of lean and steer; the zero mode, which leads along the family of circles, has
-the rear wheel's rate instead. On the level plane J does not depend on where the bicycle is: place is left out, and
-with it the modes that shift a circle.
+A pair of complex modes rotates in its plane and counts as one mode of twice the size. r is scaled so that a is the
+mode's own contribution to an angle, the larger of lean and steer. For the zero mode, which leads along the family of
+circles, it is the contribution to the rear wheel's rate. On the level plane J does not depend on the position of the
+bicycle; there position is left out, and with it the modes that shift a circle.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from ...reference.kinematics import YAW
 from ...reference.stability import are_zero, eigenvalue_order, independent, linearise
 from ...reference.surface import Surface, is_level
 
-_PLACE = 2  # x and y stand first among the independent variables
-_ANGLES = slice(2, 4)
-_RATE = 6
-# Eigenvalues of modes that are one pair differ from conjugates by round-off alone.
-_REAL = 1e-9
+_POSITION = 2  # number of position variables, x and y, which come first among the independent variables
+_LEAN_AND_STEER = slice(2, 4)
+_REAR_RATE = 6
+# Largest imaginary part of real eigenvalues, which differ from real numbers by round-off alone [1/s].
+_LARGEST_IMAGINARY = 1e-9
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,13 @@ class Mode:
     Attributes
     ----------
     name : str
-        The field's word for it where it can be told.
+        The field's term for it if it can be identified.
     eigenvalue : complex
-        The one of the pair with the positive imaginary part [1/s].
+        That of the pair with the positive imaginary part [1/s].
     left : ndarray, shape (7,), complex
-        Row that gives the amplitude of a deviation.
+        Row vector that gives the amplitude of a deviation.
     unit : str
-        Of the amplitude: ``rad``, or ``rad/s`` of the rear wheel.
+        Unit of the amplitude: ``rad``, or ``rad/s`` of the rear wheel.
     """
 
     name: str
@@ -54,34 +54,34 @@ class Mode:
 
     @property
     def title(self) -> str:
-        """Name and eigenvalue in words."""
-        real, imaginary = _signed(self.eigenvalue.real), abs(self.eigenvalue.imag)
+        """Name and eigenvalue as text."""
+        real, imaginary = _format_signed(self.eigenvalue.real), abs(self.eigenvalue.imag)
         turning = f" ± {imaginary:.3g}i" if imaginary else ""
         return f"{self.name} {real}{turning} 1/s"
 
 
 @dataclass(frozen=True)
 class Modes:
-    """Modes of the motion that a ride started from.
+    """Modes of the motion on which a ride started.
 
     Attributes
     ----------
     motion : ndarray, shape (7,)
         Independent variables of the motion.
     modes : tuple of Mode
-        From the fastest decay to the fastest growth.
+        Sorted from the fastest decay to the fastest growth.
     """
 
     motion: np.ndarray
     modes: tuple[Mode, ...]
 
     def amplitude(self, mode: Mode, ride: Trajectory) -> np.ndarray:
-        """Amplitude of a mode along a ride, in the mode's unit, shape (n,)."""
+        """Return the amplitude of a mode along a ride, in the mode's unit, shape (n,)."""
         return np.abs((independent(ride.q, ride.qd) - self.motion) @ mode.left)
 
 
 def find_modes(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> Modes:
-    """Modes of a circular motion, or of a straight upright one.
+    """Return the modes of a circular motion, or of a straight upright one.
 
     Parameters
     ----------
@@ -94,34 +94,34 @@ def find_modes(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray
     Returns
     -------
     Modes
-        Without those that decay or grow so alike that they cannot be told apart.
+        Modes whose eigenvalues are too close to be told apart are left out.
     """
     jacobian = linearise(bicycle, surface, q, qd).jacobian
-    first = _PLACE if is_level(surface) else 0
+    first = _POSITION if is_level(surface) else 0
     values, right = np.linalg.eig(jacobian[first:, first:])
     left = np.zeros((len(values), 7), complex)
     left[:, first:] = np.linalg.inv(right)
     right = np.concatenate([np.zeros((first, len(values)), complex), right])
-    real = are_zero(values) | (np.abs(np.imag(values)) <= _REAL)
+    real = are_zero(values) | (np.abs(np.imag(values)) <= _LARGEST_IMAGINARY)
     values = np.where(real, np.real(values), values)
     upper = [k for k in eigenvalue_order(values) if np.imag(values[k]) >= 0]
     zero = min(upper, key=lambda k: abs(values[k]))
-    names = _names(values[upper], upper.index(zero), 0.0 if first else abs(float(qd[YAW])))
+    names = _name_modes(values[upper], upper.index(zero), 0.0 if first else abs(float(qd[YAW])))
     modes = []
     for k, name in zip(upper, names, strict=True):
-        share = right[_RATE, k] if k == zero else max(right[_ANGLES, k], key=abs)
+        share = right[_REAR_RATE, k] if k == zero else max(right[_LEAN_AND_STEER, k], key=abs)
         pair = 2 if np.imag(values[k]) else 1
         value = 0j if k == zero else complex(values[k])
         modes.append(Mode(name, value, pair * left[k] * share, "rad/s" if k == zero else "rad"))
     return Modes(independent(q, qd), tuple(modes))
 
 
-def _names(values: np.ndarray, zero: int, yaw_rate: float) -> list[str]:
-    """Names of modes (n,), pairs by their upper eigenvalue.
+def _name_modes(values: np.ndarray, zero: int, yaw_rate: float) -> list[str]:
+    """Return names of modes (n,), pairs given by their upper eigenvalue.
 
-    As along a family from the plane, where they are plain: a pair near i times the yaw rate is the orbital one, a
-    bowl's hold on the circle's centre; then one pair is left, the weave, and of two real ones the faster is
-    castering, the other capsize. Where anything else is found they have no names.
+    The names continue those on the plane, where they are unambiguous, along a family of motions. The pair nearest to i
+    times the yaw rate is the orbital one, by which a bowl returns the circle's centre; the remaining pair is the
+    weave. Of two real modes the faster is castering, the other capsize. Modes in other numbers get no names.
     """
     names = ["family" if k == zero else "pair" if value.imag else "real" for k, value in enumerate(values)]
     pairs = sorted((k for k, name in enumerate(names) if name == "pair"), key=lambda k: abs(values[k] - 1j * yaw_rate))
@@ -132,5 +132,5 @@ def _names(values: np.ndarray, zero: int, yaw_rate: float) -> list[str]:
     return names
 
 
-def _signed(value: float) -> str:
+def _format_signed(value: float) -> str:
     return "0" if value == 0 else f"{value:.3g}".replace("-", "−")

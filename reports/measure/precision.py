@@ -1,4 +1,4 @@
-"""Work-precision: what an engine's error does as its step is halved, and what it costs."""
+"""Work-precision: an engine's error as its step is halved, and its cost."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .convergence import extrapolate, observed_orders
 from .identify import Identified
 from .metrics import position_errors, to_number
 
-SMALL = 0.1  # of the motion's size: what nonlinearity adds to an error up to here, the next powers of the step take
+SMALL = 0.1  # of the motion's size: up to here the next powers of the step absorb what nonlinearity adds to an error
 
 SAME_BITS = "its step changes nothing: rides of different steps are equal to the last bit"
 
 
 @dataclass(frozen=True)
 class Level:
-    """One run of a study: its step [s] (the mean one of a method that chooses its own), trajectory and metrics."""
+    """One run of a study: its step [s] (the mean step of a method that adapts it), trajectory and metrics."""
 
     step: float
     trajectory: Trajectory
@@ -30,18 +30,18 @@ class Level:
 
 @dataclass(frozen=True)
 class StepConvergence:
-    """How a sequence of levels converges.
+    """Convergence of a sequence of levels.
 
     Attributes
     ----------
     window : float
-        Time up to which order and limit are taken [s]: there even the coarsest level's error is small.
+        Time up to which order and limit are taken [s]; up to it even the coarsest level's error is small.
     orders : list of float
-        Seen by each three successive levels.
+        Observed in each three successive levels.
     limit_error : float
         Largest distance of the extrapolated path of D from the reference's [m].
     uncertainty : float
-        Of that path: largest change by the last extrapolation [m].
+        Uncertainty of that path: largest change by the last extrapolation [m].
     """
 
     window: float
@@ -51,18 +51,18 @@ class StepConvergence:
 
 
 def comparison_horizon(levels: Sequence[Level]) -> float | None:
-    """Time up to which the finest level's comparison means anything [s]; None where no error is amplified."""
+    """Return the time up to which the finest level's comparison is meaningful [s]; None where no error is amplified."""
     return levels[-1].metrics["horizon"] if levels else None
 
 
 def compared_time(document: Mapping[str, Any]) -> float:
-    """Time over which a document of `velodrome precision` takes its errors [s]."""
+    """Return the time over which a document of `velodrome precision` takes its errors [s]."""
     horizon, duration = document["horizon"], document["duration"]
     return duration if horizon is None else min(horizon, duration)
 
 
 def measure_convergence(levels: Sequence[Level], reference: Trajectory, size: float) -> StepConvergence | None:
-    """Order and limit of levels with halved steps.
+    """Return order and limit of levels with halved steps.
 
     Parameters
     ----------
@@ -70,11 +70,11 @@ def measure_convergence(levels: Sequence[Level], reference: Trajectory, size: fl
         From the coarsest to the finest, sampled at the reference's times.
     reference : Trajectory
     size : float
-        Of the motion [m].
+        Size of the motion [m].
 
     Returns
     -------
-    Convergence or None
+    StepConvergence or None
         None with fewer than two levels, where two of them are equal to the last bit, or where not even the first
         samples agree.
     """
@@ -93,7 +93,7 @@ def measure_convergence(levels: Sequence[Level], reference: Trajectory, size: fl
 
 
 def step_changes_nothing(levels: Sequence[Level]) -> bool:
-    """Whether two successive levels are equal to the last bit, so that neither order nor limit can be seen."""
+    """Return whether two successive levels are equal to the last bit, so that they show neither order nor limit."""
     return any(np.array_equal(a.trajectory.q, b.trajectory.q) for a, b in pairwise(levels))
 
 
@@ -104,34 +104,34 @@ def engine_document(
     size: float,
     horizon: float | None,
 ) -> dict[str, Any]:
-    """One engine's part of the JSON document of `velodrome precision`.
+    """Return one engine's part of the JSON document of `velodrome precision`.
 
     Parameters
     ----------
     levels : sequence of Level
     failures : sequence of mapping
-        ``step`` and ``reason`` of the runs that did not come to their end.
+        ``step`` and ``reason`` of the runs that did not finish.
     reference : Trajectory
     size : float
-        Of the motion [m].
+        Size of the motion [m].
     horizon : float or None
-        Errors are taken up to here [s]; None for the whole run.
+        Time up to which errors are taken [s]; None for the whole run.
     """
-    found = measure_convergence(levels, reference, size)
-    orders = [] if found is None else found.orders
-    unseen = [{"step": None, "reason": SAME_BITS}] if step_changes_nothing(levels) else []
+    convergence = measure_convergence(levels, reference, size)
+    orders = [] if convergence is None else convergence.orders
+    equal_rides = [{"step": None, "reason": SAME_BITS}] if step_changes_nothing(levels) else []
     return {
-        "points": [_point(level, reference, horizon) for level in levels],
-        "failures": [*failures, *unseen],
+        "points": [_level_document(level, reference, horizon) for level in levels],
+        "failures": [*failures, *equal_rides],
         "observed_order": to_number(orders[-1]) if orders else None,
         "orders": [to_number(order) for order in orders],
-        "richardson_error": None if found is None else found.limit_error,
-        "richardson_uncertainty": None if found is None else found.uncertainty,
-        "window": None if found is None else found.window,
+        "richardson_error": None if convergence is None else convergence.limit_error,
+        "richardson_uncertainty": None if convergence is None else convergence.uncertainty,
+        "window": None if convergence is None else convergence.window,
     }
 
 
-def _point(level: Level, reference: Trajectory, horizon: float | None) -> dict[str, Any]:
+def _level_document(level: Level, reference: Trajectory, horizon: float | None) -> dict[str, Any]:
     errors = position_errors(level.trajectory, reference)
     if horizon is not None:
         errors = errors[: max(1, int(np.searchsorted(reference.time[: len(errors)], horizon, side="right")))]
@@ -148,7 +148,7 @@ def _point(level: Level, reference: Trajectory, horizon: float | None) -> dict[s
 
 
 def eigenvalue_document(identified: Identified, reference: np.ndarray) -> dict[str, Any]:
-    """Eigenvalues that an engine itself has, beside the reference's, as JSON values.
+    """Return an engine's own eigenvalues beside the reference's, as JSON values.
 
     Parameters
     ----------
@@ -175,8 +175,8 @@ def eigenvalue_document(identified: Identified, reference: np.ndarray) -> dict[s
 
 
 def eigenvalue_pairs(reference: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Order values so that as a whole they lie nearest to the reference's."""
-    # Imported here: scipy's optimisers take a third of a second, and only this needs one of them.
+    """Reorder values so that as a whole they lie nearest to the reference's."""
+    # Imported here because importing scipy's optimisers takes a third of a second and only this function needs them.
     from scipy.optimize import linear_sum_assignment
 
     return values[linear_sum_assignment(np.abs(reference[:, None] - values[None, :]))[1]]

@@ -1,4 +1,4 @@
-"""The report of a run as one page of HTML that needs nothing else."""
+"""The report of a run as a self-contained HTML page."""
 
 from .document import make_page
 

@@ -1,4 +1,4 @@
-"""The curves of the page: which, and which of their samples."""
+"""The curves of the page, and the selection of their samples."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from ..drawing import PLOTS, RADIUS, Plot, RideData, drawable_values
 
-MOST_CURVE_POINTS = 1000  # points of a curve: as many as pixels side by side
-ALL_CURVE_POINTS = 40_000  # points of all curves together: under a megabyte of page
+MOST_CURVE_POINTS = 1000  # largest number of points of a curve, about the number of pixels across
+ALL_CURVE_POINTS = 40_000  # largest number of points of all curves together: less than a megabyte of the page
 _DIGITS = 7
 
 
@@ -22,12 +22,12 @@ class Panel:
     Attributes
     ----------
     key : str
-        Of the plot in `velodrome.reports.drawing.plots.PLOTS`.
+        Key of the plot in `velodrome.reports.drawing.plots.PLOTS`.
     title : str
-        The quantity in words.
+        Name of the quantity.
     unit : str
     meaning : str
-        A sentence or two: what is drawn, how to read it.
+        A sentence or two on what is drawn and how to read it.
     log : bool
         Whether the plot's values are decimal logarithms, to be read on a logarithmic axis.
     """
@@ -40,7 +40,7 @@ class Panel:
 
     @property
     def plot(self) -> Plot:
-        """The plot that computes the values."""
+        """Plot that computes the values."""
         return next(plot for plot in PLOTS if plot.key == self.key)
 
 
@@ -126,21 +126,21 @@ GROUPS: tuple[tuple[str, tuple[Panel, ...]], ...] = (
 
 
 def choose_samples(values: np.ndarray, most: int) -> np.ndarray:
-    """Choose samples that draw a curve: the least and the largest of each of equal parts, the first, the last.
+    """Choose samples that draw a curve: smallest and largest of each of equal parts, the first and the last.
 
-    No extreme of the curve is lost, however short.
+    No extremum of the curve is lost, however short it is.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
-        NaN where there is none.
+        NaN where there is no value.
     most : int
-        Samples to choose at most, at least 4.
+        Largest number of samples, at least 4.
 
     Returns
     -------
     ndarray of int
-        Indices, rising, of finite values.
+        Indices of finite values, in rising order.
     """
     finite = np.flatnonzero(np.isfinite(values))
     if len(finite) <= most:
@@ -153,7 +153,7 @@ def choose_samples(values: np.ndarray, most: int) -> np.ndarray:
 
 
 def make_curve(time: np.ndarray, values: np.ndarray, most: int) -> dict[str, list[float | None]]:
-    """Points of a curve as JSON: times ``t`` and values ``v``, a None between points that nothing joins."""
+    """Return the points of a curve as JSON: times ``t`` and values ``v``, with None where the curve is interrupted."""
     chosen = choose_samples(values, most)
     absent = np.cumsum(~np.isfinite(values))
     t: list[float | None] = []
@@ -170,7 +170,7 @@ def make_curve(time: np.ndarray, values: np.ndarray, most: int) -> dict[str, lis
 
 
 def round_values(value: float, digits: int = _DIGITS) -> float:
-    """A number with fewer digits."""
+    """Round a number to a number of significant digits."""
     return float(f"{value:.{digits}g}")
 
 
@@ -182,9 +182,9 @@ class DrawnCurve:
     ----------
     panel : Panel
     curves : dict
-        Engine to points, as `make_curve` gives them.
+        Points by engine, as returned by `make_curve`.
     extremes : dict
-        Engine to the least and the largest value and the last, of all samples.
+        Smallest, largest and last value of all samples, by engine.
     """
 
     panel: Panel
@@ -193,18 +193,18 @@ class DrawnCurve:
 
 
 def draw_curves(ride: RideData, circular: bool) -> list[tuple[str, list[DrawnCurve]]]:
-    """All panels that any engine has values for, in groups.
+    """Make all panels for which any engine has values, in groups.
 
     Parameters
     ----------
-    ride : Ride
+    ride : RideData
     circular : bool
-        Whether the motion circles the bowl's axis, so that its radius means something.
+        Whether the motion circles the bowl's axis, so that its radius is meaningful.
 
     Returns
     -------
-    list of (str, list of Drawn)
-        Title of the group and its panels; groups without a panel are left out.
+    list of (str, list of DrawnCurve)
+        Title of the group and its panels; groups without a panel are omitted.
     """
     found = [
         (title, panel, drawable_values(ride, panel.plot))
@@ -219,28 +219,28 @@ def draw_curves(ride: RideData, circular: bool) -> list[tuple[str, list[DrawnCur
         if not values:
             continue
         curves = {name: make_curve(ride.trajectories[name].time, series, most) for name, series in values.items()}
-        extremes = {name: _extremes(series, panel.log) for name, series in values.items()}
+        extremes = {name: _find_extremes(series, panel.log) for name, series in values.items()}
         groups.setdefault(title, []).append(DrawnCurve(panel, curves, extremes))
     return list(groups.items())
 
 
-def _extremes(values: np.ndarray, log: bool) -> tuple[float, float, float]:
+def _find_extremes(values: np.ndarray, log: bool) -> tuple[float, float, float]:
     finite = values[np.isfinite(values)]
     three = (float(finite.min()), float(finite.max()), float(finite[-1]))
     return (10 ** three[0], 10 ** three[1], 10 ** three[2]) if log else three
 
 
-def panel_data(shown: DrawnCurve, names: Sequence[str], measured: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """A panel as JSON for the page's script; engines by their number in ``names``."""
+def panel_data(drawn: DrawnCurve, names: Sequence[str], measured: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Return a panel as JSON for the page's script, with engines by their index in ``names``."""
     marks = []
-    if shown.panel.key == "log_position_error":
-        horizons = {name: measured.get(name, {}).get("horizon") for name in shown.curves}
+    if drawn.panel.key == "log_position_error":
+        horizons = {name: measured.get(name, {}).get("horizon") for name in drawn.curves}
         marks = [{"engine": names.index(name), "t": t} for name, t in horizons.items() if t is not None]
     return {
-        "key": shown.panel.key,
-        "log": shown.panel.log,
-        "unit": shown.panel.unit,
-        "span": shown.panel.plot.span,
+        "key": drawn.panel.key,
+        "log": drawn.panel.log,
+        "unit": drawn.panel.unit,
+        "span": drawn.panel.plot.span,
         "marks": marks,
-        "curves": {str(names.index(name)): points for name, points in shown.curves.items()},
+        "curves": {str(names.index(name)): points for name, points in drawn.curves.items()},
     }

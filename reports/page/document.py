@@ -1,4 +1,4 @@
-"""The page as a whole: data in, one HTML document out."""
+"""The page as a whole: from a run's data to one HTML document."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def make_page(
     measured : mapping
         Metrics by engine name, as in ``metrics.json``.
     verdicts : sequence of mapping
-        As `velodrome.scenarios.run.runner.judge_run` gives them.
+        As returned by `velodrome.scenarios.run.runner.judge_run`.
     trajectories : mapping of str to Trajectory
         By engine name, in the order of display; may be empty.
     surface : Surface
@@ -47,21 +47,21 @@ def make_page(
     Returns
     -------
     str
-        An HTML document with everything in it: style, script, data. Whatever comes from the run is escaped.
+        A self-contained HTML document with style, script and data. All text from the run is escaped.
     """
-    names, script = list(trajectories), _text("page.js")
+    names, script = list(trajectories), _read_part("page.js")
     ride = RideData(surface, trajectories)
     groups = curves.draw_curves(ride, scenario["motion"].get("kind") != "upright") if names else []
-    seen = plan.draw_plan(ride, names) if names else None
+    trails = plan.draw_plan(ride, names) if names else None
     steady = isinstance(surface, SurfaceOfRevolution)
     duration, rate = scenario["simulation"]["duration"], manifest["start"]["growth_rate"]
     ends = {name: float(run.time[-1]) for name, run in trajectories.items()}
-    return _template().render(
-        _results(measured, rate, duration, ends),
+    return _load_template().render(
+        _result_values(measured, rate, duration, ends),
         manifest=manifest,
         facts=words.list_facts(manifest, scenario),
         stability=describe_stability(rate, steady),
-        engines=_inks(names),
+        engines=_engine_styles(names),
         failures={name: entry["failed"] for name, entry in manifest["engines"].items() if "failed" in entry},
         left_out=manifest.get("left_out", {}),
         verdicts=[{"holds": verdict["holds"], "line": format_verdict(verdict)} for verdict in verdicts],
@@ -69,29 +69,29 @@ def make_page(
         steady=steady,
         duration=duration,
         groups=groups,
-        has_plan=seen is not None,
+        has_plan=trails is not None,
         most=curves.MOST_CURVE_POINTS,
         data={
             "duration": max(ends.values(), default=duration),
             "engines": names,
-            "panels": [curves.panel_data(shown, names, measured) for _, group in groups for shown in group],
-            "plan": seen,
+            "panels": [curves.panel_data(drawn, names, measured) for _, group in groups for drawn in group],
+            "plan": trails,
         },
-        style=Markup(_text("page.css")),
+        style=Markup(_read_part("page.css")),
         script=Markup(script),
-        script_hash=_hash(script),
+        script_hash=_script_hash(script),
     )
 
 
-def _results(
+def _result_values(
     measured: Mapping[str, Mapping[str, Any]], growth_rate: float, duration: float, ends: Mapping[str, float]
 ) -> dict[str, Any]:
-    """What the template says of the metrics; ``ends`` are the times of the engines' last samples [s]."""
+    """Return what the template shows of the metrics; ``ends`` are the times of the engines' last samples [s]."""
     return {
         "columns": COLUMNS,
         "meanings": trust.COLUMN_MEANINGS,
         "horizon_meaning": trust.HORIZON,
-        "rows": {name: _row(values) for name, values in measured.items()},
+        "rows": {name: _format_row(values) for name, values in measured.items()},
         "trust": {
             name: trust.explain_columns(name, values, growth_rate, duration, ends.get(name))
             for name, values in measured.items()
@@ -101,27 +101,31 @@ def _results(
     }
 
 
-def _template() -> Template:
-    # Strict: a name that the template misspells is an error, not a gap.
+def _load_template() -> Template:
+    # Strict: a misspelt name in the template is an error instead of a gap.
     environment = Environment(
-        autoescape=True, loader=FunctionLoader(_text), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        autoescape=True,
+        loader=FunctionLoader(_read_part),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     environment.filters["setting"] = words.describe_setting
     return environment.get_template("page.html")
 
 
-def _text(name: str) -> str:
+def _read_part(name: str) -> str:
     return (_PARTS / name).read_text(encoding="utf-8")
 
 
-def _hash(script: str) -> str:
-    """Name of a script in a content security policy: with it a browser runs this one and no other."""
+def _script_hash(script: str) -> str:
+    """Return the source expression of a script for a content security policy, which allows this script only."""
     return "sha256-" + base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 
-def _inks(names: list[str]) -> list[dict[str, str]]:
-    """How each engine is drawn."""
+def _engine_styles(names: list[str]) -> list[dict[str, str]]:
+    """Return the colours and dashes of each engine."""
     paint, dash = assign_colours(names), line_dashes(names)
     return [
         {
@@ -134,7 +138,7 @@ def _inks(names: list[str]) -> list[dict[str, str]]:
     ]
 
 
-def _row(values: Mapping[str, Any]) -> list[str]:
+def _format_row(values: Mapping[str, Any]) -> list[str]:
     horizon = values.get("horizon")
     return [format_cell(values, metric, part) for _, _, metric, part in COLUMNS] + [
         "–" if horizon is None else f"{horizon:.3g}"

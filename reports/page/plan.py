@@ -1,4 +1,4 @@
-"""The ride seen from above: trails on the ground."""
+"""The ride from above: trails on the ground."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from ...engines.engine import Trajectory
 from ..drawing import RideData, make_ground
 from .curves import round_values
 
-MOST_TRAIL_POINTS = 1200  # points of a trail: some hundred a turn
-ALL_TRAIL_POINTS = 12_000  # points of all trails together: a quarter of a megabyte of page
-_DIGITS = 5  # a millimetre in a hundred metres
+MOST_TRAIL_POINTS = 1200  # largest number of points of a trail: about a hundred a turn
+ALL_TRAIL_POINTS = 12_000  # largest number of points of all trails together: a quarter of a megabyte of the page
+_DIGITS = 5  # significant digits: a millimetre in a hundred metres
 
 
 def draw_trail(run: Trajectory) -> np.ndarray:
-    """Where the rear wheel touches the ground, seen from above, shape (n, 2) [m]; D where there is no contact."""
+    """Return the rear wheel's contact point from above, shape (n, 2) [m]; D where there is no contact point."""
     return run.q[:, :2] if run.contact_point is None else run.contact_point[:, 0, :2]
 
 
 def draw_plan(ride: RideData, names: Sequence[str]) -> dict[str, Any] | None:
-    """Trails and the ground's lines as JSON for the page's script; None where there is nothing to draw.
+    """Return trails and the ground's lines as JSON for the page's script; None where there is nothing to draw.
 
     Parameters
     ----------
-    ride : Ride
+    ride : RideData
     names : sequence of str
-        Engines; a trail's key is its engine's number.
+        Engines; the key of a trail is the index of its engine.
 
     Returns
     -------
@@ -45,16 +45,17 @@ def draw_plan(ride: RideData, names: Sequence[str]) -> dict[str, Any] | None:
     most = max(4, min(MOST_TRAIL_POINTS, ALL_TRAIL_POINTS // len(paths)))
     return {
         "box": [round_values(v, _DIGITS) for v in (*low, *(high - low))],
-        "edge": _points(ground.edge),
-        "lines": [_points(line) for line in ground.lines],
+        "edge": _project_points(ground.edge),
+        "lines": [_project_points(line) for line in ground.lines],
         "trails": {
-            str(names.index(name)): _trail(ride.trajectories[name].time, path, most) for name, path in paths.items()
+            str(names.index(name)): _thin_trail(ride.trajectories[name].time, path, most)
+            for name, path in paths.items()
         },
     }
 
 
-def _points(line: np.ndarray) -> list[list[float]]:
-    """Points (n, 3) from above; of a straight line its ends."""
+def _project_points(line: np.ndarray) -> list[list[float]]:
+    """Return points (n, 3) from above; only the ends of a straight line."""
     flat = line[:, :2]
     along = flat[-1] - flat[0]
     off = (flat - flat[0]) @ np.array([-along[1], along[0]])
@@ -63,10 +64,10 @@ def _points(line: np.ndarray) -> list[list[float]]:
     return [[round_values(x, _DIGITS), round_values(y, _DIGITS)] for x, y in (flat[[0, -1]] if straight else flat)]
 
 
-def _trail(time: np.ndarray, path: np.ndarray, most: int) -> dict[str, list[float]]:
-    """Every k-th sample, the last, and the outermost on each side."""
+def _thin_trail(time: np.ndarray, path: np.ndarray, most: int) -> dict[str, list[float]]:
+    """Return every k-th sample, the last one, and the outermost one on each side."""
     finite = np.flatnonzero(np.isfinite(path).all(axis=1))
-    # Six are set aside for the last sample, the four outermost, and a rest of the division.
+    # Six samples are reserved for the last one, the four outermost, and a remainder of the division.
     chosen = finite[:: max(1, -(-len(finite) // max(1, most - 6)))]
     if len(finite):
         outermost = [finite[path[finite, k].argmin()] for k in (0, 1)]

@@ -1,4 +1,4 @@
-"""What the figures mean, and how far to trust them in this run."""
+"""Meanings of the figures, and how far they can be trusted in a run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from ...engines.engine import REFERENCE
 
-# One a column of `velodrome.reports.drawing.summary.COLUMNS`.
+# One for each column of `velodrome.reports.drawing.summary.COLUMNS`.
 COLUMN_MEANINGS = {
     "position_error": "Largest distance of the point D, on the steering axis, from where the reference has it at the "
     "same time.",
@@ -32,7 +32,7 @@ HORIZON = (
 def explain_columns(
     name: str, values: Mapping[str, Any], growth_rate: float, duration: float, end: float | None = None
 ) -> str:
-    """How far to trust an engine's row.
+    """Explain how far an engine's row can be trusted.
 
     Parameters
     ----------
@@ -40,11 +40,11 @@ def explain_columns(
     values : mapping
         The engine's metrics.
     growth_rate : float
-        Of the motion's own disturbances [1/s].
+        Growth rate of the motion's own disturbances [1/s].
     duration : float
-        Of the run [s].
+        Duration of the run [s].
     end : float, optional
-        Time of the engine's last sample [s]; of a ride that ended early and is not at hand, it is not known.
+        Time of the engine's last sample [s]; unknown for a ride that ended early and is not available.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def explain_columns(
 
 
 def _stop(values: Mapping[str, Any], duration: float, end: float | None) -> tuple[float, str]:
-    """Up to when there is anything of an engine to see [s], and this in words; none for a ride of the whole run."""
+    """Return the time up to which an engine's ride lasts [s], and this as text; empty for a ride of the whole run."""
     if values.get("fell_at") is not None:
         return values["fell_at"], f"up to its fall at {values['fell_at']:.2f} s"
     if values.get("ended") is None:
@@ -83,9 +83,9 @@ def _stop(values: Mapping[str, Any], duration: float, end: float | None) -> tupl
 
 
 def _reference(values: Mapping[str, Any]) -> str:
-    kept = [
-        f"{words} {_rounded_up(values[metric])}{unit}"
-        for words, metric, unit in (
+    bounds = [
+        f"{text} {_rounded_up(values[metric])}{unit}"
+        for text, metric, unit in (
             ("its energy changes by at most", "energy_drift", " of itself"),
             ("its gaps stay within", "max_gap", " m"),
             ("its slip stays within", "max_slip", " m/s"),
@@ -93,13 +93,13 @@ def _reference(values: Mapping[str, Any]) -> str:
         if values.get(metric) is not None
     ]
     return (
-        "The measure of the others, integrated to round-off. What it can be held to: " + ", ".join(kept) + ". "
+        "The measure of the others, integrated to round-off. Its own bounds: " + ", ".join(bounds) + ". "
         "Errors of others near these sizes are its own as much as theirs."
     )
 
 
 def _rounded_up(value: float, digits: int = 2) -> str:
-    """A bound in few digits that still holds: the next number of so many digits that is not below."""
+    """Round a bound up to a few digits, so that it still holds."""
     exact = Decimal(repr(float(value)))
     if not exact:
         return "0"

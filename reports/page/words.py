@@ -1,4 +1,4 @@
-"""What ran, in words."""
+"""The facts of a run as text."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from ...reference.bicycle import Bicycle
 
-_LONGEST = 80  # letters for a field with a list of numbers
+_LONGEST = 80  # largest number of characters for a field with a list of numbers
 _UNITS = {
     "x": "m",
     "y": "m",
@@ -21,7 +21,7 @@ _UNITS = {
 
 
 def list_facts(manifest: Mapping[str, Any], scenario: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Terms and what they are in this run.
+    """List terms and their meanings in this run.
 
     Parameters
     ----------
@@ -54,17 +54,17 @@ def list_facts(manifest: Mapping[str, Any], scenario: Mapping[str, Any]) -> list
 
 
 def describe_ground(surface: Mapping[str, Any]) -> str:
-    """A surface in words."""
+    """Describe a surface."""
     if surface["kind"] == "plane":
         return "level plane"
     if surface["kind"] == "paraboloid":
         return f"bowl z = α (x² + y²), α = {surface['alpha']:g} 1/m"
-    fields = (f"{name} {_short(value)}" for name, value in surface.items() if name != "kind" and value is not None)
+    fields = (f"{name} {_shorten(value)}" for name, value in surface.items() if name != "kind" and value is not None)
     return ", ".join([str(surface["kind"]), *fields])
 
 
 def describe_motion(table: Mapping[str, Any]) -> str:
-    """A motion to start from in words."""
+    """Describe the motion at the start."""
     if table.get("kind") == "upright":
         return f"straight and upright, {table['speed']:g} m/s"
     return f"circle with the rear wheel at {table['rear_rate']:g} rad/s"
@@ -77,7 +77,7 @@ def describe_disturbance(table: Mapping[str, float]) -> str:
 
 
 def describe_bicycle(changes: Mapping[str, float]) -> str:
-    """The bicycle in words, from parameters that may be those of the benchmark bicycle."""
+    """Describe the bicycle by the parameters that differ from the benchmark bicycle's."""
     name = "benchmark bicycle (Meijaard et al. 2007)"
     benchmark = Bicycle()
     others = {key: value for key, value in changes.items() if value != getattr(benchmark, key, None)}
@@ -86,7 +86,7 @@ def describe_bicycle(changes: Mapping[str, float]) -> str:
 
 
 def describe_setting(value: Any) -> str:
-    """A setting's value as the scenario file writes it."""
+    """Format a setting's value as in a scenario file."""
     if value is None:
         return "not set"
     if isinstance(value, bool):
@@ -96,6 +96,6 @@ def describe_setting(value: Any) -> str:
     return f"{value!r}" if isinstance(value, float) else str(value)
 
 
-def _short(value: Any) -> str:
+def _shorten(value: Any) -> str:
     text = str(value)
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"

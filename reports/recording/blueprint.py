@@ -1,4 +1,4 @@
-"""How a recording opens: which views, where, looking from where."""
+"""The initial layout of a recording: its views and their cameras."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from ..drawing import CHANGE, CONSTRAINTS, ENERGY, ERROR, FORCES, LOG_ENERGY, RA
 
 BACKGROUND = (17, 19, 24)
 NEWTONS_PER_METRE = 500.0
-_LEGEND_SHARE = 1.8  # of the height of another view: a legend of ten engines fits
+_LEGEND_SHARE = 1.8  # height relative to another view, so that a legend of ten engines fits
 
 # Samples of each plot by its key, then by engine.
 Curves = Mapping[str, Mapping[str, np.ndarray]]
 
 
 def world(engine: str) -> str:
-    """Path of the entity under which everything of an engine in space is."""
+    """Return the path of the entity that contains everything of an engine in space."""
     return rr.new_entity_path(["world", engine])
 
 
-def _trails(engines: Sequence[str], seconds: float | None) -> dict[Any, rrb.VisibleTimeRanges]:
-    """Show the trails up to the cursor, all of them or the last seconds."""
+def _show_trails(engines: Sequence[str], seconds: float | None) -> dict[Any, rrb.VisibleTimeRanges]:
+    """Show the trails up to the cursor, either whole or only the last seconds."""
     start = (
         rrb.TimeRangeBoundary.infinite() if seconds is None else rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds)
     )
@@ -35,9 +35,9 @@ def _trails(engines: Sequence[str], seconds: float | None) -> dict[Any, rrb.Visi
 
 
 def overview(engines: Sequence[str], ground: GroundMesh) -> rrb.Spatial3DView:
-    """All engines on the whole ground; on a long strip the camera follows the first engine."""
+    """Make the view of all engines on the whole ground; on a long strip the camera follows the first engine."""
     if ground.disc:
-        # Twice the rim's height on top lets the eye see over the near rim down to the bottom.
+        # A camera higher than the near rim by twice the depth sees the bottom.
         bottom, rim = ground.vertices[:, 2].min(), ground.edge[:, 2].max()
         depth, size, origin = rim - bottom, ground.radius, "/world"
         target = np.array([-0.05 * size, -0.20 * size, bottom + 0.3 * depth])
@@ -50,7 +50,7 @@ def overview(engines: Sequence[str], ground: GroundMesh) -> rrb.Spatial3DView:
         name=f"Overview (arrows: contact force, 1 m = {NEWTONS_PER_METRE:.0f} N)",
         origin=origin,
         contents=["+ /world/**"],
-        overrides=_trails(engines, None),
+        overrides=_show_trails(engines, None),
         background=BACKGROUND,
         line_grid=False,
         eye_controls=eye,
@@ -58,25 +58,25 @@ def overview(engines: Sequence[str], ground: GroundMesh) -> rrb.Spatial3DView:
 
 
 def chase(engine: str, engines: Sequence[str]) -> rrb.Spatial3DView:
-    """One engine from behind, turning with its yaw only, with the reference beside it."""
-    shown = [name for name in engines if name in (engine, REFERENCE)]
-    hidden = rrb.EntityBehavior(visible=False)  # the tab says the name
+    """Make the view of one engine from behind, which turns with its yaw only, and of the reference beside it."""
+    visible = [name for name in engines if name in (engine, REFERENCE)]
+    hidden = rrb.EntityBehavior(visible=False)  # the tab has the name
     eye = rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital, position=(-2.1, -1.6, 1.0), look_target=(-0.2, 0.0, 0.15), eye_up=(0, 0, 1)
     )
     return rrb.Spatial3DView(
         name=f"Chase {engine}",
         origin=f"{world(engine)}/chase",
-        contents=["+ /world/ground/**", *(f"+ {world(name)}/**" for name in shown)],
-        overrides={**_trails(shown, 2.0), **{f"{world(name)}/chase/name": hidden for name in shown}},
+        contents=["+ /world/ground/**", *(f"+ {world(name)}/**" for name in visible)],
+        overrides={**_show_trails(visible, 2.0), **{f"{world(name)}/chase/name": hidden for name in visible}},
         background=BACKGROUND,
         line_grid=False,
         eye_controls=eye,
     )
 
 
-def _axis(plot: Plot, curves: Mapping[str, np.ndarray]) -> rrb.ScalarAxis | None:
-    """A fixed range where the viewer's own would blow round-off up to the full height."""
+def _fix_axis(plot: Plot, curves: Mapping[str, np.ndarray]) -> rrb.ScalarAxis | None:
+    """Return a fixed range where the viewer's own range would magnify round-off to the full height."""
     low = min(float(values.min()) for values in curves.values())
     high = max(float(values.max()) for values in curves.values())
     if high - low >= plot.span:
@@ -90,41 +90,41 @@ def _plot_view(plot: Plot, curves: Mapping[str, np.ndarray], legend: bool) -> rr
         name=plot.title,
         origin=f"/plots/{plot.key}",
         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
-        axis_y=_axis(plot, curves),
+        axis_y=_fix_axis(plot, curves),
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftBottom, visible=legend),
         background=rrb.archetypes.PlotBackground(color=BACKGROUND, show_grid=True),
     )
 
 
 def _plot_tab(name: str, plots: Sequence[Plot], curves: Curves, columns: int) -> rrb.Container | None:
-    """The views of the plots that have a curve; None if none has.
+    """Make a tab of the plots that have a curve; None if there is none.
 
-    One legend a tab, in the first view with the most curves: it covers part of the curves, and in a column of
-    views that one is the highest.
+    Each tab has one legend, in the first view with the most curves, since it covers a part of them; in a column of
+    views this view is the highest.
     """
-    shown = [plot for plot in plots if curves.get(plot.key)]
-    if not shown:
+    drawn = [plot for plot in plots if curves.get(plot.key)]
+    if not drawn:
         return None
-    keyed = max(shown, key=lambda plot: len(curves[plot.key]))
-    views = [_plot_view(plot, curves[plot.key], plot is keyed) for plot in shown]
+    keyed = max(drawn, key=lambda plot: len(curves[plot.key]))
+    views = [_plot_view(plot, curves[plot.key], plot is keyed) for plot in drawn]
     if columns == 1:
-        return rrb.Vertical(*views, row_shares=[_LEGEND_SHARE if plot is keyed else 1 for plot in shown], name=name)
+        return rrb.Vertical(*views, row_shares=[_LEGEND_SHARE if plot is keyed else 1 for plot in drawn], name=name)
     return rrb.Grid(*views, grid_columns=columns, name=name)
 
 
 def blueprint(engines: Sequence[str], ground: GroundMesh, curves: Curves, modes: Sequence[Plot] = ()) -> rrb.Blueprint:
-    """Layout of a recording: the ride left, curves and summary right, paused at the start.
+    """Make the layout of a recording: the ride left, curves and summary right, paused at the start.
 
     Parameters
     ----------
     engines : sequence of str
         Names in the order of display.
-    ground : Ground
-        What is drawn of the surface.
+    ground : GroundMesh
+        Drawn part of the surface.
     curves : mapping
-        Samples by plot key and engine; a plot without any gets no view.
+        Samples by plot key and engine; a plot without samples gets no view.
     modes : sequence of Plot
-        Of the modes' amplitudes.
+        Plots of the modes' amplitudes.
     """
     where = RADIUS if ground.disc else STATES[1]
     tabs = (

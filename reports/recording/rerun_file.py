@@ -1,4 +1,4 @@
-"""A run as a recording for the rerun viewer: the ride in space, the curves, the summary."""
+"""Recording of a run for the rerun viewer: the ride in space, the curves, the summary."""
 
 from __future__ import annotations
 
@@ -34,21 +34,21 @@ from ..measure import find_modes
 from .blueprint import NEWTONS_PER_METRE, blueprint, world
 
 APPLICATION = "velodrome"
-TRAIL_PIECES = 400  # the viewer queries a trail piece by piece: more would make playing stutter
+TRAIL_PIECES = 400  # the viewer queries a trail piece by piece: with more, playback stutters
 GROUND_LOW, GROUND_HIGH = np.array([28.0, 35.0, 44.0]), np.array([96.0, 112.0, 126.0])
 LINE_COLOUR, EDGE_COLOUR = (112, 128, 140), (165, 182, 194)
 WALL_COLOUR = (44, 52, 62)
-INFLATION = 0.0015  # each bicycle is drawn this much fatter than the one before [m]
-TRAIL_WIDTHS = (3.6, 2.2, 1.2, 0.8)  # trails on top of one another show as stripes [points on the screen]
-# The viewer draws curves in the order of their paths: the reference first and wide, the others on it.
+INFLATION = 0.0015  # each bicycle is drawn larger than the previous one by this much [m]
+TRAIL_WIDTHS = (3.6, 2.2, 1.2, 0.8)  # trails on top of one another appear as stripes [points on the screen]
+# The viewer draws curves in the order of their paths: the reference first and wide, the others on top of it.
 REFERENCE_CURVE, CURVE = 3.4, 2.0
 EXPECTED, EXPECTED_CURVE, EXPECTED_COLOUR = "linear law", 1.0, (150, 155, 165)
 ARROW_RADIUS = 0.009
 
 
 @contextmanager
-def _strict() -> Iterator[None]:
-    """Make wrong calls of the recorder raise, and leave the process as it was."""
+def _strict_mode() -> Iterator[None]:
+    """Make wrong calls of the recorder raise errors, and restore the process's setting."""
     before = rr.strict_mode()
     rr.set_strict_mode(True)
     try:
@@ -58,13 +58,13 @@ def _strict() -> Iterator[None]:
 
 
 class _Clock:
-    """Timelines of a recording: ``time`` and ``step``, the sample's number among all engines' samples."""
+    """Timelines of a recording: ``time``, and ``step``, the index of a sample among the samples of all engines."""
 
     def __init__(self, trajectories: Mapping[str, Trajectory]) -> None:
         self._all = np.unique(np.concatenate([to_nanoseconds(run.time) for run in trajectories.values()]))
 
     def columns(self, time: np.ndarray) -> list[rr.TimeColumn]:
-        """Index columns of samples at times [s]."""
+        """Return the index columns of samples at times [s]."""
         exact = to_nanoseconds(time)
         return [
             rr.TimeColumn("time", duration=exact.astype("timedelta64[ns]")),
@@ -73,7 +73,7 @@ class _Clock:
 
 
 def brighten(colour: Colour) -> Colour:
-    """Half way to white, to stand out from a bicycle of the same colour."""
+    """Mix a colour half with white, so that it differs from a bicycle of the same colour."""
     red, green, blue = ((c + 255) // 2 for c in colour)
     return red, green, blue
 
@@ -105,7 +105,7 @@ def _log_ground(stream: rr.RecordingStream, ground: GroundMesh) -> None:
 
 
 def _send_bodies(stream: rr.RecordingStream, root: str, run: Trajectory, clock: _Clock) -> None:
-    """Poses of the bodies and of the chase frame, which is at D and turns with the yaw only."""
+    """Send the poses of the bodies and of the chase frame, which is at D and turns with the yaw only."""
     index = clock.columns(run.time)
     for k, body in enumerate(BODIES):
         pose = rr.Transform3D.columns(
@@ -119,7 +119,7 @@ def _send_bodies(stream: rr.RecordingStream, root: str, run: Trajectory, clock: 
 
 
 def _send_trail(stream: rr.RecordingStream, path: str, points: np.ndarray, run: Trajectory, clock: _Clock) -> None:
-    """A line in pieces, each at the time of its last point, so that the trail grows with the cursor."""
+    """Send a line in pieces, each at the time of its last point, so that the trail grows with the cursor."""
     stride = max(1, len(points) // TRAIL_PIECES)
     ends = np.arange(stride, len(points), stride)
     if len(ends) == 0:
@@ -131,7 +131,7 @@ def _send_trail(stream: rr.RecordingStream, path: str, points: np.ndarray, run: 
 def _send_contacts(
     stream: rr.RecordingStream, root: str, run: Trajectory, surface: Surface, colour: Colour, place: int, clock: _Clock
 ) -> None:
-    """Contact points, their trails and the contact forces, as far as the engine gives them."""
+    """Send contact points, their trails and the contact forces, as far as the engine reports them."""
     layer = min(place, len(TRAIL_WIDTHS) - 1)
     width, lift = rr.Radius.ui_points(TRAIL_WIDTHS[layer] / 2), (2 + layer) * LINE_LIFT
     if run.contact_point is None:
@@ -157,7 +157,7 @@ def _send_contacts(
 def _send_name(
     stream: rr.RecordingStream, root: str, name: str, place: int, run: Trajectory, colour: Colour, clock: _Clock
 ) -> None:
-    """The engine's name over its bicycle, and where it ended early the reason."""
+    """Send the engine's name above its bicycle and, if it ended early, the reason."""
     at = [[0.0, 0.0, 0.95 + 0.2 * place]]
     label = rr.Points3D(at, labels=[name], radii=0.0, colors=colour, show_labels=True)
     stream.log(f"{root}/chase/name", label, static=True)
@@ -169,19 +169,19 @@ def _send_name(
         stream.send_columns(f"{root}/ended", clock.columns(run.time[-1:]), columns)
 
 
-def _curves(ride: RideData, plots: Iterable[Plot]) -> dict[str, dict[str, PlotCurve]]:
-    """Finite samples of every plot: key -> engine -> (times, values); what is absent has no entry."""
+def _finite_curves(ride: RideData, plots: Iterable[Plot]) -> dict[str, dict[str, PlotCurve]]:
+    """Return the finite samples of every plot: (times, values) by key and engine, without empty ones."""
     curves: dict[str, dict[str, PlotCurve]] = {}
     for plot in plots:
         found: dict[str, PlotCurve] = {}
         for name, values in drawable_values(ride, plot).items():
-            kept = np.isfinite(values)
-            found[name] = ride.trajectories[name].time[kept], values[kept]
+            finite = np.isfinite(values)
+            found[name] = ride.trajectories[name].time[finite], values[finite]
         law = plot.expected(ride)
         if law is not None and found:
-            # What decays below all that is measured would only stretch the axis.
-            kept = law[1] >= min(values.min() for _, values in found.values())
-            found |= {EXPECTED: (law[0][kept], law[1][kept])} if kept.any() else {}
+            # Values below all measured ones would only extend the axis.
+            visible = law[1] >= min(values.min() for _, values in found.values())
+            found |= {EXPECTED: (law[0][visible], law[1][visible])} if visible.any() else {}
         if found:
             curves[plot.key] = found
     return curves
@@ -199,7 +199,7 @@ def write_recording(
     before: Mapping[str, str] | None = None,
     paint: Mapping[str, Colour] | None = None,
 ) -> None:
-    """Write a recording with its layout, whole or not at all.
+    """Write a recording with its layout, completely or not at all.
 
     Parameters
     ----------
@@ -211,16 +211,16 @@ def write_recording(
     surface : Surface
     trajectories : mapping of str to Trajectory
         By engine name, in the order of display. Some may have ended early; optional fields that are
-        None are left out of the recording.
+        None are omitted from the recording.
     summary : str
         Markdown for the summary tab.
     undisturbed : tuple of ndarray, shapes (9,), optional
         Coordinates and rates of the steady motion that the rides started from, on a surface of revolution or a
-        plane: its modes get a tab.
+        plane; its modes get a tab.
     before : mapping of str to str, optional
-        Where two runs are shown together: from a trajectory to the earlier one that it is held against.
+        For two runs shown together: the name of the earlier trajectory that each trajectory is compared with.
     paint : mapping, optional
-        Colours by name; those of `palette.colours` if not given.
+        Colours by name; those of `velodrome.reports.drawing.assign_colours` if not given.
 
     Raises
     ------
@@ -231,14 +231,16 @@ def write_recording(
         raise ValueError("a recording needs at least one trajectory, and each at least one sample")
     modes = None if undisturbed is None else find_modes(bicycle, surface, *undisturbed)
     ride = RideData(surface, trajectories, before or {}, modes)
-    with write_whole(path) as partial, _strict():
-        _write(partial, title, bicycle, ride, summary, paint or assign_colours(trajectories))
+    with write_whole(path) as partial, _strict_mode():
+        _write_stream(partial, title, bicycle, ride, summary, paint or assign_colours(trajectories))
 
 
-def _write(path: Path, title: str, bicycle: Bicycle, ride: RideData, summary: str, paint: Mapping[str, Colour]) -> None:
+def _write_stream(
+    path: Path, title: str, bicycle: Bicycle, ride: RideData, summary: str, paint: Mapping[str, Colour]
+) -> None:
     """Write the whole recording to a path."""
     own = mode_plots(ride.modes)
-    curves = _curves(ride, (*PLOTS, *own))
+    curves = _finite_curves(ride, (*PLOTS, *own))
     places = np.concatenate([run.q[:, :2] for run in ride.trajectories.values()])
     ground = make_ground(ride.surface, places[np.isfinite(places).all(axis=1)])
     layout = blueprint(
@@ -269,7 +271,7 @@ def _write(path: Path, title: str, bicycle: Bicycle, ride: RideData, summary: st
 def _send_curve(
     stream: rr.RecordingStream, key: str, name: str, curve: PlotCurve, paint: Mapping[str, Colour], clock: _Clock
 ) -> None:
-    """One engine's curve of a plot, or the one that theory expects."""
+    """Send one engine's curve of a plot, or the curve that theory predicts."""
     if name == EXPECTED:
         entity, colour, width = [key, "expected"], EXPECTED_COLOUR, EXPECTED_CURVE
     elif name == REFERENCE:

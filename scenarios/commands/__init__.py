@@ -4,6 +4,7 @@ from .bicycle import bicycle_command
 from .check import check_command
 from .motions import atlas_command, circular_command, critical_command, families_command
 from .run import list_command, run_command
+from .show import show_command
 from .stored import diff_command, view_command
 from .studies import paper_command, precision_command
 from .supervision import run_supervised
@@ -24,6 +25,7 @@ __all__ = [
     "print_versions",
     "run_command",
     "run_supervised",
+    "show_command",
     "sweep_command",
     "view_command",
 ]

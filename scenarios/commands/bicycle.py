@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ..error import ScenarioError
+from .completion import complete_scenario
 from .options import JsonOption, ending_with, print_json, show_written
 
 _FINEST = 10_000  # speeds of a list
@@ -15,7 +16,11 @@ _FINEST = 10_000  # speeds of a list
 
 def bicycle_command(
     source: Annotated[
-        str, typer.Argument(help="benchmark, a bicycle file (BicycleParameters or TOML), or a scenario.")
+        str,
+        typer.Argument(
+            help="benchmark, a bicycle file (BicycleParameters or TOML), or a scenario.",
+            autocompletion=complete_scenario,
+        ),
     ] = "benchmark",
     speeds: Annotated[
         str, typer.Option(metavar="FROM:TO", help="Range of forward speeds [m/s], or a list such as 1,3,5.")

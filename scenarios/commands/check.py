@@ -11,18 +11,24 @@ from typing import Annotated
 import typer
 
 from ..error import ScenarioError
+from .completion import complete_engine, complete_scenario
 from .options import JsonOption, TracebackOption, ending_with, print_json, print_traceback, showing_traceback
 
 
 def check_command(
     scenario: Annotated[
-        list[str] | None, typer.Argument(help="Library names or paths to TOML files; all gated ones if none is named.")
+        list[str] | None,
+        typer.Argument(
+            help="Library names or paths to TOML files; all gated ones if none is named.",
+            autocompletion=complete_scenario,
+        ),
     ] = None,
     engine: Annotated[
         list[str] | None,
         typer.Option(
             help="Judge only this engine; may be given several times. Its settings are those of the scenario's "
-            "[engines.NAME]."
+            "[engines.NAME].",
+            autocompletion=complete_engine,
         ),
     ] = None,
     baselines: Annotated[Path | None, typer.Option(help="Folder of the baselines instead of the suite's own.")] = None,
@@ -93,8 +99,8 @@ def check_command(
         else:
             console = Console()
             show_verdicts(console, verdicts, renewed=update)
-            for path in written:
-                console.print(f"baseline written: {path}", soft_wrap=True)
+            for name in written:
+                console.print(f"baseline written: {name}", soft_wrap=True)
             for name, verdict in refused:
                 line = f"no baseline written of {verdict.engine} on {name}: {verdict.reason}"
                 console.print(line, style="red", markup=False, highlight=False, soft_wrap=True)

@@ -51,8 +51,8 @@ def _numbers(entry: Mapping[str, Any]) -> list[str]:
         return ["–"] * len(_COLUMNS)
     # The reference has no error: it is what errors are measured against.
     error = entry["metrics"].get("position_error.max", {"before": None, "after": None})
-    numbers = (found["max"], found["end_limit"], found["exceeds_at"], error["before"], error["after"])
-    numbers += (entry["cpu_time"]["ratio"],)
+    numbers = [found["max"], found["end_limit"], found["exceeds_at"], error["before"], error["after"]]
+    numbers.append(entry["cpu_time"]["ratio"])
     return ["–" if number is None else f"{number:.2g}" for number in numbers]
 
 

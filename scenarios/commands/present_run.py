@@ -54,7 +54,8 @@ def _metric_tables(cells: Mapping[str, list[str]], width: int) -> Iterator[Table
     texts = [(*title.split(), unit) for title, unit, _, _ in COLUMNS]
     widths = [max(map(len, (*text, *(row[k] for row in cells.values())))) for k, text in enumerate(texts)]
     gap, room = 2, width - max((len(name) for name in cells), default=0)
-    parts, used = [[]], 0
+    parts: list[list[int]] = [[]]
+    used = 0
     for k, column in enumerate(widths):
         if parts[-1] and used + gap + column > room:
             parts.append([])

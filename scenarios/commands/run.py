@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..error import ScenarioError
+from .completion import complete_engine, complete_scenario
 from .options import (
     STARTING,
     ChangesOption,
@@ -36,7 +37,7 @@ def list_command(as_json: JsonOption = False) -> None:
     for name in library_names():
         _, scenario = load_scenario(name)
         scenarios.append({"name": name, "title": scenario.title, "tags": list(scenario.tags)})
-    engines = []
+    engines: list[dict[str, Any]] = []
     for name in installed_engines():
         try:
             engine = load_engine(name)
@@ -69,10 +70,15 @@ def _show_list(scenarios: list[dict[str, Any]], engines: list[dict[str, Any]]) -
 
 
 def run_command(
-    scenario: Annotated[list[str] | None, typer.Argument(help="Library names or paths to TOML files.")] = None,
+    scenario: Annotated[
+        list[str] | None, typer.Argument(help="Library names or paths to TOML files.", autocompletion=complete_scenario)
+    ] = None,
     engine: Annotated[
         list[str] | None,
-        typer.Option(help="Run only this engine, beside the reference; may be given several times."),
+        typer.Option(
+            help="Run only this engine, beside the reference; may be given several times.",
+            autocompletion=complete_engine,
+        ),
     ] = None,
     tag: Annotated[str | None, typer.Option(help="Run all library scenarios with this tag.")] = None,
     change: ChangesOption = None,

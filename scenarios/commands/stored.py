@@ -8,15 +8,23 @@ from typing import Annotated
 import typer
 
 from ..error import ScenarioError
+from .completion import complete_engine, complete_folder
 from .options import JsonOption, ending_with, print_json, show_written
 
 
 def diff_command(
-    before: Annotated[Path, typer.Argument(metavar="RUN", help="The earlier run's folder.")],
-    after: Annotated[Path, typer.Argument(metavar="RUN", help="The later run's folder.")],
+    before: Annotated[
+        Path, typer.Argument(metavar="RUN", help="The earlier run's folder.", autocompletion=complete_folder)
+    ],
+    after: Annotated[
+        Path, typer.Argument(metavar="RUN", help="The later run's folder.", autocompletion=complete_folder)
+    ],
     engine: Annotated[
         list[str] | None,
-        typer.Option(help="Compare only this engine, beside the reference; may be given several times."),
+        typer.Option(
+            help="Compare only this engine, beside the reference; may be given several times.",
+            autocompletion=complete_engine,
+        ),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for diff.json, diff.md and the recording diff.rrd.")] = None,
     as_json: JsonOption = False,
@@ -41,7 +49,7 @@ def diff_command(
 
 
 def view_command(
-    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")],
+    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.", autocompletion=complete_folder)],
     web: Annotated[bool, typer.Option("--web", help="Serve the report page with the viewer in it.")] = False,
     port: Annotated[
         int | None, typer.Option(min=0, max=65535, help="Port for --web; any free one if not given.")

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .completion import complete_engine, complete_scenario
 from .options import (
     ChangesOption,
     DurationOption,
@@ -47,10 +48,15 @@ def paper_command(
 
 
 def precision_command(
-    scenario: Annotated[str, typer.Argument(help="Library name or path to a TOML file.")],
+    scenario: Annotated[
+        str, typer.Argument(help="Library name or path to a TOML file.", autocompletion=complete_scenario)
+    ],
     engine: Annotated[
         list[str] | None,
-        typer.Option(help="Study only this engine, beside the reference; may be given several times."),
+        typer.Option(
+            help="Study only this engine, beside the reference; may be given several times.",
+            autocompletion=complete_engine,
+        ),
     ] = None,
     change: ChangesOption = None,
     duration: DurationOption = None,

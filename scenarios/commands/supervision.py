@@ -60,7 +60,7 @@ def _end_with(parent: int) -> None:
 
 def _run(main: Callable[[], NoReturn], report: int) -> NoReturn:
     own = os.getpid()
-    status = 1  # of a fault of the suite, which Python shows
+    status: str | int = 1  # of a fault of the suite, which Python shows
     try:
         main()
     except SystemExit as end:

@@ -7,11 +7,15 @@ from typing import Annotated
 
 import typer
 
+from .completion import complete_toml
 from .options import JsonOption
 
 
 def sweep_command(
-    file: Annotated[Path, typer.Argument(metavar="FILE.toml", help="What to vary; see examples/sweeps.")],
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE.toml", help="What to vary; see examples/sweeps.", autocompletion=complete_toml),
+    ],
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler instead of processes of this machine.")
     ] = None,

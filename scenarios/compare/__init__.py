@@ -1,6 +1,7 @@
-"""Two stored runs of one scenario against each other."""
+"""Comparison of two stored runs of one scenario."""
 
-from .differences import DIFFERS, TO_THE_BIT, WITHIN_ROUND_OFF, diff_remarks
+from .differences import DIFFERS, TO_THE_BIT, WITHIN_ROUND_OFF
 from .folders import diff_runs, read_pair, write_diff
+from .markdown import diff_remarks
 
 __all__ = ["DIFFERS", "TO_THE_BIT", "WITHIN_ROUND_OFF", "diff_remarks", "diff_runs", "read_pair", "write_diff"]

@@ -1,4 +1,4 @@
-"""`velodrome diff`: two stored run folders against each other."""
+"""Comparison of two stored run folders, as `velodrome diff` makes it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from ..error import ScenarioError
 from ..files import make_folder, write_json, write_text
 from ..run import configure_engine, find_part, installed_engines, read_document, read_ride, read_start_state
 from ..scenario import OF_THE_MOTION, CircularTable, Scenario, load_scenario, make_start
-from .differences import DIFFERS, StoredGround, StoredRun, diff_document, diff_markdown
+from .differences import DIFFERS, StoredGround, StoredRun, diff_document
+from .markdown import diff_markdown
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Pair:
     ----------
     scenario : Scenario
     before, after : StoredRun
-    ground : Ground
+    ground : StoredGround
     """
 
     scenario: Scenario
@@ -47,12 +48,12 @@ def read_pair(first: Path, second: Path, engines: Sequence[str] | None = None) -
     first, second : Path
         The earlier run and the later one.
     engines : sequence of str, optional
-        Only these, beside the reference; all if not given.
+        Names of the engines to compare, besides the reference; all if not given.
 
     Raises
     ------
     ScenarioError
-        If one is no run folder, or they differ in scenario, output times or start, or share no engine.
+        If a folder is not a run folder, or they differ in scenario, output times or start, or share no engine.
     """
     names = (first.resolve().name, second.resolve().name)
     if names[0] == names[1]:
@@ -98,7 +99,7 @@ def _read(folder: Path, name: str, engines: Sequence[str] | None) -> StoredRun:
     except ScenarioError:
         raise
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        # A ValueError is a sentence; the others are a word that says nothing without their kind.
+        # A ValueError has a sentence; the others have a single word, which says little without the error's type.
         kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
         raise ScenarioError(f"{folder}: not the files of one run: {kind}{error}") from error
     return StoredRun(name, {**manifest, "engines": entries}, metrics, rides)
@@ -113,7 +114,7 @@ def _same_start(before: StoredRun, after: StoredRun, first: Path, second: Path) 
         read_start_state(before.manifest), read_start_state(after.manifest), ("coordinates", "rates"), strict=True
     ):
         apart = np.abs(b - a)
-        # Each is a root known to this; a table of numbers cannot say which of them is right.
+        # Each start is a root known to this accuracy; the stored numbers do not show which of them is right.
         if np.any(apart > START_ERROR * (1 + np.abs(a))):
             raise ScenarioError(
                 f"{first} and {second}: different starts: {what} differ by up to {apart.max():.2g}; "
@@ -136,7 +137,7 @@ def _ground(scenario: Scenario, run: StoredRun) -> StoredGround:
 
 
 def diff_runs(pair: Pair) -> dict[str, Any]:
-    """The JSON document of `velodrome diff`; ``notes`` say where a limit is not the engine's own."""
+    """Return the JSON document of `velodrome diff`; ``notes`` say where a limit does not come from the engine."""
     noises, notes = {}, []
     for name, entry in pair.after.manifest["engines"].items():
         if name not in pair.before.manifest["engines"]:
@@ -150,7 +151,7 @@ def diff_runs(pair: Pair) -> dict[str, Any]:
 
 
 def _step_noise(name: str, settings: Mapping[str, Any]) -> float | str:
-    """Relative error that a step of an engine may add, or why the engine here does not tell it for such settings."""
+    """Return the relative error that a step of an engine may add, or why the installed engine cannot say it."""
     if name not in installed_engines():
         return "is not installed here"
     try:
@@ -159,7 +160,7 @@ def _step_noise(name: str, settings: Mapping[str, Any]) -> float | str:
         return float(engine.step_noise(chosen))
     except ScenarioError:
         return "is not installed here with such settings"
-    except Exception as error:  # another package's code may break in any way
+    except Exception as error:  # another package's code may raise anything
         return f"cannot be asked here: {why_failed(error)}"
 
 
@@ -183,7 +184,7 @@ def write_diff(pair: Pair, found: Mapping[str, Any], out: Path) -> list[Path]:
 
 
 def _record(path: Path, pair: Pair, found: Mapping[str, Any], page: str) -> None:
-    # rerun takes a second to load; only this needs it.
+    # Imported here: rerun takes a second to load.
     from ...reports.recording import brighten, write_recording
 
     ground, hues = pair.ground, assign_colours(found["engines"])
@@ -209,9 +210,9 @@ def _record(path: Path, pair: Pair, found: Mapping[str, Any], page: str) -> None
 
 
 def _labels(pair: Pair, engine: str, entry: Mapping[str, Any]) -> tuple[str, str]:
-    """Names of an engine's ride in either run: with its version, or where that is the same with the run's name.
+    """Name an engine's rides in both runs by its versions or, where these are the same, by the runs' names.
 
-    A reference that is the same in both stands once, as what all others are measured against.
+    A reference that is the same in both runs is named once, since the other engines are compared with it.
     """
     if engine == REFERENCE and entry["verdict"] != DIFFERS:
         return engine, engine

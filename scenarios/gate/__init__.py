@@ -1,4 +1,4 @@
-"""The drift gate: gated scenarios in every engine, held against committed baselines."""
+"""The drift gate: compare gated scenarios in every engine with committed baselines."""
 
 from .checks import check_gate, refused_verdicts, update_baselines
 from .ci_files import UNFINISHED_JUNIT, UNFINISHED_MARKDOWN, junit_xml, markdown_page

@@ -1,4 +1,4 @@
-"""`velodrome check`: run the gated scenarios in every engine, hold them against the baselines."""
+"""`velodrome check`: run the gated scenarios in every engine and compare the results with the baselines."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ BASELINE_VERSION = 1
 _SETTINGS = Path(__file__).parent / "gate.toml"
 
 
-class _Entry(BaseModel):
-    """What a baseline must say of an engine; whatever else it says is kept."""
+class _EngineEntry(BaseModel):
+    """Baseline of one engine, with the fields that the gate needs; further fields are kept."""
 
     model_config = ConfigDict(strict=True, extra="allow", allow_inf_nan=False)
 
@@ -53,7 +53,7 @@ class _Entry(BaseModel):
 
 
 class _Baseline(BaseModel):
-    """A baseline file."""
+    """Baseline file of one scenario."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
@@ -62,20 +62,20 @@ class _Baseline(BaseModel):
     output_rate: float = Gate.model_fields["output_rate"].default
     short_horizon: float = SHORT_HORIZON
     content: dict[str, Any] | None = None
-    engines: dict[str, _Entry]
+    engines: dict[str, _EngineEntry]
 
 
 Chosen = Callable[[str, Mapping[str, Any]], tuple[Engine, Settings]]
 
 
 def gated_names() -> list[str]:
-    """Names of the library's gated scenarios."""
+    """Return the names of the library's gated scenarios."""
     return [name for name in library_names() if GATED_TAG in load_scenario(name)[1].tags]
 
 
 @cache
 def gate_settings() -> dict[str, dict[str, Any]]:
-    """Engines' settings on gated rides, by engine, where a scenario has no others."""
+    """Return the engines' settings on gated rides, by engine, used where a scenario sets no others."""
     return read_toml(_SETTINGS.read_text(encoding="utf-8"))["engines"]
 
 
@@ -90,25 +90,25 @@ def check_gate(
 ) -> tuple[list[tuple[str, Verdict]], dict[str, dict[str, Any]]]:
     """Run the gate.
 
-    Every engine has a verdict on every scenario, but for engines that were not asked for, have no baseline and are
-    not made for the motion: one that exits, breaks or is not judged for any other reason did not run, and fails.
+    Every engine gets a verdict on every scenario, except engines that were not asked for, have no baseline and do not
+    suit the motion. An engine that exits, breaks or is not judged for any other reason counts as not run, and fails.
 
     Parameters
     ----------
     watch : callable
         Called with engine, time reached and duration.
     sources : sequence of str, optional
-        Scenarios, library names or paths; the library's gated ones if not given.
+        Scenarios, by library name or path; the library's gated ones if not given.
     engines : sequence of str, optional
-        Engines to judge; all that are installed or in a baseline if not given.
+        Engines to judge; all that are installed or have a baseline if not given.
     baselines : Path, optional
         Folder of the baselines; the suite's own if not given.
     chosen : callable
         Maps an engine's name and its settings in the scenario to the engine and its settings.
     trace : callable, optional
-        Called with an engine that broke and what it raised.
+        Called with the name of an engine that broke and the exception.
     hold_cpu : bool
-        Whether an engine's CPU time, relative to the reference's, is judged too.
+        Whether to judge also an engine's CPU time relative to the reference's.
 
     Returns
     -------
@@ -119,41 +119,41 @@ def check_gate(
     Raises
     ------
     ScenarioError
-        If a scenario or a baseline is none, or an engine is neither installed nor in a baseline.
+        If a scenario or a baseline is invalid, or an engine is neither installed nor in a baseline.
     """
     folder = BASELINES if baselines is None else baselines
     scenarios = [load_gated(source) for source in (sources or gated_names())]
     known = {name: read_baseline(name, folder, scenario) for name, scenario in scenarios}
-    judged = _to_judge(engines, known)
+    judged = _engines_to_judge(engines, known)
     verdicts: list[tuple[str, Verdict]] = []
     fresh: dict[str, dict[str, Any]] = {}
     for name, scenario in scenarios:
-        held = _hold(name, scenario, judged, known[name], watch, chosen, trace, bool(engines), hold_cpu)
-        verdicts += [(name, verdict) for verdict in [*held.verdicts, *_without_verdict(judged, held)]]
+        results = _judge_scenario(name, scenario, judged, known[name], watch, chosen, trace, bool(engines), hold_cpu)
+        verdicts += [(name, verdict) for verdict in [*results.verdicts, *_missing_verdicts(judged, results)]]
         fresh[name] = {
             VERSION_KEY: BASELINE_VERSION,
             "scenario": name,
-            **_ride(scenario),
+            **_ride_parameters(scenario),
             "content": gated_content(scenario),
             "libraries": library_versions(),
-            "exact_error": held.exact_error,
-            "engines": held.entries,
+            "exact_error": results.exact_error,
+            "engines": results.entries,
         }
     if not verdicts:
-        raise ScenarioError("nothing was judged: no engine and no scenario go together")
+        raise ScenarioError("nothing was judged: none of the engines suits any of the scenarios")
     return verdicts, fresh
 
 
 def load_gated(source: str) -> tuple[str, Scenario]:
-    """Name of a scenario, and the scenario as the gate rides it."""
+    """Return the name of a scenario, and the scenario with the duration and output rate of the gate."""
     name, scenario = load_scenario(source)
     gate = scenario.gate or Gate()
     simulation = Simulation(duration=gate.duration, output_rate=gate.output_rate)
     return name, scenario.model_copy(update={"gate": gate, "simulation": simulation})
 
 
-def _ride(scenario: Scenario) -> dict[str, float]:
-    """How a gated scenario is ridden: what of it a baseline holds for."""
+def _ride_parameters(scenario: Scenario) -> dict[str, float]:
+    """Return the parameters of a gated ride for which a baseline is valid."""
     simulation = scenario.simulation
     return {
         "duration": simulation.duration,
@@ -162,8 +162,8 @@ def _ride(scenario: Scenario) -> dict[str, float]:
     }
 
 
-def _to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Names of the engines to judge; those of a baseline count too: one that is gone did not run."""
+def _engines_to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return the names of the engines to judge, including those of a baseline that are not installed any more."""
     there = installed_engines()
     names = [*there, *sorted({name for entries in known.values() for name in entries} - set(there))]
     for engine in wanted or []:
@@ -173,10 +173,18 @@ def _to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[str, Any
 
 
 @dataclass(frozen=True)
-class _Held:
-    """What came of all engines on one scenario.
+class _ScenarioResults:
+    """Results of all engines on one scenario.
 
-    Verdicts, entries of a new baseline, engines that were passed over, and the exact ride's own error.
+    Attributes
+    ----------
+    verdicts : list of Verdict
+    entries : dict
+        Entries of a new baseline, by engine.
+    passed_over : list of str
+        Engines that were not judged because the motion does not suit them.
+    exact_error : float
+        Error of the exact ride itself, see `velodrome.scenarios.gate.exact.Exact`.
     """
 
     verdicts: list[Verdict]
@@ -185,7 +193,7 @@ class _Held:
     exact_error: float
 
 
-def _hold(
+def _judge_scenario(
     name: str,
     scenario: Scenario,
     engines: Sequence[str],
@@ -195,8 +203,8 @@ def _hold(
     trace: Trace | None,
     asked: bool,
     hold_cpu: bool,
-) -> _Held:
-    """Hold the engines on one scenario against the baseline.
+) -> _ScenarioResults:
+    """Judge the engines on one scenario against the baseline.
 
     An engine that the motion does not suit is passed over, unless it was ``asked`` for or has a baseline.
     """
@@ -205,7 +213,7 @@ def _hold(
         exact = find_exact(start)
     except ScenarioError as error:
         raise ScenarioError(f"{name}: {error}") from error
-    held = _Held([], {}, [], exact.error)
+    results = _ScenarioResults([], {}, [], exact.error)
     for engine_name in engines:
         entry = baseline.get(engine_name)
         try:
@@ -218,21 +226,21 @@ def _hold(
                 scenario.gate or Gate(),
                 engine,
                 settings,
-                watch=partial(_report, watch, engine_name, scenario.simulation.duration),
+                watch=partial(_report_progress, watch, engine_name, scenario.simulation.duration),
                 known_noise=(entry or {}).get("step_noise"),
                 hold_cpu=hold_cpu,
             )
-        except Exception as error:  # an engine that breaks in any way did not run
+        except Exception as error:  # an engine that raises anything counts as not run
             if entry is None and not asked and isinstance(error, UnsuitableProblem):
-                held.passed_over.append(engine_name)
+                results.passed_over.append(engine_name)
                 continue
             own_words = isinstance(error, ScenarioError | UnsuitableProblem)
             why = " ".join(str(error).split()) if own_words else why_failed(error)
-            held.verdicts.append(missing_verdict(engine_name, f"did not run: {why}"))
+            results.verdicts.append(missing_verdict(engine_name, f"did not run: {why}"))
             if trace is not None:
                 trace(engine_name, error)
             continue
-        held.entries[engine_name] = {
+        results.entries[engine_name] = {
             "created": datetime.now(UTC).date().isoformat(),
             "version": found.version,
             "settings": found.settings,
@@ -240,19 +248,21 @@ def _hold(
             "step_noise": found.step_noise,
             "quantities": found.values,
         }
-        run = (found.settings, found.version, found.reasons)
-        held.verdicts.extend(judge_sample(engine_name, found.values, entry, found.limits, *run))
-    return held
+        verdicts = judge_sample(
+            engine_name, found.values, entry, found.limits, found.settings, found.version, found.reasons
+        )
+        results.verdicts.extend(verdicts)
+    return results
 
 
-def _report(watch: RunWatch, engine: str, duration: float, time: float) -> None:
+def _report_progress(watch: RunWatch, engine: str, duration: float, time: float) -> None:
     watch(engine, time, duration)
 
 
-def _without_verdict(engines: Sequence[str], held: _Held) -> list[Verdict]:
-    """Verdicts on engines that should have been judged and were not: nothing that is known of them holds."""
-    judged = {verdict.engine for verdict in held.verdicts if verdict.quantity != CHANGES}
-    expected = [name for name in engines if name not in held.passed_over]
+def _missing_verdicts(engines: Sequence[str], results: _ScenarioResults) -> list[Verdict]:
+    """Return failing verdicts on the engines that should have been judged and were not."""
+    judged = {verdict.engine for verdict in results.verdicts if verdict.quantity != CHANGES}
+    expected = [name for name in engines if name not in results.passed_over]
     return [
         missing_verdict(name, "did not run: none of its quantities was judged")
         for name in expected
@@ -261,20 +271,20 @@ def _without_verdict(engines: Sequence[str], held: _Held) -> list[Verdict]:
 
 
 def gated_content(scenario: Scenario) -> dict[str, Any]:
-    """What of a scenario its motion depends on, as JSON values."""
+    """Return the parts of a scenario that determine its motion, as JSON values."""
     return scenario.model_dump(mode="json", exclude_none=True, include={*OF_THE_MOTION})
 
 
 def read_baseline(name: str, folder: Path | None = None, scenario: Scenario | None = None) -> dict[str, Any]:
-    """Committed entries of a scenario, by engine; empty where there is no baseline.
+    """Return the committed entries of a scenario, by engine; empty where there is no baseline.
 
     Parameters
     ----------
     name : str
-        Of the scenario.
+        Name of the scenario.
     folder : Path, optional
     scenario : Scenario, optional
-        As the gate rides it: the baseline must be of the same ride of the same motion.
+        The scenario as the gate runs it: the baseline must be of the same ride of the same motion.
 
     Raises
     ------
@@ -284,7 +294,7 @@ def read_baseline(name: str, folder: Path | None = None, scenario: Scenario | No
     within = BASELINES if folder is None else folder
     path = within / f"{name}.json"
     if within.exists() and not within.is_dir():
-        raise ScenarioError(f"{within}: is no folder of baselines")
+        raise ScenarioError(f"{within}: is not a folder of baselines")
     if not path.exists():
         return {}
     try:
@@ -301,16 +311,16 @@ def read_baseline(name: str, folder: Path | None = None, scenario: Scenario | No
         raise ScenarioError(f"{path}: not the baseline of {name} but of {show_value(repr(found.scenario))}")
     if scenario is None:
         return data["engines"]
-    for field, value in _ride(scenario).items():
-        if (came := getattr(found, field)) != value:
-            raise ScenarioError(f"{path}: not a baseline of this ride: its {field} is {came!r}, not {value!r}")
+    for field, expected in _ride_parameters(scenario).items():
+        if (value := getattr(found, field)) != expected:
+            raise ScenarioError(f"{path}: not a baseline of this ride: its {field} is {value!r}, not {expected!r}")
     if found.content not in (None, gated_content(scenario)):
         raise ScenarioError(f"{path}: not the baseline of this {name}: its motion, ground or bicycle is another")
     return data["engines"]
 
 
 def refused_verdicts(verdicts: Sequence[tuple[str, Verdict]]) -> list[tuple[str, Verdict]]:
-    """Verdicts on engines that contradict themselves: no baseline is written of their run."""
+    """Return the verdicts on engines that contradict themselves, whose runs are not written to baselines."""
     return [(name, verdict) for name, verdict in verdicts if verdict.quantity in ABSOLUTE and not verdict.passes]
 
 
@@ -320,36 +330,36 @@ def update_baselines(
     reason: str | None = None,
     baselines: Path | None = None,
 ) -> list[Path]:
-    """Write new baselines, with why they were written, and return their paths.
+    """Write new baselines with the reason for the change, and return their paths.
 
-    Engines that were not run, or that are refused (`refused_verdicts`), keep their entries, unless they are not
-    installed any more.
+    Engines that were not run, or that are refused (`refused_verdicts`), keep their entries as long as they are
+    installed.
 
     Parameters
     ----------
     fresh : mapping
     verdicts : sequence of (scenario, Verdict)
-        What the run said of the old baselines.
+        Verdicts of the run against the old baselines.
     reason : str, optional
-        In somebody's words; what moved if not given.
+        Why the baselines are written; a list of what moved if not given.
     baselines : Path, optional
-        Folder, made if need be; the suite's own if not given.
+        Folder, created if needed; the suite's own if not given.
 
     Raises
     ------
     ScenarioError
-        If the folder cannot be made.
+        If the folder cannot be created.
     """
     folder = BASELINES if baselines is None else baselines
     make_folder(folder)
-    paths, there = [], installed_engines()
-    out = {(scenario, verdict.engine) for scenario, verdict in refused_verdicts(verdicts)}
+    paths, installed = [], installed_engines()
+    refused = {(scenario, verdict.engine) for scenario, verdict in refused_verdicts(verdicts)}
     for name, baseline in fresh.items():
-        entries = {engine: entry for engine, entry in baseline["engines"].items() if (name, engine) not in out}
+        entries = {engine: entry for engine, entry in baseline["engines"].items() if (name, engine) not in refused}
         if baseline["engines"] and not entries:
             continue
         moved = [verdict for scenario, verdict in verdicts if scenario == name and verdict.moved]
-        kept = {engine: entry for engine, entry in read_baseline(name, folder).items() if engine in there}
+        kept = {engine: entry for engine, entry in read_baseline(name, folder).items() if engine in installed}
         words = reason or "; ".join(f"{v.engine}: {v.quantity}: {v.status}" for v in moved) or "nothing moved"
         paths.append(folder / f"{name}.json")
         write_json(paths[-1], {**baseline, "reason": words, "engines": kept | entries})

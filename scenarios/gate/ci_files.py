@@ -1,4 +1,4 @@
-"""The gate's verdicts as files for a CI service: JUnit XML and Markdown."""
+"""Write the gate's verdicts as files for a CI service: JUnit XML and Markdown."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...reports.drawing import escape_markdown, make_printable
 from .verdict import Verdict
 
 Verdicts = Sequence[tuple[str, Verdict]]
-# What a reader must see first.
+# Order of the statuses in the Markdown page.
 _WORST_FIRST = ("missing", "worse", "changed", "better", "holds", "shown")
 
 
@@ -28,7 +28,7 @@ UNFINISHED_JUNIT = """\
 
 
 def junit_xml(verdicts: Verdicts) -> str:
-    """JUnit XML: a test suite a scenario, a test case a quantity of an engine.
+    """Return JUnit XML with a test suite per scenario and a test case per quantity of an engine.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def _counts(verdicts: Verdicts) -> dict[str, str]:
 
 
 def markdown_page(verdicts: Verdicts) -> str:
-    """Markdown for a summary: the outcome, what moved, then all quantities, the worst first.
+    """Return Markdown for a summary: the outcome, what moved, then all quantities, the worst first.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def markdown_page(verdicts: Verdicts) -> str:
     judged = sum(verdict.status != "shown" for _, verdict in verdicts)
     lines = [f"# Drift gate: {'holds' if passes else 'fails'}", "", f"{held} of {judged} quantities hold.", ""]
     ordered = sorted(verdicts, key=lambda item: _WORST_FIRST.index(item[1].status))
-    moved = [(name, one) for name, one in ordered if one.told]
+    moved = [(name, verdict) for name, verdict in ordered if verdict.told]
     for name, verdict in moved:
         reason = escape_markdown(verdict.reason)
         who = escape_markdown(f"{name}, {verdict.engine}")

@@ -1,4 +1,4 @@
-"""What a gated ride is measured against: the exact motion, or the reference's precise ride with its known error."""
+"""The rides against which gated rides are measured: the exact motion, or the reference's ride with its known error."""
 
 from __future__ import annotations
 
@@ -15,34 +15,34 @@ from ...reports.measure import Scale, relative_differences, state_error, steady_
 from ..error import ScenarioError
 from ..scenario import Start
 
-# Of the reference's step: an eighth-order method's error is a tenth at 3/4 of it.
-_FINER = 0.75
-# Of the reference's ride, some milliseconds each: the least CPU time of so many is its cost.
+# Factor on the reference's step for the finer ride: the error of a method of order 8 is a tenth at 3/4 of the step.
+_FINER_STEP = 0.75
+# Number of the reference's rides, some milliseconds each, of which the least CPU time counts.
 _CPU_REPEATS = 5
-# Equal to the last bit in a few samples may be chance where hardly anything changes.
-_MANY_SAMPLES = 10
+# Least number of samples: in fewer, where hardly anything changes, equality to the last bit may be chance.
+_LEAST_SAMPLES = 10
 
 
 @dataclass(frozen=True)
 class Exact:
-    """What is known of a gated ride.
+    """Exact ride of a gated scenario, and what is known about it.
 
     Attributes
     ----------
     trajectory : Trajectory
-        The ride that engines are measured against.
+        The ride against which engines are measured.
     error : float
         Its own largest error, relative to the motion's sizes as in
-        `velodrome.reports.measure.inspection.relative_differences`; 0 for a motion in closed form, whose start alone
-        has an error.
+        `velodrome.reports.measure.inspection.relative_differences`; 0 for a motion in closed form, where only the
+        start has an error.
     computed : tuple of Trajectory
-        The reference's rides, at its own settings and at finer ones.
+        The reference's rides at its own settings and at finer ones.
     round_off : Trajectory
         The reference's ride from a start in which every number is one unit in the last place larger.
     cpu_time : float
-        Of the reference's ride [s].
+        CPU time of the reference's ride [s].
     borders : int
-        Borders between the pieces of a ground of splines that the wheels cross.
+        Number of borders between the pieces of a ground of splines that the wheels cross.
     """
 
     trajectory: Trajectory
@@ -53,25 +53,25 @@ class Exact:
     borders: int
 
     def is_copied_by(self, trajectory: Trajectory, scale: Scale) -> bool:
-        """Whether a ride is one of the reference's, to the bit or but for noise.
+        """Return whether a ride is one of the reference's, up to round-off.
 
-        An engine that integrates by itself rounds its start to its own coordinates and every step after it. So its ride
-        differs from the reference's by more than what one unit in the last place of the start alone, rounded only once,
-        makes of the reference's own ride: what is closer was not integrated.
+        An engine that integrates by itself rounds its start to its own coordinates and rounds in every step after it.
+        Its ride therefore differs from the reference's by more than the reference's own ride changes by one unit in the
+        last place of the start alone. A ride that is closer was not integrated.
         """
         n = len(trajectory.time)
-        if n < _MANY_SAMPLES:
+        if n < _LEAST_SAMPLES:
             return False
         least = state_error(self.round_off.first(n), self.computed[0], scale)
-        return any(state_error(trajectory, one, scale) <= least for one in self.computed)
+        return any(state_error(trajectory, ride, scale) <= least for ride in self.computed)
 
 
 def find_exact(start: Start) -> Exact:
-    """Find what the engines' rides from a start are measured against.
+    """Return the ride against which the engines' rides from a start are measured.
 
-    An undisturbed circular motion is known in closed form. Of any other ride the reference's at a tenth of its
-    tolerance is taken; its error is at most what the tenfold tolerance or one unit in the last place of the start
-    changes, whichever is more.
+    An undisturbed circular motion is known in closed form. For any other ride, the exact ride is the reference's at a
+    tenth of its tolerance. Its error is at most the change by the tenfold tolerance or by one unit in the last place of
+    the start, whichever is larger.
 
     Raises
     ------
@@ -80,41 +80,48 @@ def find_exact(start: Start) -> Exact:
     """
     engine, problem = load_engine(REFERENCE), start.problem
     own = engine.settings()
-    rides = [_precise(problem, own) for _ in range(_CPU_REPEATS)]
-    finer = _precise(problem, own.refined(_FINER))
-    above = 1 + 2.0**-52
-    shifted = _precise(replace(problem, q=above * problem.q, qd=above * problem.qd), own)
-    cpu_time = min(one.cpu_time for one in rides)
+    rides = [_ride_reference(problem, own) for _ in range(_CPU_REPEATS)]
+    finer = _ride_reference(problem, own.refined(_FINER_STEP))
+    rounded_up = 1 + 2.0**-52
+    shifted = _ride_reference(replace(problem, q=rounded_up * problem.q, qd=rounded_up * problem.qd), own)
+    cpu_time = min(ride.cpu_time for ride in rides)
     if start.motion is not None and all(map(np.array_equal, (problem.q, problem.qd), start.undisturbed)):
         trajectory, error = steady_trajectory(problem.bicycle, start.motion, problem.times), 0.0
     else:
         scale = scale_of(start)
-        changes = [relative_differences(one, rides[0], scale) for one in (finer, shifted)]
+        changes = [relative_differences(ride, rides[0], scale) for ride in (finer, shifted)]
         trajectory, error = finer, max(float(np.abs(change).max()) for change in changes)
     borders = _borders_crossed(problem.surface, rides[0])
-    return Exact(trajectory, error, (rides[0], finer), shifted, cpu_time, borders)
+    return Exact(
+        trajectory=trajectory,
+        error=error,
+        computed=(rides[0], finer),
+        round_off=shifted,
+        cpu_time=cpu_time,
+        borders=borders,
+    )
 
 
 def _borders_crossed(surface: Surface, trajectory: Trajectory) -> int:
-    """Borders between pieces of the ground that the wheels' contacts cross from sample to sample."""
+    """Return the number of borders between pieces of the ground that the wheels' contacts cross between samples."""
     assert trajectory.contact_point is not None
-    across = trajectory.contact_point[..., :2]
+    points = trajectory.contact_point[..., :2]
     if isinstance(surface, HeightField):
-        piece = np.floor((across - surface.origin) / surface.spacing)
+        piece = np.floor((points - surface.origin) / surface.spacing)
     elif isinstance(surface, SplineProfile):
-        piece = np.searchsorted(surface.radii, np.hypot(across[..., 0], across[..., 1]))
+        piece = np.searchsorted(surface.radii, np.hypot(points[..., 0], points[..., 1]))
     else:
         return 0
     return int(np.abs(np.diff(piece, axis=0)).sum())
 
 
 def scale_of(start: Start) -> Scale:
-    """Sizes of the motion that a ride starts with."""
+    """Return the sizes of the motion on which a ride starts."""
     problem = start.problem
     return Scale.of(problem.bicycle, problem.qd, start.size, start.growth_rate, float(problem.times[-1]))
 
 
-def _precise(problem: Problem, settings: Settings) -> Trajectory:
+def _ride_reference(problem: Problem, settings: Settings) -> Trajectory:
     trajectory = ride_engine(load_engine(REFERENCE), problem, settings, lambda _: None)
     if trajectory.ended is not None:
         raise ScenarioError(f"the reference ends at {trajectory.time[-1]:.6g} s: {trajectory.ended}")

@@ -1,4 +1,4 @@
-"""What one engine measures on one gated scenario, and by how much each quantity may move."""
+"""Measure one engine on one gated scenario, with the limits by which each quantity may move."""
 
 from __future__ import annotations
 
@@ -47,35 +47,34 @@ from .exact import Exact, scale_of
 from .verdict import BELOW_NOISE, HELD_CPU, RIDE_QUANTITIES, SHOWN
 
 FoundEigenvalues = dict[str, tuple[float | None, float | None]]  # value and limit by quantity
-Measured = tuple[FoundEigenvalues, dict[str, str]]  # and why there is no value
+Measured = tuple[FoundEigenvalues, dict[str, str]]  # with the reasons for missing values, by quantity
 
 EIGENVALUE_QUANTITIES = ("eigenvalue_error", "growth_rate_error")
-SHORT_HORIZON = 1.0  # of the first error and of the order [s]
-# Of the order: coarser steps than the settings' own, whose errors stand further above noise, and an interval that
-# four steps of common sizes divide [s].
+SHORT_HORIZON = 1.0  # duration over which the first error and the order are measured [s]
+# Factors on the settings' own step for the order: the errors of coarser steps are further above noise.
 FACTORS = (4.0, 2.0, 1.0)
-ORDER_INTERVAL = 0.2
-# Rides of an engine and of the reference in turn, where CPU time is held, and what the median of their ratios may
-# grow by: of 29 engines and scenarios the medians of six runs lay within a factor of 1.7, with four jobs a core beside
-# them.
+ORDER_INTERVAL = 0.2  # output interval for the order, which four steps of common sizes divide [s]
+# Number of pairs of rides, of the engine and the reference in turn, where CPU time is judged; and the factor by which
+# the median of their ratios may grow. In 29 pairs of engine and scenario the medians of six runs lay within a factor of
+# 1.7, with four jobs per core running beside them.
 _CPU_PAIRS = 7
 CPU_FACTOR = 2.0
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One engine on one gated scenario.
+    """Measurements of one engine on one gated scenario.
 
     Attributes
     ----------
     values, limits : dict
-        By quantity; None where the engine does not give it, or no figure could be told from noise.
+        By quantity; None where the engine does not give it, or where it cannot be told from noise.
     reasons : dict
-        Why there is no figure, by quantity.
+        Why a value is missing, by quantity.
     steps : int
-        Of the ride.
+        Steps of the ride.
     step_noise : float
-        As the engine has it with these settings.
+        The engine's own, with these settings.
     version : str
     settings : dict
         JSON values.
@@ -102,32 +101,32 @@ def take_sample(
 ) -> Sample:
     """Run an engine on a gated scenario and measure it against the exact ride.
 
-    Contacts, poses and energies are those that follow from its coordinates; what it reports of them must agree. An
-    engine that falls is measured up to its fall; it has no order and no eigenvalues.
+    Contacts, poses and energies are those that follow from its coordinates; its reports of them must agree with
+    these. An engine that falls is measured up to its fall, and has no order and no eigenvalues.
 
     Parameters
     ----------
     start : Start
     exact : Exact
-        Of this start, by `velodrome.scenarios.gate.exact.find_exact`.
+        Exact ride from this start, by `velodrome.scenarios.gate.exact.find_exact`.
     gate : Gate
-        What to measure beside the ride.
+        What to measure in addition to the ride.
     engine : Engine
     settings : Settings
     watch : callable
         Called with the simulated time reached in the ride.
     known_noise : float, optional
-        The step noise of the baseline: an engine that has become noisier has no more room for it.
+        Step noise of the baseline; an engine that claims more gets no wider limits for it.
     hold_cpu : bool
-        Whether to measure CPU time so well that it can be judged, which takes some rides more.
+        Whether to measure CPU time precisely enough to be judged, which takes some more rides.
 
     Raises
     ------
     UnsuitableProblem
-        If the engine is not made for such a motion.
+        If the motion does not suit the engine.
     EngineError, ValueError
-        If the engine does not run, neither falls nor comes to the end, gives what is not finite, has steps that did
-        not converge, or returns the reference's own trajectory.
+        If the engine does not run, neither falls nor reaches the end, gives values that are not finite, has steps that
+        did not converge, or returns the reference's own trajectory.
     """
     problem = start.problem
     engine.check(problem, settings)
@@ -151,58 +150,69 @@ def take_sample(
     scale = replace(scale_of(start), duration=float(standing.time[-1]))
     if engine.name != REFERENCE and exact.is_copied_by(standing, scale):
         raise EngineError("it returned the reference's own trajectory")
-    # As many steps as the part that is measured took.
+    # Number of steps in the measured part of the ride.
     steps = trajectory.steps * scale.duration / float(trajectory.time[-1])
     reports = find_mismatches(reported, standing, exact.trajectory, start.size, step_noise)
-    values = _ride_values(start, reported, standing, exact.trajectory, scale) | {
+    values = _measure_ride(start, reported, standing, exact.trajectory, scale) | {
         "report_mismatch": max(report.share for report in reports),
         "fell_at": fall,
         "steps": steps,
         "cpu_ratio": _ratio(trajectory.cpu_time, exact.cpu_time),
     }
-    left = exact.error + noise(scale, step_noise, trajectory.steps, fall is not None)
+    error = exact.error + noise(scale, step_noise, trajectory.steps, fall is not None)
     force = step_force(scale, step_noise, scale.duration / steps) if steps > 0 else 0.0
-    limits: dict[str, float | None] = dict(ride_limits(scale, left, force, exact.borders))
+    limits: dict[str, float | None] = dict(ride_limits(scale, error, force, exact.borders))
     if hold_cpu:
-        cost = _cpu_ratio(engine, problem, settings)
-        values[HELD_CPU] = cost
-        limits[HELD_CPU] = None if cost is None else (1 - 1 / CPU_FACTOR) * cost
-    reasons = _disagreement(reports)
+        cpu_ratio = _measure_cpu_ratio(engine, problem, settings)
+        values[HELD_CPU] = cpu_ratio
+        limits[HELD_CPU] = None if cpu_ratio is None else (1 - 1 / CPU_FACTOR) * cpu_ratio
+    reasons = _describe_disagreement(reports)
     further: list[Measured] = []
     if fall is None and gate.order:
-        further.append(_measured(("observed_order",), lambda: _order(start, engine, settings, step_noise)))
+        further.append(
+            _measure_safely(("observed_order",), lambda: _measure_order(start, engine, settings, step_noise))
+        )
     if fall is None and gate.eigenvalues and start.motion is not None:
         rate = trajectory.steps / scale.duration
         further.append(
-            _measured(EIGENVALUE_QUANTITIES, lambda: (_eigenvalues(start, engine, settings, rate, step_noise), {}))
+            _measure_safely(
+                EIGENVALUE_QUANTITIES, lambda: (_measure_eigenvalues(start, engine, settings, rate, step_noise), {})
+            )
         )
     for part, why in further:
         values |= {name: value for name, (value, _) in part.items()}
         limits |= {name: limit for name, (_, limit) in part.items()}
         reasons |= why
     values = {name: value if value is not None and np.isfinite(value) else None for name, value in values.items()}
-    shown = settings.model_dump(mode="json")
-    return Sample(values, limits, reasons, trajectory.steps, own_noise, engine.version, shown)
+    return Sample(
+        values=values,
+        limits=limits,
+        reasons=reasons,
+        steps=trajectory.steps,
+        step_noise=own_noise,
+        version=engine.version,
+        settings=settings.model_dump(mode="json"),
+    )
 
 
-def _disagreement(reports: Sequence[Mismatch]) -> dict[str, str]:
-    """Why the reports of an engine do not agree with its coordinates; none where they do."""
+def _describe_disagreement(reports: Sequence[Mismatch]) -> dict[str, str]:
+    """Return why the reports of an engine do not agree with its coordinates; empty where they do."""
     lines = [describe_mismatch(report.as_json()) for report in reports if not report.holds]
     return {"report_mismatch": "; ".join(lines)} if lines else {}
 
 
-def _measured(names: Sequence[str], measure: Callable[[], Measured]) -> Measured:
-    """What a further measurement finds; an engine that breaks in it has no such figures, but keeps its ride's."""
+def _measure_safely(names: Sequence[str], measure: Callable[[], Measured]) -> Measured:
+    """Return a further measurement; an engine that breaks in it gets no values there but keeps those of its ride."""
     try:
         return measure()
-    except Exception as error:  # an engine that rode may still break at other steps or from other starts
+    except Exception as error:  # an engine that finished its ride may still break at other steps or from other starts
         return dict.fromkeys(names, (None, None)), dict.fromkeys(names, why_failed(error))
 
 
-def _ride_values(
+def _measure_ride(
     start: Start, reported: Trajectory, standing: Trajectory, exact: Trajectory, scale: Scale
 ) -> dict[str, float | None]:
-    """Quantities of the part of a ride that is standing, as reported and as it follows from its coordinates."""
+    """Return the quantities of a ride before its fall, as reported and as they follow from the coordinates."""
     measured = measure_one(start, reported, exact, followed=standing)
     errors = position_errors(standing, exact)
     found = measured | {
@@ -216,17 +226,17 @@ def _ride_values(
 
 
 def _required_friction(standing: Trajectory, surface: Surface) -> float | None:
-    """Coefficient of friction that an engine's own contact forces need; None where it gives none."""
+    """Return the coefficient of friction that an engine's own contact forces need; None where it gives none."""
     return None if standing.contact_force is None else float(required_friction(standing, surface).max())
 
 
-def _cpu_ratio(engine: Engine, problem: Problem, settings: Settings) -> float | None:
-    """CPU time relative to the reference's: the median of several pairs of rides in turn."""
+def _measure_cpu_ratio(engine: Engine, problem: Problem, settings: Settings) -> float | None:
+    """Return the CPU time relative to the reference's: the median over several pairs of rides in turn."""
     reference = load_engine(REFERENCE)
     pairs = []
     for _ in range(_CPU_PAIRS):
-        ours = ride_engine(reference, problem, reference.settings(), lambda _: None).cpu_time
-        pairs.append(_ratio(ride_engine(engine, problem, settings, lambda _: None).cpu_time, ours))
+        reference_time = ride_engine(reference, problem, reference.settings(), lambda _: None).cpu_time
+        pairs.append(_ratio(ride_engine(engine, problem, settings, lambda _: None).cpu_time, reference_time))
     ratios = [ratio for ratio in pairs if ratio is not None]
     return float(np.median(ratios)) if ratios else None
 
@@ -235,37 +245,39 @@ def _ratio(time: float, reference: float) -> float | None:
     return time / reference if reference > 0 else None
 
 
-def _order(start: Start, engine: Engine, settings: Settings, step_noise: float) -> Measured:
-    """Order of convergence over the short horizon with its limit, or why there is none."""
+def _measure_order(start: Start, engine: Engine, settings: Settings, step_noise: float) -> Measured:
+    """Return the order of convergence over the short horizon with its limit, or why there is none."""
     short = replace(start.problem, times=ORDER_INTERVAL * np.arange(round(SHORT_HORIZON / ORDER_INTERVAL) + 1))
     none: FoundEigenvalues = {"observed_order": (None, None)}
     try:
-        ladder = [settings.refined(factor) for factor in FACTORS]
-        rides = [ride_engine(engine, short, refined, lambda _: None) for refined in ladder]
-    except ValueError as error:  # settings without a step, or of a step at the end of its range or beside the interval
+        refined_settings = [settings.refined(factor) for factor in FACTORS]
+        rides = [ride_engine(engine, short, refined, lambda _: None) for refined in refined_settings]
+    except ValueError as error:  # settings without a step, or a step out of range or off the interval
         return none, {"observed_order": " ".join(str(error).split())}
-    for one, factor in zip(rides, FACTORS, strict=True):
-        if one.ended is not None:
-            return none, {"observed_order": f"with {factor:g} times its step it ended: {one.ended}"}
-    if any(np.array_equal(one.q, other.q) for one, other in pairwise(rides)):
+    for ride, factor in zip(rides, FACTORS, strict=True):
+        if ride.ended is not None:
+            return none, {"observed_order": f"with {factor:g} times its step it ended: {ride.ended}"}
+    if any(np.array_equal(coarse.q, fine.q) for coarse, fine in pairwise(rides)):
         return none, {"observed_order": SAME_BITS}
-    samples = min(len(one.time) for one in rides)
-    paths = [one.q[:samples, :3] for one in rides]
-    first, second = (float(np.abs(b - a).max()) for a, b in pairwise(paths))
+    samples = min(len(ride.time) for ride in rides)
+    paths = [ride.q[:samples, :3] for ride in rides]
+    first, second = (float(np.abs(fine - coarse).max()) for coarse, fine in pairwise(paths))
     scale = replace(scale_of(start), duration=float(short.times[-1]))
     # The finest ride has the most steps.
-    error = scale.radius * noise(scale, step_noise, rides[-1].steps)
-    limit = order_limit(error, (first, second))
+    round_off = scale.radius * noise(scale, step_noise, rides[-1].steps)
+    limit = order_limit(round_off, (first, second))
     if limit is None:
         return none, {"observed_order": BELOW_NOISE}
     return {"observed_order": (observed_orders(paths)[-1], limit)}, {}
 
 
-def _eigenvalues(start: Start, engine: Engine, settings: Settings, rate: float, step_noise: float) -> FoundEigenvalues:
-    """How far the engine's own eigenvalues are from the reference's, at ``rate`` steps a second.
+def _measure_eigenvalues(
+    start: Start, engine: Engine, settings: Settings, rate: float, step_noise: float
+) -> FoundEigenvalues:
+    """Return the errors of the engine's own eigenvalues, from rides with ``rate`` steps per second.
 
-    Those that decay within the interval of the flow from which they are measured are left out: little is left of
-    them.
+    Eigenvalues that decay within the interval of the flow from which they are measured are left out, because little of
+    their motion is left in the flow.
     """
     problem = start.problem
     motion = Problem(problem.bicycle, problem.surface, *start.undisturbed, problem.times)

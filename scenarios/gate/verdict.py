@@ -1,8 +1,8 @@
-"""The drift gate: what engines measure on a gated scenario against their baselines, and the verdict.
+"""Judge what engines measure on a gated scenario against their baselines.
 
-A baseline holds what each engine measured against the exact ride; what it may move by is derived in
-`velodrome.reports.measure.limits`. Drift rates are held with their signs, and a move to smaller values is
-no excuse while version and settings are the baseline's: a fault may well cancel part of an engine's own error.
+A baseline holds what each engine measured against the exact ride; the limits of changes are derived in
+`velodrome.reports.measure.limits`. Drift rates are compared with their signs, and a move to smaller values also fails
+as long as version and settings are the baseline's: a fault may cancel part of an engine's own error.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-# Of a ride, in the order shown.
+# Quantities of a ride, in the order of the table.
 RIDE_QUANTITIES = (
     "short_error",
     "position_error",
@@ -31,25 +31,25 @@ RIDE_QUANTITIES = (
     "steps",
 )
 
-# Shown beside them: the friction follows from the forces, which are judged; the CPU time, relative to the reference's
-# in the same run, depends on the machine.
+# Shown in addition, but not judged: the friction follows from the forces, which are judged; the CPU time, relative to
+# the reference's in the same run, depends on the machine.
 SHOWN = ("required_friction", "cpu_ratio")
 
-# Why an order may not be seen; of another version that is an improvement.
+# Why an order may be missing; with another version this counts as an improvement.
 BELOW_NOISE = "the errors of its steps cannot be told from what its iterations leave"
 
-CHANGES = "settings"  # under which other settings or another version are told, whatever they do
+CHANGES = "settings"  # quantity under which a change of settings or version is reported
 
-# Held against a limit of its own, whatever the baseline says: no engine may contradict itself.
+# Judged against limits of their own, without the baseline: no engine may contradict itself.
 ABSOLUTE = ("report_mismatch",)
 
-# Of these more is better; of all others, less in size.
+# Quantities of which more is better; of all others, less in size is better.
 _MORE_IS_BETTER = ("fell_at", "observed_order")
-# Another number of steps is another computation, be it better or worse.
+# A change in either direction is neither better nor worse: it means another computation.
 _NEITHER = ("steps",)
-# Judged only if asked for: the CPU time of several rides, relative to the reference's.
+# Judged only on request: the CPU time of several rides, relative to the reference's.
 HELD_CPU = "held_cpu_ratio"
-# Less of it hides no fault.
+# Quantities whose decrease never fails, because it hides no fault.
 _NEVER_TOO_SMALL = (HELD_CPU,)
 
 
@@ -80,28 +80,28 @@ class Verdict:
 
     @property
     def passes(self) -> bool:
-        """Whether the gate stays open."""
+        """Whether the verdict lets the gate pass."""
         return self.status in ("holds", "better", "shown")
 
     @property
     def moved(self) -> bool:
-        """Whether it was judged and does not hold."""
+        """Whether the quantity was judged and does not hold."""
         return self.status not in ("holds", "shown")
 
     @property
     def told(self) -> bool:
-        """Whether a reader is told of it in words: of what moved, and of other settings or another version."""
+        """Whether to report it in words: whatever moved, and a change of settings or version."""
         return self.moved or self.quantity == CHANGES
 
     @property
     def share(self) -> float | None:
-        """How far the value moved, in limits; None where there is nothing to compare."""
+        """Change of the value relative to its limit; None where there is nothing to compare."""
         if self.value is None or self.baseline is None or not self.limit:
             return None
         return abs(self.value - self.baseline) / self.limit
 
     def as_json(self) -> dict[str, Any]:
-        """Fields as JSON values."""
+        """Return the fields as JSON values."""
         return asdict(self) | {"passes": self.passes}
 
 
@@ -114,7 +114,7 @@ def judge_sample(
     version: str,
     reasons: Mapping[str, str] | None = None,
 ) -> list[Verdict]:
-    """Hold an engine's quantities against its baseline.
+    """Judge an engine's quantities against its baseline.
 
     Parameters
     ----------
@@ -124,9 +124,9 @@ def judge_sample(
     baseline : mapping or None
         The engine's entry: ``quantities``, ``settings``, ``version``, and where known the date ``created``.
     allowed : mapping
-        Limits by quantity; None where this run cannot tell the quantity.
+        Limits by quantity; None where this run cannot determine the quantity.
     settings, version
-        Of this run, to explain a change.
+        Those of this run, to explain a change.
     reasons : mapping, optional
         Why this run does not give a quantity.
 
@@ -134,11 +134,11 @@ def judge_sample(
     -------
     list of Verdict
     """
-    absolute = [_absolute(engine, name, values, allowed, reasons or {}) for name in ABSOLUTE if name in allowed]
+    absolute = [_judge_absolute(engine, name, values, allowed, reasons or {}) for name in ABSOLUTE if name in allowed]
     if baseline is None:
         without = missing_verdict(engine, "no baseline; velodrome check --update writes one")
         return [without, *(verdict for verdict in absolute if not verdict.passes)]
-    changes = _changes(baseline, settings, version)
+    changes = _describe_changes(baseline, settings, version)
     stored = " ".join(["the baseline", *(["of " + baseline["created"]] if "created" in baseline else [])])
     since = f"since {stored}: {changes}" if changes else f"same version and settings as {stored}"
     verdicts = [Verdict(engine, CHANGES, None, None, None, "holds", since)] if changes else []
@@ -148,9 +148,9 @@ def judge_sample(
             continue
         value, before = values.get(quantity), baseline["quantities"].get(quantity)
         if value is None and before is None:
-            continue  # the engine cannot give it, and never could
+            continue  # the engine does not give this quantity and did not give it before
         if quantity == "fell_at" and (value is None or before is None):
-            verdicts.append(_fall(engine, value, before, since, excused=bool(changes)))
+            verdicts.append(_judge_fall(engine, value, before, since, excused=bool(changes)))
             continue
         if value is None or before is None or limit is None:
             why = (reasons or {}).get(quantity, "not given by this run")
@@ -158,31 +158,31 @@ def judge_sample(
             status = "better" if why == BELOW_NOISE and before is not None and changes else "missing"
             verdicts.append(Verdict(engine, quantity, value, before, limit, status, f"{reason}; {since}"))
             continue
-        status = _status(quantity, value, before, limit, excused=bool(changes))
+        status = _find_status(quantity, value, before, limit, excused=bool(changes))
         move = f"{before:.6g} -> {value:.6g}, limit {limit:.2g}"
         reason = move if status == "holds" else f"{move}; {since}"
         verdicts.append(Verdict(engine, quantity, value, before, limit, status, reason))
     return verdicts + [
-        _shown(engine, quantity, value, baseline["quantities"].get(quantity))
+        _show_unjudged(engine, quantity, value, baseline["quantities"].get(quantity))
         for quantity in SHOWN
         if quantity not in allowed and (value := values.get(quantity)) is not None
     ]
 
 
-def _shown(engine: str, quantity: str, value: float, before: float | None) -> Verdict:
-    """Verdict on a quantity that is not judged: it passes."""
+def _show_unjudged(engine: str, quantity: str, value: float, before: float | None) -> Verdict:
+    """Return the verdict on a quantity that is not judged, which passes."""
     reason = f"{value:.3g}" if before is None else f"{before:.3g} -> {value:.3g}"
     return Verdict(engine, quantity, value, before, None, "shown", f"{reason}, not judged")
 
 
-def _absolute(
+def _judge_absolute(
     engine: str,
     quantity: str,
     values: Mapping[str, float | None],
     allowed: Mapping[str, float | None],
     reasons: Mapping[str, str],
 ) -> Verdict:
-    """Verdict on a quantity that must be within its limit of zero."""
+    """Return the verdict on a quantity that must lie within its limit of zero, whatever the baseline."""
     value, limit = values.get(quantity), allowed[quantity]
     if value is None or limit is None:
         why = reasons.get(quantity, "not given by this run")
@@ -192,8 +192,8 @@ def _absolute(
     return Verdict(engine, quantity, value, None, limit, status, reason)
 
 
-def _fall(engine: str, value: float | None, before: float | None, since: str, excused: bool) -> Verdict:
-    """Verdict where the bicycle fell in one of the two runs only."""
+def _judge_fall(engine: str, value: float | None, before: float | None, since: str, excused: bool) -> Verdict:
+    """Return the verdict where the bicycle fell in only one of the two runs."""
     if value is not None:
         return Verdict(engine, "fell_at", value, before, None, "worse", f"falls at {value:.6g} s; {since}")
     return Verdict(
@@ -201,29 +201,29 @@ def _fall(engine: str, value: float | None, before: float | None, since: str, ex
     )
 
 
-def _status(quantity: str, value: float, before: float, limit: float, excused: bool) -> str:
-    """Status of a value; ``excused`` where another version or other settings may have improved it."""
+def _find_status(quantity: str, value: float, before: float, limit: float, excused: bool) -> str:
+    """Return the status of a value; ``excused`` where another version or other settings may have improved it."""
     if abs(value - before) <= limit or (quantity in _NEVER_TOO_SMALL and value < before):
         return "holds"
     if quantity in _NEITHER:
         return "changed"
-    # At a finite step an order is a whole number and what the next power adds, which another version may change.
+    # At a finite step an order is a whole number plus the effect of the next power, which another version may change.
     if quantity == "observed_order" and excused and round(value) == round(before):
         return "holds"
     growth = (abs(value) - abs(before)) * (-1 if quantity in _MORE_IS_BETTER else 1)
-    # Not "larger than": a value that is no number is no improvement.
+    # Not "larger than": NaN is no improvement.
     if not growth <= limit:
         return "worse"
     return "better" if excused and growth < -limit else "changed"
 
 
 def missing_verdict(engine: str, reason: str) -> Verdict:
-    """Verdict on an engine that gives nothing to judge: it fails."""
+    """Return the failing verdict on an engine that gives nothing to judge."""
     return Verdict(engine, "run", None, None, None, "missing", reason)
 
 
-def _changes(baseline: Mapping[str, Any], settings: Mapping[str, Any], version: str) -> str:
-    """Version and settings that differ from the baseline's, in words; empty where none does."""
+def _describe_changes(baseline: Mapping[str, Any], settings: Mapping[str, Any], version: str) -> str:
+    """Return the changes of version and settings since the baseline in words; empty where there are none."""
     found = []
     if baseline["version"] != version:
         found.append(f"version {baseline['version']} -> {version}")

@@ -154,7 +154,8 @@ def follow_flat_end(equations: Steady, unknowns: np.ndarray, nearest: float) -> 
         If the motion is lost on the way.
     """
     chosen, side = with_angle(unknowns), float(np.sign(unknowns[LEAN]))
-    distance, constants, rate = float(np.pi / 2 - side * chosen[LEAN]), [], 0.0
+    distance, rate = float(np.pi / 2 - side * chosen[LEAN]), 0.0
+    constants: list[float] = []
     while distance > nearest or len(constants) < 2:
         distance /= 4
         chosen = solve_flat(equations, chosen, at_lean(side * (np.pi / 2 - distance)))

@@ -54,7 +54,8 @@ def find_limit(equations: Steady, ends: Sequence[np.ndarray], side: int) -> Flat
     distance = np.pi / 2 - side * unknowns[LEAN]
     if distance > 1:
         raise ValueError("the curve has no flat end there")
-    rows, residual = [], 0.0
+    rows: list[tuple[float, float, float, float]] = []
+    residual = 0.0
     while distance > _NEAREST or len(rows) < 3:
         distance /= 2
         condition = unknown_condition(LEAN, side * (np.pi / 2 - distance))

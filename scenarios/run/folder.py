@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -14,7 +14,7 @@ from ...reference.surface import SurfaceOfRevolution
 from ...reports.drawing import make_summary
 from ..error import ScenarioError
 from ..files import write_sealed, write_text
-from ..scenario import Scenario, Start
+from ..scenario import Scenario, Start, resolve_scenario
 from .machine import describe_machine, find_commit
 
 LIBRARIES = ("velodrome", "numpy", "scipy", "numba", "exudyn", "mujoco", "rerun-sdk", "pyarrow", "jinja2")
@@ -60,27 +60,9 @@ def new_folder(out: Path, name: str) -> Path:
     raise ScenarioError(f"{out}: too many runs of {name} in one second")
 
 
-def resolve_scenario(plan: RunPlan) -> Scenario:
-    """The scenario of a plan with nothing left open: the bicycle's numbers, and all settings of engines that ride.
-
-    What other engines' tables say stays as it is.
-    """
-    engines = dict(plan.scenario.engines)
-    for name, (_, settings) in plan.engines.items():
-        values = settings.model_dump(mode="json", exclude_none=True)
-        if not _has_none(values):
-            engines[name] = values
-    bicycle = asdict(plan.scenario.make_bicycle())
-    return plan.scenario.model_copy(update={"bicycle": bicycle, "engines": engines})
-
-
-def _has_none(value: Any) -> bool:
-    """Whether TOML cannot say a value: it has no word for nothing."""
-    if isinstance(value, Mapping):
-        return any(_has_none(item) for item in value.values())
-    if isinstance(value, list):
-        return any(_has_none(item) for item in value)
-    return value is None
+def resolve_plan(plan: RunPlan) -> Scenario:
+    """The scenario of a plan with nothing left open: all parameters, and all settings of engines that ride."""
+    return resolve_scenario(plan.scenario, {name: settings for name, (_, settings) in plan.engines.items()})
 
 
 def write_manifest(

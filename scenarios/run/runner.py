@@ -28,7 +28,7 @@ from ..scenario import (
     make_start,
     refuse_engine,
 )
-from .folder import RUN_VERSION, RunPlan, new_folder, resolve_scenario, write_manifest, write_page, write_run_recording
+from .folder import RUN_VERSION, RunPlan, new_folder, resolve_plan, write_manifest, write_page, write_run_recording
 from .installed import installed_engines
 
 # (engine, simulated time reached, duration)
@@ -180,7 +180,7 @@ def store_run(
     See `run_plan` for the parameters.
     """
     folder = new_folder(out, plan.name)
-    write_text(folder / "scenario.toml", tomli_w.dumps(resolve_scenario(plan).model_dump(exclude_none=True)))
+    write_text(folder / "scenario.toml", tomli_w.dumps(resolve_plan(plan).model_dump(exclude_none=True)))
     write_manifest(folder, plan, {}, {})
 
     def store(name: str, rides: Rides) -> None:

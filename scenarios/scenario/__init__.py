@@ -2,6 +2,8 @@
 
 from .bicycle_file import BicycleFile, read_bicycle_file
 from .engine_settings import configure_engine, list_engine_faults, refuse_engine
+from .parameters import PARAMETERS
+from .resolved import resolve_scenario
 from .schema import (
     OF_THE_MOTION,
     CircularTable,
@@ -28,6 +30,7 @@ from .table import (
 
 __all__ = [
     "OF_THE_MOTION",
+    "PARAMETERS",
     "BicycleFile",
     "CircularTable",
     "Gate",
@@ -53,6 +56,7 @@ __all__ = [
     "read_scenario_file",
     "read_toml",
     "refuse_engine",
+    "resolve_scenario",
     "show_value",
     "validate_scenario",
 ]

@@ -11,11 +11,13 @@ from pydantic import Field, ValidationError, ValidatorFunctionWrapHandler, field
 from ...engines.names import suggest_name
 from ...reference.bicycle import Bicycle, require_rigid_bodies
 from ..error import ScenarioError
+from ..names import LIBRARY as LIBRARY
+from ..names import library_names as library_names
 from .engine_settings import list_engine_faults
+from .parameters import PARAMETERS
 from .surfaces import SurfaceTable
 from .table import Table, join_complaints, list_complaints, place_error, read_toml, show_value, validate_known
 
-LIBRARY = Path(__file__).parents[1] / "library"
 # The tables that the motion depends on.
 OF_THE_MOTION = ("surface", "motion", "perturbation", "bicycle")
 
@@ -27,17 +29,17 @@ _Moderate = Annotated[float, Field(ge=-1e6, le=1e6)]
 class Near(Table):
     """Angles that a circular motion is near to."""
 
-    lean: float
-    steer: float
+    lean: float = Field(description="lean", json_schema_extra={"unit": "rad"})
+    steer: float = Field(description="steer, positive to the left", json_schema_extra={"unit": "rad"})
 
 
 class CircularTable(Table):
     """A circular motion to start from."""
 
     kind: Literal["circular"] = "circular"
-    rear_rate: float = Field(gt=0, le=1e4, description="rear-wheel rate [rad/s]")
-    family: Annotated[int, Field(ge=1, le=4)] | None = None
-    near: Near | None = None
+    rear_rate: float = Field(gt=0, le=1e4, description="rate of the rear wheel", json_schema_extra={"unit": "rad/s"})
+    family: Annotated[int, Field(ge=1, le=4)] | None = Field(default=None, description="number of the solution family")
+    near: Near | None = Field(default=None, description="angles that the motion is near to, where there are several")
 
     @model_validator(mode="after")
     def _determined(self) -> CircularTable:
@@ -50,26 +52,32 @@ class UprightTable(Table):
     """A straight upright start along x, the rear contact in the origin."""
 
     kind: Literal["upright"]
-    speed: float = Field(gt=0, le=1e4, description="forward speed [m/s]")
+    speed: float = Field(gt=0, le=1e4, description="forward speed", json_schema_extra={"unit": "m/s"})
 
 
 class Perturbation(Table):
     """Added to the independent variables of the start; the rest is solved."""
 
-    x: _Moderate = 0.0
-    y: _Moderate = 0.0
-    lean: _Moderate = 0.0
-    steer: _Moderate = 0.0
-    lean_rate: _Moderate = 0.0
-    steer_rate: _Moderate = 0.0
-    rear_rate: _Moderate = 0.0
+    x: _Moderate = Field(
+        default=0.0, description="of the point D on the steering axis", json_schema_extra={"unit": "m"}
+    )
+    y: _Moderate = Field(
+        default=0.0, description="of the point D on the steering axis", json_schema_extra={"unit": "m"}
+    )
+    lean: _Moderate = Field(default=0.0, description="of the rear frame", json_schema_extra={"unit": "rad"})
+    steer: _Moderate = Field(default=0.0, description="positive to the left", json_schema_extra={"unit": "rad"})
+    lean_rate: _Moderate = Field(default=0.0, description="of the rear frame", json_schema_extra={"unit": "rad/s"})
+    steer_rate: _Moderate = Field(default=0.0, description="positive to the left", json_schema_extra={"unit": "rad/s"})
+    rear_rate: _Moderate = Field(default=0.0, description="of the rear wheel", json_schema_extra={"unit": "rad/s"})
 
 
 class Simulation(Table):
     """How long, and how often to report."""
 
-    duration: float = Field(gt=0, le=1e5, description="[s]")
-    output_rate: float = Field(100.0, gt=0, le=1e5, description="[1/s]")
+    duration: float = Field(gt=0, le=1e5, description="simulated time", json_schema_extra={"unit": "s"})
+    output_rate: float = Field(
+        default=100.0, gt=0, le=1e5, description="samples a second", json_schema_extra={"unit": "1/s"}
+    )
 
     @model_validator(mode="after")
     def _whole_samples(self) -> Simulation:
@@ -87,9 +95,11 @@ class Gate(Simulation):
     """How the drift gate rides a scenario, and what it measures beside the ride."""
 
     # Seconds of work in the slowest engine.
-    duration: float = Field(default=3.0, gt=0, le=1e5, description="[s]")
+    duration: float = Field(default=3.0, gt=0, le=1e5, description="simulated time", json_schema_extra={"unit": "s"})
     # An interval that doubled steps divide as well: a coarser step is judged, not refused.
-    output_rate: float = Field(default=50.0, gt=0, le=1e5, description="[1/s]")
+    output_rate: float = Field(
+        default=50.0, gt=0, le=1e5, description="samples a second", json_schema_extra={"unit": "1/s"}
+    )
     order: bool = Field(default=True, description="measure the order of convergence")
     eigenvalues: bool = Field(default=True, description="measure the engine's own eigenvalues, of a circular motion")
 
@@ -97,22 +107,44 @@ class Gate(Simulation):
 class Criterion(Table):
     """A verdict that a benchmark asks of every engine."""
 
-    energy_variation: float = Field(gt=0, description="limit of 100 (Emax - Emin) / E(0) [percent]")
+    energy_variation: float = Field(
+        gt=0, description="limit of 100 (Emax - Emin) / E(0)", json_schema_extra={"unit": "percent"}
+    )
+
+
+def _list_parameters(schema: dict[str, Any]) -> None:
+    """Put the names of a bicycle's parameters into the JSON schema of their table."""
+    value = schema.pop("additionalProperties")
+    benchmark = Bicycle()
+    schema["properties"] = {
+        name: value | {"default": getattr(benchmark, name), "description": meaning, "unit": unit}
+        for name, (unit, meaning) in PARAMETERS.items()
+    }
+    schema["additionalProperties"] = False
 
 
 class Scenario(Table):
     """A scenario as its file declares it."""
 
-    title: str
-    tags: Annotated[tuple[str, ...], Field(strict=False)] = ()  # TOML has arrays only
-    surface: SurfaceTable
-    motion: Annotated[CircularTable | UprightTable, Field(discriminator="kind")]
-    perturbation: Perturbation = Perturbation()
-    simulation: Simulation
-    gate: Gate | None = None
-    criterion: Criterion | None = None
-    bicycle: dict[str, _Moderate] = Field(default_factory=dict)
-    engines: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    title: str = Field(description="one line of text")
+    # TOML has arrays only.
+    tags: Annotated[tuple[str, ...], Field(strict=False)] = Field(default=(), description="for velodrome run --tag")
+    surface: SurfaceTable = Field(description="the ground")
+    motion: Annotated[CircularTable | UprightTable, Field(discriminator="kind")] = Field(
+        description="the motion to start from"
+    )
+    perturbation: Perturbation = Field(default=Perturbation(), description="added to the start; the rest is solved")
+    simulation: Simulation = Field(description="how long, and how often to report")
+    gate: Gate | None = Field(default=None, description="how velodrome check rides it")
+    criterion: Criterion | None = Field(default=None, description="a verdict on every engine")
+    bicycle: dict[str, _Moderate] = Field(
+        default_factory=dict,
+        description="parameters that differ from the benchmark bicycle's",
+        json_schema_extra=_list_parameters,
+    )
+    engines: dict[str, dict[str, Any]] = Field(
+        default_factory=dict, description="settings by engine, each checked by its engine"
+    )
 
     @field_validator("title")
     @classmethod
@@ -166,18 +198,15 @@ def _bicycle_faults(values: Mapping[str, float]) -> list[str]:
             # Of inertias only all together can be judged.
             if str(error).startswith(f"bicycle parameter {name} is"):
                 faults.append(str(error))
-    return [fault.removeprefix("bicycle parameter ") for fault in faults or [together]]
+    return [
+        fault.removeprefix("bicycle parameter ").removeprefix("bicycle parameters ") for fault in faults or [together]
+    ]
 
 
 def _line_of_text(text: str) -> str:
     if not text.strip() or not text.isprintable():
         raise ValueError("must be one line of text")
     return text
-
-
-def library_names() -> list[str]:
-    """Names of the library's scenarios, sorted."""
-    return sorted(entry.name.removesuffix(".toml") for entry in LIBRARY.iterdir() if entry.name.endswith(".toml"))
 
 
 def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tuple[str, Scenario]:

@@ -94,7 +94,7 @@ def _undisturbed(
     table = scenario.motion
     if isinstance(table, CircularTable):
         near = (table.near.lean, table.near.steer) if table.near is not None else None
-        family, motion = _found(bicycle, make_bowl(surface), table.rear_rate, table.family, near)
+        family, motion = _found(bicycle, make_bowl(surface), table.rear_rate, table.family, near)  # type: ignore[arg-type]
         return family, motion, *motion.state()
     rates = (0.0, 0.0, table.speed / bicycle.rear_wheel_radius)
     # Where the disturbed bicycle stands: there may be no ground at the origin.

@@ -63,7 +63,7 @@ class ParaboloidTable(Table):
     """The bowl z = alpha (x^2 + y^2)."""
 
     kind: Literal["paraboloid"]
-    alpha: float = Field(ge=0, description="shape [1/m]")
+    alpha: float = Field(ge=0, description="shape; 0 is the plane", json_schema_extra={"unit": "1/m"})
 
     @field_validator("alpha")
     @classmethod
@@ -79,7 +79,7 @@ class SphereTable(Table):
     """The lower half of a sphere."""
 
     kind: Literal["sphere"]
-    radius: _Length = Field(description="[m]")
+    radius: _Length = Field(description="radius of the sphere", json_schema_extra={"unit": "m"})
 
     def make(self) -> Sphere:
         """The surface."""
@@ -90,8 +90,8 @@ class ConeTable(Table):
     """A cone with a rounded tip."""
 
     kind: Literal["cone"]
-    slope: float = Field(ge=1e-6, le=1e6, description="far from the axis [-]")
-    rounding: float = Field(ge=1e-6, le=1e6, description="scale of the tip [m]")
+    slope: float = Field(ge=1e-6, le=1e6, description="slope far from the axis", json_schema_extra={"unit": "1"})
+    rounding: float = Field(ge=1e-6, le=1e6, description="scale of the tip", json_schema_extra={"unit": "m"})
 
     def make(self) -> Cone:
         """The surface."""
@@ -102,8 +102,8 @@ class TorusTable(Table):
     """A circular trough."""
 
     kind: Literal["torus"]
-    ring: float = Field(ge=0, le=1e6, description="radius of the tube's centre line [m]")
-    tube: _Length = Field(description="radius of the tube [m]")
+    ring: float = Field(ge=0, le=1e6, description="radius of the tube's centre line", json_schema_extra={"unit": "m"})
+    tube: _Length = Field(description="radius of the tube", json_schema_extra={"unit": "m"})
 
     def make(self) -> Torus:
         """The surface."""
@@ -114,9 +114,13 @@ class ProfileTable(Table):
     """A bowl z = g(r): a polynomial in r^2, or a spline through points."""
 
     kind: Literal["profile"]
-    coefficients: _Numbers | None = Field(None, description="of r^2, r^4, ... [1/m, 1/m^3, ...]")
-    radii: _Numbers | None = Field(None, description="of the points, rising [m]")
-    heights: _Numbers | None = Field(None, description="of the points [m]")
+    coefficients: _Numbers | None = Field(
+        default=None, description="coefficients of r^2, r^4, ...", json_schema_extra={"unit": "1/m, 1/m^3, ..."}
+    )
+    radii: _Numbers | None = Field(
+        default=None, description="radii of the points, rising", json_schema_extra={"unit": "m"}
+    )
+    heights: _Numbers | None = Field(default=None, description="heights of the points", json_schema_extra={"unit": "m"})
 
     @model_validator(mode="after")
     def _one_way(self) -> ProfileTable:
@@ -139,11 +143,11 @@ class HeightFieldTable(Table):
 
     kind: Literal["height-field"]
     heights: Annotated[tuple[_Numbers, ...], Field(strict=False, max_length=1000)] = Field(
-        description="row i, column j at origin + spacing (i, j) [m]"
+        description="heights, row i and column j at origin + spacing (i, j)", json_schema_extra={"unit": "m"}
     )
-    spacing: _Length = Field(description="[m]")
+    spacing: _Length = Field(description="distance of neighbours in the grid", json_schema_extra={"unit": "m"})
     origin: Annotated[tuple[_Moderate, _Moderate], Field(strict=False)] = Field(
-        (0.0, 0.0), description="x and y of the first height [m]"
+        default=(0.0, 0.0), description="x and y of the first height", json_schema_extra={"unit": "m"}
     )
 
     @model_validator(mode="after")

@@ -119,7 +119,11 @@ def critical(
     -------
     CriticalShapes
     """
-    return find_critical_shapes(bicycle or Bicycle(), progress or (lambda *_: None))
+    return find_critical_shapes(bicycle or Bicycle(), progress or _say_nothing)
+
+
+def _say_nothing(*_: object) -> None:
+    """Take the place of a progress bar."""
 
 
 def _ground(alpha: float | None, surface: Surface | None) -> Surface | float:

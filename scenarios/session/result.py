@@ -11,6 +11,7 @@ from typing import Any
 
 from ...engines.engine import Problem, Trajectory
 from ...reports.drawing import format_verdict
+from ..error import ScenarioError
 from ..run import find_part
 from ..view import RECORDING, open_native
 from .table import MetricsTable
@@ -65,7 +66,7 @@ class Run:
     def show(self) -> Any:
         """Show the recording of the rides.
 
-        In a notebook where rerun's widget is installed (``pip install 'rerun-sdk[notebook]'``) the widget is returned
+        In a notebook where rerun's widget is installed (``pip install 'velodrome[notebook]'``) the widget is returned
         and shown by the notebook. Elsewhere the viewer's window is opened, and the call returns when it is closed.
 
         Raises
@@ -75,6 +76,8 @@ class Run:
         """
         from ...reports.recording import make_widget
 
+        if not self.trajectories:
+            raise ScenarioError("the run has no trajectory to show: no engine gave one")
         if self.folder is not None:
             return self._shown(self.folder, make_widget)
         with TemporaryDirectory(prefix="velodrome-") as name:
@@ -100,5 +103,5 @@ class Run:
     def _repr_html_(self) -> str:
         notes = "".join(f"<li>{escape(line)}</li>" for line in self._notes())
         where = "" if self.folder is None else f"<p>run folder: <code>{escape(str(self.folder))}</code></p>"
-        table = self.metrics._repr_html_()
+        table = self.metrics.to_html()
         return f"<p><b>{escape(self._heading())}</b></p>{table}{f'<ul>{notes}</ul>' if notes else ''}{where}"

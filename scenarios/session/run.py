@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -95,10 +95,11 @@ def _wanted(engines: str | Iterable[str] | None) -> list[str] | None:
 
 def _plain(value: Any) -> Any:
     """Return a value of numpy as one that a TOML file could hold."""
-    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+    given: Any = value
+    return given.tolist() if isinstance(value, np.generic | np.ndarray) else value
 
 
-def _with_settings(scenario: Scenario, settings: Mapping[str, Mapping[str, Any] | Settings]) -> Scenario:
+def _with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     """Return the scenario with engine settings put on top of its own.
 
     Raises
@@ -111,7 +112,8 @@ def _with_settings(scenario: Scenario, settings: Mapping[str, Mapping[str, Any] 
         if isinstance(given, Settings):
             values = given.model_dump(mode="json", exclude_none=True)
         elif isinstance(given, Mapping):
-            values = {key: _plain(value) for key, value in given.items()}
+            table = cast("Mapping[str, Any]", given)
+            values = {key: _plain(value) for key, value in table.items()}
         else:
             raise ScenarioError(f"settings of {name!r} are {given!r}; they must be a mapping such as {{'step': 0.001}}")
         engines[name] = {**engines.get(name, {}), **values}

@@ -1,5 +1,8 @@
 """The metrics of a run as a table: engines by quantities."""
 
+# pandas carries no types.
+# pyright: reportMissingTypeStubs=false
+
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
@@ -114,7 +117,8 @@ class MetricsTable(Mapping[str, Mapping[str, Any]]):
         ]
         return "\n".join([text.rstrip() for text in texts] + list(self.remarks))
 
-    def _repr_html_(self) -> str:
+    def to_html(self) -> str:
+        """Return the table with its remarks as HTML, as a notebook shows it."""
         heads = "".join(f"<th>{escape(title)}<br>[{escape(unit)}]</th>" for title, unit, _, _ in COLUMNS)
         rows = "".join(
             f"<tr><th>{escape(name)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in self._cells(name))}</tr>"
@@ -123,6 +127,9 @@ class MetricsTable(Mapping[str, Mapping[str, Any]]):
         remarks = "".join(f"<li>{escape(line)}</li>" for line in self.remarks)
         table = f"<table><thead><tr><th>engine</th>{heads}</tr></thead><tbody>{rows}</tbody></table>"
         return table + (f"<ul>{remarks}</ul>" if remarks else "")
+
+    def _repr_html_(self) -> str:
+        return self.to_html()
 
     def _cells(self, engine: str) -> list[str]:
         return [format_cell(self._rows[engine], metric, part) for _, _, metric, part in COLUMNS]

@@ -1,6 +1,7 @@
 """Sweeps: a sweep file, its tasks, worker processes or a Dask cluster, and one data set of results."""
 
 from .cluster import on_cluster
+from .file import SweepFile
 from .live import SweepView
 from .plan import plan_sweep
 from .rows import STATUSES
@@ -9,6 +10,7 @@ from .summary import resume_command, show_summary, status_of, summarise_sweep
 
 __all__ = [
     "STATUSES",
+    "SweepFile",
     "SweepView",
     "Work",
     "locally",

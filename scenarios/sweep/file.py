@@ -40,12 +40,22 @@ def flatten_table(table: Any) -> Any:
     return found
 
 
+def _allow_tables(schema: dict[str, Any]) -> None:
+    """Let the JSON schema of dotted keys have tables in tables too; `flatten_table` reads both."""
+    leaf = schema["additionalProperties"]
+    schema["additionalProperties"] = {"anyOf": [leaf, {"type": "object"}]}
+
+
 class Hypercube(Table):
     """Points of a Latin hypercube."""
 
     count: int = Field(ge=1, description="number of points")
     seed: int = Field(ge=0, description="seed of the random numbers")
-    ranges: dict[str, _Range] = Field(min_length=1, description="dotted key to [low, high]")
+    ranges: dict[str, _Range] = Field(
+        min_length=1,
+        description="scenario's keys, dotted or as tables, to [low, high]",
+        json_schema_extra=_allow_tables,
+    )
 
     @field_validator("ranges", mode="before")
     @classmethod
@@ -64,14 +74,28 @@ class Hypercube(Table):
 class SweepFile(Table):
     """A sweep as its file declares it."""
 
-    title: str = ""
+    title: str = Field(default="", description="one line of text")
     scenario: str | dict[str, Any] = Field(description="library name, path from the sweep file, or tables")
-    engines: _Names = (REFERENCE,)
-    time_limit: float = Field(600.0, gt=0, le=1e6, description="of a run, on the clock [s]")
-    memory_limit: float | None = Field(None, ge=1, le=1e9, description="that a run may take for itself [MB]")
-    grid: dict[str, _Values] = Field(default_factory=dict, description="dotted key to values, all combinations")
-    latin_hypercube: Hypercube | None = None
-    list: Annotated[tuple[dict[str, Any], ...], Field(strict=False)] = ()
+    engines: _Names = Field(default=(REFERENCE,), description="engines that ride at every point")
+    time_limit: float = Field(
+        default=600.0, gt=0, le=1e6, description="of a run, on the clock", json_schema_extra={"unit": "s"}
+    )
+    memory_limit: float | None = Field(
+        default=None,
+        ge=1,
+        le=1e9,
+        description="memory that a run may take for itself",
+        json_schema_extra={"unit": "MB"},
+    )
+    grid: dict[str, _Values] = Field(
+        default_factory=dict,
+        description="scenario's keys, dotted or as tables, to lists of values: all combinations",
+        json_schema_extra=_allow_tables,
+    )
+    latin_hypercube: Hypercube | None = Field(default=None, description="points of a Latin hypercube")
+    list: Annotated[tuple[dict[str, Any], ...], Field(strict=False)] = Field(
+        default=(), description="points, a table each"
+    )
 
     @field_validator("grid", mode="before")
     @classmethod

@@ -1,4 +1,4 @@
-"""A stored run, looked at in the viewer or in a browser."""
+"""Views of a stored run, in the native viewer or in a browser."""
 
 from .viewing import RECORDING, open_native, serve
 

@@ -1,4 +1,4 @@
-"""A server of one run's files to the browser on this machine."""
+"""A server of one run's files for the browser on this machine."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-# The viewer may run its compiled code and read from this server, and nothing from elsewhere.
+# The viewer may run its compiled code and read from this server, but load nothing from elsewhere.
 _VIEWER_POLICY = (
     "default-src 'self' data: blob:; style-src 'unsafe-inline'; "
     "script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; frame-ancestors 'self'"
@@ -34,7 +34,7 @@ class Content:
     Attributes
     ----------
     kind : str
-        Its media type.
+        Media type.
     body : bytes
     """
 
@@ -43,7 +43,7 @@ class Content:
 
 
 class RunPageServer(ThreadingHTTPServer):
-    """Listens on the loopback interface as soon as it is made; `serve_forever` answers.
+    """Server on the loopback interface, which listens as soon as it is made; `serve_forever` answers.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class RunPageServer(ThreadingHTTPServer):
         return f"http://{LOOPBACK}:{self.server_port}/report.html?replay"
 
     def knows(self, host: str | None) -> bool:
-        """Whether a request is meant for this server: a name that another site resolves to it is refused."""
+        """Return whether a request is meant for this server; a name that another site resolves to it is refused."""
         return host in (f"{LOOPBACK}:{self.server_port}", f"localhost:{self.server_port}")
 
 
@@ -128,4 +128,4 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Say nothing of every request: the command's output is for its user."""
+        """Do not log requests: the command's output is for its user."""

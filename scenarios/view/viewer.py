@@ -1,4 +1,4 @@
-"""The rerun viewer for a browser: its files, out of the program that they come in."""
+"""The rerun viewer for a browser: its files, fetched from the program that contains them."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from pathlib import Path
 from .server import LOOPBACK, Content
 
 _FILES = ("", "re_viewer.js", "re_viewer_bg.wasm", "favicon.ico")
-_PATIENCE = 20.0  # for a program of 300 MB to come off a cold disk and listen [s]
-# Fonts from elsewhere: the viewer has its own, and nothing here asks the network.
+_PATIENCE = 20.0  # [s] for a program of 300 MB to be read from a cold disk and to listen
+# Links to fonts elsewhere: the viewer has its own fonts, and the page must not use the network.
 _ELSEWHERE = re.compile(rb"<link\b[^>]*\bhttps://[^>]*>")
 
 
 class ReplayError(RuntimeError):
-    """The viewer's files cannot be had."""
+    """The viewer's files cannot be obtained."""
 
 
 def rerun() -> str:
-    """Path of the viewer's program, which is installed beside the interpreter."""
+    """Return the path of the viewer's program, which is installed beside the interpreter."""
     return str(Path(sys.executable).with_name("rerun"))
 
 
 def viewer_files() -> dict[str, Content]:
-    """Files of the viewer for a browser, by name; the page itself is "".
+    """Fetch the files of the viewer for a browser, by name; the page itself is "".
 
-    The viewer's program serves them. It is run for the moment that it takes to fetch them, on the loopback
+    The viewer's program serves them. It runs only while they are fetched, on the loopback
     interface.
 
     Raises
@@ -42,20 +42,20 @@ def viewer_files() -> dict[str, Content]:
         If it does not serve them.
     """
     port = _free_port()
-    # With the address of a recording it serves the viewer and listens for no data.
+    # With the address of a recording it serves the viewer and does not listen for data.
     command = [rerun(), "--serve-web", "--bind", LOOPBACK, "--web-viewer-port", str(port), f"http://{LOOPBACK}/x.rrd"]
     try:
-        # A group of its own: the program runs under a launcher that would leave it behind.
+        # A process group of its own: the program runs under a launcher that would leave it behind.
         program = subprocess.Popen(
             command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
         )
     except OSError as error:
         raise ReplayError(f"the viewer {command[0]} cannot be started: {error.strerror}") from error
     try:
-        _await(program, port)
+        _wait_until_listening(program, port)
         return {name: _fetch(port, name) for name in _FILES}
     finally:
-        with suppress(ProcessLookupError):  # it may have ended of itself
+        with suppress(ProcessLookupError):  # it may have ended by itself
             os.killpg(program.pid, signal.SIGTERM)
         program.wait()
 
@@ -66,7 +66,7 @@ def _free_port() -> int:
         return probe.getsockname()[1]
 
 
-def _await(program: subprocess.Popen[bytes], port: int) -> None:
+def _wait_until_listening(program: subprocess.Popen[bytes], port: int) -> None:
     """Wait until the program listens."""
     deadline = time.monotonic() + _PATIENCE
     while time.monotonic() < deadline:

@@ -1,4 +1,4 @@
-"""A stored run, looked at: in the native viewer, or as its page with the viewer in it."""
+"""Viewing a stored run in the native viewer, or as its page with the viewer in it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ RECORDING, REPORT = "comparison.rrd", "report.html"
 
 
 def open_native(folder: Path) -> None:
-    """Open a run's recording in the native viewer; returns when its window is closed.
+    """Open a run's recording in the native viewer; return when its window is closed.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def open_native(folder: Path) -> None:
 
 
 def native_command(recording: Path) -> list[str]:
-    """How the native viewer is started; it listens for data as well, on this machine only."""
+    """Return the command that starts the native viewer; it also listens for data, on this machine only."""
     return [rerun(), "--bind", LOOPBACK, "--port", "auto", str(recording)]
 
 
@@ -47,14 +47,14 @@ def serve(folder: Path, port: int, ready: Callable[[str], None]) -> None:
     folder : Path
         A run folder; its page is written if it has none.
     port : int
-        To listen on; 0 for any free one.
+        Port to listen on; 0 for any free one.
     ready : callable
         Called with the page's address once it is served.
 
     Raises
     ------
     ScenarioError
-        If the folder is no run folder, the port is taken, or the viewer's files cannot be had.
+        If the folder is not a run folder, the port is taken, or the viewer's files cannot be obtained.
     """
     with page_server(folder, port) as server:
         ready(server.address)
@@ -65,7 +65,7 @@ def serve(folder: Path, port: int, ready: Callable[[str], None]) -> None:
 
 
 def page_server(folder: Path, port: int) -> RunPageServer:
-    """The server of `serve`, listening but not yet answering."""
+    """Make the server of `serve`, which listens but does not answer yet."""
     find_part(folder, RECORDING)
     if not (folder / REPORT).is_file():
         text = stored_page(folder)
@@ -77,8 +77,8 @@ def page_server(folder: Path, port: int) -> RunPageServer:
         viewer = viewer_files()
     except ReplayError as error:
         raise ScenarioError(str(error)) from error
-    # What is in the folder now and nothing above it: an address is looked up, never joined to a path, and a link
-    # may lead anywhere.
+    # Only files that are in the folder now can be served: an address is looked up, never joined to a path, and links,
+    # which may lead anywhere, are left out.
     files = {
         path.name: path
         for path in folder.iterdir()
@@ -91,7 +91,7 @@ def page_server(folder: Path, port: int) -> RunPageServer:
 
 
 def stored_page(folder: Path) -> str:
-    """The page of a stored run, from its files.
+    """Make the page of a stored run from its files.
 
     Parameters
     ----------
@@ -101,12 +101,12 @@ def stored_page(folder: Path) -> str:
     Returns
     -------
     str
-        As `velodrome.reports.page.page` gives it.
+        Page as `velodrome.reports.page.make_page` returns it.
 
     Raises
     ------
     ScenarioError
-        If it is no run folder: which file is missing or cannot be read.
+        If the folder is not a run folder, with the file that is missing or cannot be read.
     """
     from jinja2 import TemplateError
 
@@ -117,7 +117,7 @@ def stored_page(folder: Path) -> str:
     try:
         where = scenario.make_bicycle(), scenario.surface.make()
         rides = {name: evaluate_ride(read_ride(folder, manifest, measured, name), *where) for name in measured}
-        runs = {name: cut_at_fall(one, *where) for name, one in rides.items()}
+        runs = {name: cut_at_fall(ride, *where) for name, ride in rides.items()}
         verdicts = manifest.get("verdicts", [])
         return make_page(manifest, scenario.model_dump(), measured, verdicts, runs, where[1])
     except ScenarioError:

@@ -447,5 +447,5 @@ def test_a_baseline_without_a_version_is_read_and_a_newer_one_refused(tmp_path: 
 
 def test_a_file_is_no_folder_of_baselines(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(ScenarioError, match="is no folder of baselines"):
+    with pytest.raises(ScenarioError, match="is not a folder of baselines"):
         gate.read_baseline("q2", tmp_path / "file")

@@ -24,7 +24,7 @@ from velodrome.reports.drawing.summary import make_summary
 from velodrome.reports.figures.precision import precision_figure
 from velodrome.scenarios.gate.ci_files import junit_xml, markdown_page
 from velodrome.scenarios.gate.verdict import Verdict
-from velodrome.scenarios.run.folder import new_folder, resolve_scenario
+from velodrome.scenarios.run.folder import new_folder, resolve_plan
 from velodrome.scenarios.run.runner import plan_run, run_plan
 from velodrome.scenarios.scenario.schema import LIBRARY, load_scenario
 from velodrome.scenarios.view import viewing as view
@@ -82,11 +82,28 @@ def test_a_scenarios_name_stays_inside_the_output_folder(stem: str, tmp_path: Pa
     assert sorted(entry.name for entry in (tmp_path / "in").iterdir()) == [path.name]
     names = {"scenario.toml", "manifest.json", "metrics.json", "reference.parquet", "comparison.rrd", "report.html"}
     assert {entry.name for entry in folder.iterdir()} == names
-    assert load_scenario(str(folder / "scenario.toml"))[1] == resolve_scenario(plan)
+    assert load_scenario(str(folder / "scenario.toml"))[1] == resolve_plan(plan)
 
 
 @pytest.mark.parametrize(
-    "name", ["../x", "a/b", "/tmp/x", "..", ".", "", "a\\b", "a\nb", "a b", "-x", ".x", "é", "x" * 65]
+    "name",
+    [
+        "../x",
+        "a/b",
+        "/tmp/x",
+        "..",
+        ".",
+        "",
+        "a\\b",
+        "a\nb",
+        "a b",
+        "-x",
+        ".x",
+        "é",
+        "x" * 65,
+        "sha256",
+        "schema_version",
+    ],
 )
 def test_an_engines_name_leads_no_file_elsewhere(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     bad = EntryPoint(name=name, value="velodrome.engines.lagrange:ENGINE", group=registry.ENTRY_POINT_GROUP)

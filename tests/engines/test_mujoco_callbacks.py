@@ -145,10 +145,10 @@ def test_wheel_lifts_off():
 def unknown_layout():
     """Nothing found out yet, before and after."""
     layout.find_layout.cache_clear()
-    layout._place.cache_clear()
+    layout._structure_layout.cache_clear()
     yield
     layout.find_layout.cache_clear()
-    layout._place.cache_clear()
+    layout._structure_layout.cache_clear()
 
 
 def test_places_are_those_of_the_views(unknown_layout):

@@ -49,8 +49,8 @@ def compute_starts_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def measure_rides_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """Measure the ride alone: orders and eigenvalues take the longest, and faults must show without them."""
-    monkeypatch.setattr(gate_sample, "_order", lambda *_: ({}, {}))
-    monkeypatch.setattr(gate_sample, "_eigenvalues", lambda *_: {})
+    monkeypatch.setattr(gate_sample, "_measure_order", lambda *_: ({}, {}))
+    monkeypatch.setattr(gate_sample, "_measure_eigenvalues", lambda *_: {})
 
 
 def verdicts_of(

@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import Field
 from scipy.integrate import DOP853
 
+from velodrome.engines.coordinates import body_positions, body_quaternions
 from velodrome.engines.engine import EngineError, Problem, Progress, Settings, Trajectory, UnsuitableProblem
-from velodrome.reference.contact import observe
-from velodrome.reference.kinematics import body_positions, quaternions, rotations
+from velodrome.engines.rolling import observe
 from velodrome.reference.surface import is_level
 
 from .coordinates import AXES, from_symbrim, to_symbrim
@@ -25,7 +25,11 @@ class SymbrimSettings(Settings):
     """Settings of the engine."""
 
     tolerance: float = Field(
-        default=1e-10, ge=2.5e-14, le=1e-3, description="error of a step of dop853, relative to 1 + |state|"
+        default=1e-10,
+        ge=2.5e-14,
+        le=1e-3,
+        description="error of a step of dop853, relative to 1 + |state|",
+        json_schema_extra={"unit": "1"},
     )
 
     def refined(self, factor: float) -> Self:
@@ -72,7 +76,7 @@ class SymbrimEngine:
             q=q,
             qd=qd,
             body_position=body_positions(problem.bicycle, q),
-            body_quaternion=quaternions(rotations(problem.bicycle, q)),
+            body_quaternion=body_quaternions(problem.bicycle, q),
             contact_point=seen.point if seen.found else None,
             contact_force=AXES * equations.contact_forces(x),
             gap=seen.gap if seen.found else None,

@@ -18,7 +18,7 @@ from velodrome.reports.measure.consistency import (
     LARGEST_NOISE,
     ROOM,
     Mismatch,
-    _integrals,
+    _integrate_samples,
     describe_mismatch,
     evaluate_ride,
     find_mismatches,
@@ -65,7 +65,7 @@ def test_the_quadrature_is_exact_for_polynomials_of_its_degree(samples: int, eve
     time = np.linspace(0, 2, 12) if even else np.cumsum(np.linspace(0.1, 0.3, 12))
     values = np.column_stack([time**k for k in range(samples)])
     integral = np.column_stack([np.diff(time ** (k + 1)) / (k + 1) for k in range(samples)])
-    np.testing.assert_allclose(_integrals(time, values, samples), integral, rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(_integrate_samples(time, values, samples), integral, rtol=1e-11, atol=1e-12)
 
 
 @pytest.mark.parametrize("samples", [4, 6])
@@ -75,7 +75,7 @@ def test_the_quadratures_error_falls_with_its_order(samples: int) -> None:
         time = np.linspace(0, 2, n)
         exact = np.diff(np.sin(3 * time))[:, None]
         inside = slice(samples, -samples)
-        errors.append(np.abs(_integrals(time, 3 * np.cos(3 * time)[:, None], samples) - exact)[inside].max())
+        errors.append(np.abs(_integrate_samples(time, 3 * np.cos(3 * time)[:, None], samples) - exact)[inside].max())
     # Of an interval: one power more than of the whole. The next power is (3 h)^2 smaller.
     assert np.log2(errors[0] / errors[1]) == pytest.approx(samples + 1, abs=0.1)
 

@@ -19,7 +19,8 @@ from velodrome.reference.surface import Paraboloid
 from velodrome.reports.measure.limits import START_ERROR, Scale
 from velodrome.reports.measure.metrics import compute_metrics
 from velodrome.reports.measure.steady import steady_trajectory
-from velodrome.scenarios.compare.differences import StoredGround, StoredRun, diff_document, diff_markdown
+from velodrome.scenarios.compare.differences import StoredGround, StoredRun, diff_document
+from velodrome.scenarios.compare.markdown import diff_markdown
 
 BICYCLE, BOWL = Bicycle(), Paraboloid(0.005)
 _, MOTION = find_motion(BICYCLE, BOWL, 18.0, 2, (0.74, 2.84))

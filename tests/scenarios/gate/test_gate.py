@@ -195,7 +195,7 @@ def test_a_trajectory_late_by_a_sample_fails(name: str) -> None:
 
 @pytest.mark.usefixtures("rides_only")
 def test_a_flipped_sign_in_one_row_of_a_jacobian_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    original = joint._user_functions
+    original = joint._make_user_functions
 
     def flipped(*arguments: Any) -> Any:
         constraint, jacobian = original(*arguments)
@@ -207,7 +207,7 @@ def test_a_flipped_sign_in_one_row_of_a_jacobian_fails(monkeypatch: pytest.Monke
 
         return constraint, wrong
 
-    monkeypatch.setattr(joint, "_user_functions", flipped)
+    monkeypatch.setattr(joint, "_make_user_functions", flipped)
     assert failing(verdicts_on("exudyn"))
 
 
@@ -466,7 +466,7 @@ def test_cpu_time_is_judged_if_asked_for(
     ratio: float, status: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     def check(ratio: float, hold_cpu: bool = True) -> dict[str, Verdict]:
-        monkeypatch.setattr(gate_sample, "_cpu_ratio", lambda *_: ratio)
+        monkeypatch.setattr(gate_sample, "_measure_cpu_ratio", lambda *_: ratio)
         verdicts, fresh = gate.check_gate(lambda *_: None, ["q2"], [REFERENCE], tmp_path, hold_cpu=hold_cpu)
         if not (tmp_path / "q2.json").exists():
             gate.update_baselines(fresh, verdicts, None, tmp_path)

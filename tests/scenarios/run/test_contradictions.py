@@ -101,8 +101,8 @@ def accused(name: str, duration: float | None, out: Path) -> None:
 @pytest.fixture
 def rides_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """Measure the ride alone: orders and eigenvalues take the longest."""
-    monkeypatch.setattr(gate_sample, "_order", lambda *_: ({}, {}))
-    monkeypatch.setattr(gate_sample, "_eigenvalues", lambda *_: {})
+    monkeypatch.setattr(gate_sample, "_measure_order", lambda *_: ({}, {}))
+    monkeypatch.setattr(gate_sample, "_measure_eigenvalues", lambda *_: {})
 
 
 def chosen_with(after: Any) -> gate.Chosen:

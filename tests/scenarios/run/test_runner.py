@@ -20,7 +20,7 @@ from tests.sealing import contents
 from velodrome.engines.engine import REFERENCE, EngineError, Trajectory
 from velodrome.engines.storage import read_trajectory
 from velodrome.scenarios.error import ScenarioError
-from velodrome.scenarios.run.folder import LIBRARIES, RunPlan, resolve_scenario
+from velodrome.scenarios.run.folder import LIBRARIES, RunPlan, resolve_plan
 from velodrome.scenarios.run.machine import describe_machine, find_commit
 from velodrome.scenarios.run.runner import RunOutcome, configure_engine, plan_run, run_plan
 from velodrome.scenarios.scenario.schema import Perturbation, load_scenario
@@ -144,7 +144,7 @@ def test_the_stored_scenario_is_resolved_and_the_same_problem_to_the_bit(
 ) -> None:
     first = plan(name, changes)
     path = tmp_path / f"{name}.toml"
-    path.write_text(tomli_w.dumps(resolve_scenario(first).model_dump(exclude_none=True)))
+    path.write_text(tomli_w.dumps(resolve_plan(first).model_dump(exclude_none=True)))
     stated = tomllib.loads(path.read_text())
     assert stated["bicycle"] == asdict(first.start.problem.bicycle)
     assert set(stated["perturbation"]) == set(Perturbation.model_fields)

@@ -9,6 +9,7 @@ import pytest
 from sweeping import UPRIGHT, planned, written
 
 from velodrome.scenarios.error import ScenarioError
+from velodrome.scenarios.names import LIBRARY
 from velodrome.scenarios.scenario.table import place_error
 from velodrome.scenarios.sweep.file import read_sweep
 from velodrome.scenarios.sweep.plan import plan_sweep
@@ -130,3 +131,61 @@ def test_bad_files_are_told_in_one_line_with_their_name(tmp_path: Path, text: st
         plan_sweep(written(tmp_path, text))
     assert said in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_everything_wrong_with_a_sweep_file_is_said_at_once(tmp_path: Path) -> None:
+    text = """
+    time_limt = 3.0
+    memory_limit = 0.1
+    [scenario]
+    titel = "x"
+    surface = { kind = "plain" }
+    motion = { kind = "upright", speed = 4.0 }
+    simulation = { duration = 0.1 }
+    [scenario.engines.exudyn]
+    stepp = 1
+    """
+    with pytest.raises(ScenarioError) as caught:
+        plan_sweep(written(tmp_path, text))
+    line = str(caught.value)
+    for words in (
+        "unknown key 'time_limt' (did you mean 'time_limit'?)",
+        "memory_limit: Input should be greater",
+        "scenario: its tables: unknown key 'titel' (did you mean 'title'?)",
+        "surface.kind: unknown kind 'plain' (did you mean 'plane'?)",
+        "engines.exudyn: unknown key 'stepp' (did you mean 'step'?)",
+    ):
+        assert words in line
+    assert line.count("; ") == 4
+
+
+def test_everything_wrong_with_the_points_of_a_sweep_is_said_at_once(tmp_path: Path) -> None:
+    text = """
+    scenario = "q2"
+    engines = ["exudyn", "mujocu-native"]
+    [grid]
+    surface.alfa = [0.1, 0.2]
+    motion.rear_rate = [18.0, -1.0]
+    engines.exudyn.stepp = [1]
+    engines.exudn.step = [0.001]
+    """
+    with pytest.raises(ScenarioError) as caught:
+        plan_sweep(written(tmp_path, text))
+    line = str(caught.value)
+    for words in (
+        "engine 'mujocu-native' is not installed (did you mean 'mujoco-native'?)",
+        "engines.exudn.step: 'exudn' is not among the sweep's engines (did you mean 'exudyn'?)",
+        "surface: unknown key 'alfa' (did you mean 'alpha'?)",
+        "motion.rear_rate: Input should be greater than 0 (it is -1.0)",
+        "engines.exudyn: unknown key 'stepp' (did you mean 'step'?)",
+    ):
+        # Each once, though it is of many points.
+        assert line.count(words) == 1
+    assert line.count("; ") == 4
+
+
+def test_settings_of_an_engine_that_a_sweep_does_not_ride_are_checked(tmp_path: Path) -> None:
+    base = (LIBRARY / "q2.toml").read_text(encoding="utf-8") + "[engines.mujoco-native]\nstepp = 1\n"
+    (tmp_path / "base.toml").write_text(base)
+    with pytest.raises(ScenarioError, match=r"scenario: engines\.mujoco-native: unknown key 'stepp'"):
+        plan_sweep(written(tmp_path, "scenario = 'base.toml'"))

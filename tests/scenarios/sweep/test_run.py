@@ -286,7 +286,9 @@ def test_a_point_that_is_none_is_a_row_and_the_others_ride(tmp_path: Path) -> No
             assert row["version"] is not None
     assert outcome.counts["reference"].keys() == {"done", "refused"}
     document = summarise_sweep(plan, outcome)
-    assert all(reason.startswith("refused: bicycle param") for reason in document["engines"]["reference"]["reasons"])
+    assert all(
+        reason.startswith("refused: bicycle: rear_frame_I") for reason in document["engines"]["reference"]["reasons"]
+    )
     again = run_sweep(plan, out, breaking_off(0, OSError("no one is asked")), True, lambda *_: None, ["refused"])
     assert again.missing == 0
 

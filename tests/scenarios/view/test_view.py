@@ -159,8 +159,8 @@ def test_the_viewers_files_come_over_the_loopback_interface_and_ask_for_nothing_
         wait(program, port)
         seen.append((program.pid, listening(program.pid)))
 
-    wait = replay._await
-    monkeypatch.setattr(replay, "_await", watched)
+    wait = replay._wait_until_listening
+    monkeypatch.setattr(replay, "_wait_until_listening", watched)
     files = replay.viewer_files()
     group, addresses = seen[0]
     assert addresses == {LOOPBACK_HEX}

@@ -1,0 +1,139 @@
+"""The JSON documents of `velodrome show`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from ...engines.engine import describe_engine, load_engine, package_of
+from ...engines.names import suggest_name
+from ...reference.bicycle import Bicycle
+from ..error import ScenarioError
+from ..run import installed_engines
+from ..scenario import (
+    PARAMETERS,
+    configure_engine,
+    join_complaints,
+    library_names,
+    list_engine_faults,
+    load_scenario,
+    resolve_scenario,
+    show_value,
+)
+from ..sweep import SweepFile
+from .fields import list_fields, list_tables
+from .schemas import scenario_schema, settings_schema
+
+BICYCLE = "bicycle"
+FILES = ("scenario", "sweep")
+
+
+def kind_of(name: str) -> str:
+    """Tell what a name is of: ``scenario``, ``sweep``, ``bicycle`` or ``engine``; of files, ``scenario`` or ``sweep``.
+
+    Raises
+    ------
+    ScenarioError
+        If it is of nothing.
+    """
+    if name in (BICYCLE, *FILES):
+        return name
+    if name in installed_engines():
+        return "engine"
+    if name in library_names() or Path(name).suffix == ".toml":
+        return "scenario"
+    known = [*library_names(), *installed_engines(), BICYCLE, *FILES]
+    raise ScenarioError(
+        f"nothing is called {show_value(repr(name))} ({suggest_name(name, known)}); "
+        "name a scenario, a path to a .toml file, an engine, bicycle, or the format of a file: scenario, sweep"
+    )
+
+
+def make_document(name: str) -> dict[str, Any]:
+    """Make the document of `velodrome show`.
+
+    Parameters
+    ----------
+    name : str
+        A scenario of the library, a path to a scenario file, an engine, ``bicycle``, or ``scenario`` or ``sweep`` for
+        what such files may hold.
+
+    Returns
+    -------
+    dict
+        ``kind`` and ``name``. Of a ``scenario`` its tables as resolved, with all parameters of the bicycle and all
+        settings of all installed engines, and ``units`` by dotted key. Of an ``engine``: ``version``, ``package``,
+        ``description``, ``gives``, ``settings`` by name (see `FieldFacts`). Of the ``bicycle``: ``parameters``,
+        ``units``, ``descriptions``. Of a ``file``: ``tables`` (see `TableFacts`).
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such thing, or it cannot be read or loaded.
+    """
+    kind = kind_of(name)
+    if kind == "engine":
+        return _engine(name)
+    if kind == BICYCLE:
+        return _bicycle()
+    if name in FILES:
+        schema = scenario_schema() if name == "scenario" else SweepFile.model_json_schema()
+        return {"kind": "file", "name": name, "tables": [table.as_json() for table in list_tables(schema)]}
+    return _scenario(name)
+
+
+def _engine(name: str) -> dict[str, Any]:
+    settings = settings_schema(name)
+    engine = load_engine(name)
+    return {
+        "kind": "engine",
+        "name": name,
+        "version": engine.version,
+        "package": package_of(name),
+        "description": describe_engine(engine),
+        "gives": list(engine.gives),
+        "settings": {key: field.as_json() for key, field in list_fields(settings).items()},
+    }
+
+
+def _bicycle() -> dict[str, Any]:
+    return {
+        "kind": "bicycle",
+        "name": "benchmark",
+        "description": "the benchmark bicycle of Meijaard et al. (2007); x forward, y to the left, z up",
+        "parameters": asdict(Bicycle()),
+        "units": {name: parameter.unit for name, parameter in PARAMETERS.items()},
+        "descriptions": {name: parameter.meaning for name, parameter in PARAMETERS.items()},
+    }
+
+
+def _scenario(source: str) -> dict[str, Any]:
+    name, scenario = load_scenario(source)
+    faults = list_engine_faults(scenario.engines)
+    if faults:
+        raise ScenarioError(f"{show_value(source)}: {join_complaints(faults)}")
+    settings = {}
+    for engine in installed_engines():
+        try:
+            settings[engine] = configure_engine(engine, scenario.engines.get(engine, {}))[1]
+        except ScenarioError:
+            continue  # one that cannot be loaded; velodrome list says why
+    resolved = resolve_scenario(scenario, settings).model_dump(mode="json", exclude_none=True)
+    return {"kind": "scenario", "name": name} | resolved | {"units": _units(resolved)}
+
+
+def _units(resolved: Mapping[str, Any]) -> dict[str, str]:
+    """Units of a resolved scenario's numbers, by dotted key; pure numbers and words have none."""
+    found = {}
+    for table in list_tables(scenario_schema()):
+        values: Any = resolved
+        for key in table.name.split(".") if table.name else ():
+            values = values.get(key, {})
+        # Of several kinds of a table the one that it is of.
+        if table.kind is None or values.get("kind") == table.kind:
+            for key, field in table.fields.items():
+                if key in values and field.unit not in (None, "1"):
+                    found[f"{table.name}.{key}"] = field.unit
+    return found

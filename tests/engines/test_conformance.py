@@ -1,0 +1,41 @@
+"""Every installed engine passes the examination that a stranger's must pass, with its own settings and with others."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from velodrome.engines.engine import REFERENCE, engine_names
+from velodrome.testing import check_engine
+
+# Settings that change the method, where every choice of it must conform.
+VARIANTS: list[tuple[str, dict[str, Any]]] = [
+    (REFERENCE, {"integrator": "modified-euler"}),
+    (REFERENCE, {"tolerance": 1e-9}),
+    ("exudyn", {"solver": "trapezoidal-index2"}),
+    ("exudyn", {"start": "engine"}),
+    ("exudyn", {"jacobian": "iteration", "step": 5e-4}),
+    ("exudyn-plane-normal", {"solver": "trapezoidal-index2"}),
+    ("mujoco-native", {"integrator": "RK4", "cone": "pyramidal"}),
+    ("mujoco-default", {"integrator": "implicit"}),
+    ("mujoco-exact-contact", {"integrator": "implicitfast"}),
+    ("mujoco-multipliers", {"step": 1e-3, "integrator": "Euler"}),
+]
+
+
+@pytest.mark.parametrize("name", engine_names())
+def test_an_engine_conforms(name: str) -> None:
+    report = check_engine(name)
+    outcomes = {check.name: check.outcome for check in report.checks}
+    # Nothing that matters is left out: the reference alone may be like the reference.
+    assert {name for name, outcome in outcomes.items() if outcome == "skipped"} <= (
+        {"own work"} if name == REFERENCE else set()
+    )
+    assert len(outcomes) == len(report.checks) == 23
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "settings"), VARIANTS)
+def test_an_engine_conforms_with_other_settings(name: str, settings: dict[str, Any]) -> None:
+    check_engine(name, settings)
