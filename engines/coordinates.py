@@ -1,6 +1,7 @@
 """The suite's coordinates and an engine's rigid bodies, both ways.
 
-The nine coordinates and their order are `COORDINATES`, the four bodies `BODIES`; the suite's README states the axes.
+The nine coordinates and their order are `COORDINATES`, the four bodies `BODIES`; the theory page of the documentation
+states the axes.
 
 - An engine of coordinates has its bodies' poses from `body_positions` and `body_quaternions`, and their twists from
   `body_velocities` and `angular_velocities`: these also place the bodies at the start.

@@ -2,7 +2,7 @@
 
 `observe_wheel` measures one wheel or arrays of them. What it computes with is compiled and may be called from compiled
 code as well, such as a constraint or a callback of an engine: `contact_state` for all of it, `contact_frame` for the
-gap and the axes alone. A ground goes into compiled code as three arguments, the second and the third from the surface:
+gap and the axes alone. A ground goes into compiled code as three arguments, the second and the third from the surface::
 
     ground = rim_search(surface, [radius])
     function, parameters = surface.function.real, surface.parameters

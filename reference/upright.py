@@ -24,8 +24,6 @@ import numpy as np
 
 from .bicycle import Bicycle
 
-MODES = ("weave", "capsize", "castering")
-
 # A mass matrix whose condition number is larger cannot be told from a singular one in double precision.
 _LARGEST_CONDITION = 1e14
 # Imaginary parts below this share of a root's size are round-off: a double root splits by the root of 1e-16.

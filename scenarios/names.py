@@ -8,7 +8,7 @@ LIBRARY = Path(__file__).parent / "library"
 _ENGINES = "velodrome.engines"  # as `velodrome.engines.engine.ENTRY_POINT_GROUP`, which takes half a second to load
 
 
-def library_names() -> list[str]:
+def list_library() -> list[str]:
     """Names of the library's scenarios, sorted."""
     return sorted(entry.name.removesuffix(".toml") for entry in LIBRARY.iterdir() if entry.name.endswith(".toml"))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import random
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,12 +17,12 @@ from ...engines.guard import GuardedEngine, call_engine
 from ...reference.bicycle import Bicycle
 from .forces import check_forces
 from .maps import check_maps
-from .motions import GROUNDS, OTHER_BICYCLE, SAMPLES, Motion, make_motion, make_problem, output_interval
+from .motions import GROUNDS, OTHER_BICYCLE, SAMPLES, TransientMotion, make_motion, make_problem, output_interval
 from .order import check_order
 from .protocol import check_settings, guard_engine, step_noise_of
 from .refusals import check_refusals, suits
 from .repeats import check_bits, check_own_work
-from .report import Check, ConformanceError, ConformanceReport, judge, skip
+from .report import ConformanceCheck, ConformanceError, ConformanceReport, make_check, skip_check
 from .reports import check_bodies, check_reports
 from .rides import Ride
 from .start import check_start
@@ -105,7 +105,7 @@ class _Examination:
     settings: Settings
     reported: list[list[float]] = field(default_factory=list)
 
-    def ride(self, motion: Motion, settings: Settings | None = None) -> Ride:
+    def ride(self, motion: TransientMotion, settings: Settings | None = None) -> Ride:
         """Ride a motion with the settings, or with others; errors as of `ride_engine`."""
         chosen = self.settings if settings is None else settings
         self.reported.append([])
@@ -113,27 +113,27 @@ class _Examination:
         # Of the settings themselves: what a method leaves at longer steps is its error, not its noise.
         return Ride(motion, trajectory, step_noise_of(self.engine, self.settings))
 
-    def refine(self, motion: Motion, factor: float) -> Settings:
+    def refine(self, motion: TransientMotion, factor: float) -> Settings:
         """Settings with a factor on the step; ValueError where there are none or the engine refuses them."""
         settings = self.settings if factor == 1.0 else call_engine(self.settings.refined, factor)
         self.engine.check(motion.problem, settings)
         return settings
 
-    def checks(self) -> Iterator[Check]:
+    def checks(self) -> Iterator[ConformanceCheck]:
         """All checks that take rides."""
         wrong, suitable = self.grounds()
         ridden = [name for name, good in suitable.items() if good]
         if not ridden:
             refused = f"it refuses all: {', '.join(suitable)}"
-            yield judge("grounds", "it rides on one ground at least", [*wrong, refused])
+            yield make_check("grounds", "it rides on one ground at least", [*wrong, refused])
             return
         motion = make_motion(ridden[0], Bicycle(), self.interval)
         try:
             first = self.ride(motion)
         except Exception as error:  # another package's code may break in any way
-            yield judge(f"ride on {motion.name}", _RIDE, [why_failed(error)])
+            yield make_check(f"ride on {motion.name}", _RIDE, [why_failed(error)])
             return
-        yield judge(f"ride on {motion.name}", _RIDE, _wrong_facts(first, self.reported[-1]))
+        yield make_check(f"ride on {motion.name}", _RIDE, _wrong_facts(first, self.engine.gives, self.reported[-1]))
         yield check_refusals(self.engine, self.settings, first, wrong, suitable)
         judged = tuple(_judged(first))
         yield from judged
@@ -158,44 +158,44 @@ class _Examination:
             wrong += more
         return wrong, suitable
 
-    def checks_of_another(self, motion: Motion) -> Iterator[Check]:
+    def checks_of_another(self, motion: TransientMotion) -> Iterator[ConformanceCheck]:
         """The checks of a ride of a second motion."""
         try:
             second = self.ride(motion)
         except Exception as error:  # another package's code may break in any way
-            yield judge(f"ride on {motion.name}", _RIDE, [why_failed(error)])
+            yield make_check(f"ride on {motion.name}", _RIDE, [why_failed(error)])
             return
-        yield judge(f"ride on {motion.name}", _RIDE, _wrong_facts(second, self.reported[-1]))
+        yield make_check(f"ride on {motion.name}", _RIDE, _wrong_facts(second, self.engine.gives, self.reported[-1]))
         yield from _judged(second)
 
-    def checks_of_repeats(self, first: Ride) -> Iterator[Check]:
+    def checks_of_repeats(self, first: Ride) -> Iterator[ConformanceCheck]:
         """The checks of a ride that is repeated after another one."""
         try:
             again = self.ride(first.motion)
         except Exception as error:  # another package's code may break in any way
-            yield judge("same bits", "a ride can be repeated", [why_failed(error)])
+            yield make_check("same bits", "a ride can be repeated", [why_failed(error)])
         else:
             yield check_bits(first, again.trajectory)
         yield check_own_work(first, self.engine.name)
 
-    def check_order(self, first: Ride, mapped: bool) -> Check:
+    def check_order(self, first: Ride, mapped: bool) -> ConformanceCheck:
         """The check of rides with other steps."""
         motion = first.motion
         name, claim = f"order on {motion.name}", "it is judged along a ride in the right coordinates"
         if mapped:
-            return skip(name, claim, _MAPPED)
+            return skip_check(name, claim, _MAPPED)
         if first.trajectory.ended is not None:
-            return skip(name, claim, "it does not ride to the end")
+            return skip_check(name, claim, "it does not ride to the end")
         return check_order(
             motion.name, lambda factor: self.refine(motion, factor), lambda settings: self.ride(motion, settings)
         )
 
 
-def _is_of_maps(check: Check) -> bool:
+def _is_of_maps(check: ConformanceCheck) -> bool:
     return check.name.startswith("maps on ")
 
 
-def _judged(ride: Ride) -> Iterator[Check]:
+def _judged(ride: Ride) -> Iterator[ConformanceCheck]:
     """The checks of one ride, of a short one those that a few samples can tell."""
     maps = check_maps(ride)
     mapped = maps.outcome == "failed"
@@ -204,20 +204,24 @@ def _judged(ride: Ride) -> Iterator[Check]:
     yield check_bodies(ride)
     if mapped:
         rest = f"reports, rates, clock and forces on {ride.motion.name}"
-        yield skip(rest, "they are judged in the right coordinates", _MAPPED)
+        yield skip_check(rest, "they are judged in the right coordinates", _MAPPED)
         return
     yield check_reports(ride)
     if len(ride.trajectory.time) < _FEWEST:
         rest = f"rates, clock and forces on {ride.motion.name}"
-        yield skip(rest, "they are judged along a ride", f"it has fewer than {_FEWEST} samples")
+        yield skip_check(rest, "they are judged along a ride", f"it has fewer than {_FEWEST} samples")
         return
     yield check_rates(ride)
     yield check_clock(ride)
     yield check_forces(ride)
 
 
-def _wrong_facts(ride: Ride, reported: list[float]) -> Iterator[str]:
+def _wrong_facts(ride: Ride, gives: Iterable[str], reported: list[float]) -> Iterator[str]:
+    """What is wrong with a ride before any number of it is looked at, in words."""
     trajectory, end = ride.trajectory, float(ride.motion.problem.times[-1])
+    missing = [name for name in gives if getattr(trajectory, name) is None]
+    if missing:
+        yield f"it lists {', '.join(missing)} in gives, and gives None"
     if trajectory.ended is not None:
         yield f"it ended after {trajectory.time[-1]:.6g} s: {trajectory.ended}"
     if trajectory.not_finite():
@@ -240,7 +244,7 @@ def _surroundings() -> dict[str, Any]:
     }
 
 
-def _check_surroundings(before: Mapping[str, Any]) -> Check:
+def _check_surroundings(before: Mapping[str, Any]) -> ConformanceCheck:
     after = _surroundings()
     changed = [f"it changed {what}" for what, value in before.items() if after[what] != value]
-    return judge("surroundings", "it leaves the process as it found it", changed)
+    return make_check("surroundings", "it leaves the process as it found it", changed)

@@ -37,7 +37,7 @@ def fit_factor(given: np.ndarray, expected: np.ndarray) -> float | None:
     if not 0 < square < np.inf:
         return None
     factor = float(np.sum(given * expected)) / square
-    return factor if explains(given, factor * expected, expected) else None
+    return factor if np.isfinite(factor) and explains(given, factor * expected, expected) else None
 
 
 def fit_lag(given: np.ndarray, expected: np.ndarray, time: np.ndarray) -> float | None:
@@ -52,6 +52,8 @@ def fit_lag(given: np.ndarray, expected: np.ndarray, time: np.ndarray) -> float 
     if not 0 < square < np.inf:
         return None
     lag = -float(np.sum(apart * slope)) / square
+    if not np.isfinite(lag):
+        return None
     left, constant = size_of(apart + lag * slope), size_of(apart - apart.mean(axis=0))
     # A line from sample to sample errs by its curvature over the lag.
     bend = 0.5 * lag * lag * size_of(np.gradient(slope, time[1:], axis=0))
@@ -59,7 +61,7 @@ def fit_lag(given: np.ndarray, expected: np.ndarray, time: np.ndarray) -> float 
     return lag if explained and abs(lag) <= _LONGEST_LAG * float(np.max(np.diff(time))) else None
 
 
-def explain_columns(
+def explain_numbers(
     given: np.ndarray, expected: np.ndarray, off: Sequence[int], names: Sequence[str], factors: bool = True
 ) -> Iterator[str]:
     """Say of columns what they look like.

@@ -14,7 +14,7 @@ from ...reference.kinematics import rotations
 from ...reference.surface import unit_normals
 from ..measure import ride_limits
 from .explain import fit_factor, fit_lag, size_of
-from .report import Check, judge, skip
+from .report import ConformanceCheck, make_check, skip_check
 from .rides import Ride
 
 CLAIM = "its contact forces are those of the ground on the wheels, in inertial axes and newtons"
@@ -22,11 +22,11 @@ _SETTLED = 0.5  # of the ride: contacts that start unsettled have settled by the
 _ROOM = 4.0
 
 
-def check_forces(ride: Ride) -> Check:
+def check_forces(ride: Ride) -> ConformanceCheck:
     """Check the sense of the contact forces."""
     name = f"forces on {ride.motion.name}"
     if ride.trajectory.contact_force is None or ride.exact.contact_force is None:
-        return skip(name, CLAIM, "it gives none")
+        return skip_check(name, CLAIM, "it gives none")
     late = ride.trajectory.time >= _SETTLED * ride.trajectory.time[-1]
     given, right = ride.trajectory.contact_force, ride.exact.contact_force
     off = size_of((given - right)[late]) / size_of(right[late])
@@ -41,7 +41,7 @@ def check_forces(ride: Ride) -> Check:
             wrong = [f"they look scaled by {factor:.6g}"]
         elif lag is not None:
             wrong = [f"they look {abs(lag):.3g} s {'late' if lag > 0 else 'early'}"]
-    return judge(
+    return make_check(
         name,
         CLAIM,
         wrong,

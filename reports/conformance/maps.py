@@ -22,20 +22,18 @@ import numpy as np
 from ...reference.contact import observe
 from .coordinate_maps import coordinate_maps
 from .explain import EXPLAINED, rate_names
-from .motions import Motion
-from .predictions import distance, predictions
-from .report import Check, judge, skip
+from .motions import TransientMotion
+from .predictions import measure_distance, predictions
+from .report import ConformanceCheck, make_check, skip_check
 from .rides import Ride
 
 _CLAIM = "neither its slip nor its ride is that of mirrored, swapped or rescaled coordinates"
 _LIMIT = "a map is wrong if that explains nine tenths of the slip and the gaps, or of the ride's difference"
-
-
-_AS_MUCH = 2.0
+_AS_MUCH = 2.0  # evidence that leaves up to twice the least is as good
 
 
 @dataclass(frozen=True)
-class Evidence:
+class MapEvidence:
     """How much a wrong map leaves of what it should explain.
 
     Attributes
@@ -56,18 +54,18 @@ class Evidence:
     told: str
 
 
-def check_maps(ride: Ride) -> Check:
-    """Check that a ride speaks of no wrong map."""
+def check_maps(ride: Ride) -> ConformanceCheck:
+    """Check that no wrong map explains a ride."""
     name = f"maps on {ride.motion.name}"
     if len(ride.q) < 2:
-        return skip(name, _CLAIM, "it has no sample but the start")
+        return skip_check(name, _CLAIM, "it has no sample but the start")
     found = find_wrong_map(ride)
     own = violation(ride.motion, ride.trajectory.q, ride.trajectory.qd)
     wrong = [] if found is None else [f"{found.what}: {found.told}"]
-    return judge(name, _CLAIM, wrong, [f"wheels are off rolling by {own:.2g} of their speed"], _LIMIT)
+    return make_check(name, _CLAIM, wrong, [f"wheels are off rolling by {own:.2g} of their speed"], _LIMIT)
 
 
-def find_wrong_map(ride: Ride) -> Evidence | None:
+def find_wrong_map(ride: Ride) -> MapEvidence | None:
     """The wrong map that explains a ride best, or None; two mistakes only where no single one explains it."""
     if len(ride.q) < 2:
         return None
@@ -81,29 +79,29 @@ def find_wrong_map(ride: Ride) -> Evidence | None:
     return None
 
 
-def _of_rolling(ride: Ride) -> Iterator[Evidence]:
+def _of_rolling(ride: Ride) -> Iterator[MapEvidence]:
     q, qd = ride.trajectory.q, ride.trajectory.qd
     own = violation(ride.motion, q, qd)
     for map_ in coordinate_maps():
         left = violation(ride.motion, q @ map_.positions.T, qd @ map_.rates.T)
         told = f"wheels are off rolling by {own:.2g} of their speed in its coordinates, and by {left:.2g} in the others"
-        yield Evidence(map_.what, map_.simple, _share(left, own), told)
+        yield MapEvidence(map_.what, map_.simple, _share(left, own), told)
 
 
-def _of_the_ride(ride: Ride) -> Iterator[Evidence]:
+def _of_the_ride(ride: Ride) -> Iterator[MapEvidence]:
     motion, exact, qd = ride.motion, ride.motion.exact, ride.trajectory.qd
-    own = distance(motion, ride.q, qd, exact.q, exact.qd)
+    own = measure_distance(motion, ride.q, qd, exact.q, exact.qd)
     for one in predictions(motion):
-        left = distance(motion, ride.trajectory.q, qd, one.q, one.qd)
+        left = measure_distance(motion, ride.trajectory.q, qd, one.q, one.qd)
         told = f"its ride is {own:.2g} from the reference's, and {left:.2g} from the reference's with that mistake"
-        yield Evidence(one.what, one.simple, _share(left, own), told)
+        yield MapEvidence(one.what, one.simple, _share(left, own), told)
 
 
 def _share(left: float, own: float) -> float:
     return left / own if 0 < own < np.inf else (0.0 if left < own else np.inf)
 
 
-def violation(motion: Motion, q: np.ndarray, qd: np.ndarray) -> float:
+def violation(motion: TransientMotion, q: np.ndarray, qd: np.ndarray) -> float:
     """How far wheels are from rolling on the ground, a mean over samples: slip over speed, and gap over radius.
 
     inf where a wheel has no contact. The first sample is the problem's start, which says nothing of the engine.

@@ -49,7 +49,7 @@ OTHER_BICYCLE = replace(
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class TransientMotion:
     """A problem and the reference's ride of it.
 
     Attributes
@@ -122,7 +122,7 @@ def make_problem(ground: str, bicycle: Bicycle, interval: float, samples: int) -
 
 
 @lru_cache(maxsize=16)
-def make_motion(ground: str, bicycle: Bicycle, interval: float, samples: int = SAMPLES) -> Motion:
+def make_motion(ground: str, bicycle: Bicycle, interval: float, samples: int = SAMPLES) -> TransientMotion:
     """Let the reference ride a problem of `make_problem`.
 
     Raises
@@ -136,7 +136,7 @@ def make_motion(ground: str, bicycle: Bicycle, interval: float, samples: int = S
     upright = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.0, 0.0, (0.0, 0.0, _REAR_RATE))
     growth = growth_rate(Plane(), linearise(bicycle, Plane(), *upright).eigenvalues, 0.0)
     scale = Scale.of(bicycle, problem.qd, bicycle.wheelbase, growth, float(problem.times[-1]))
-    return Motion(ground, problem, exact, shifted, scale)
+    return TransientMotion(ground, problem, exact, shifted, scale)
 
 
 def _ride(problem: Problem) -> Trajectory:

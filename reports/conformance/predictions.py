@@ -19,10 +19,12 @@ from ...engines.rolling import WheelContact, observe_wheel
 from ...reference.bicycle import Bicycle
 from ...reference.simulate import PreciseMotion, simulate, simulate_modified_euler
 from ...reference.surface import Surface
+from ..measure import ROUND_OFF
 from .coordinate_maps import CoordinateMap, coordinate_maps
-from .motions import Motion
+from .motions import TransientMotion
 
 _STEP = 1e-3  # of the rides that keep what is off the constraints [s]
+_TELLING = 100.0  # times the error of a method
 _LIFTS = 5  # Newton steps to the ground
 
 
@@ -47,12 +49,23 @@ class Prediction:
 
 
 @lru_cache(maxsize=16)
-def predictions(motion: Motion) -> tuple[Prediction, ...]:
-    """Rides of a motion with every map of `maps.coordinate_maps` wrong in every way."""
-    return tuple(one for map_ in coordinate_maps() for one in _predict(motion, map_))
+def predictions(motion: TransientMotion) -> tuple[Prediction, ...]:
+    """Rides of a motion with every map of `coordinate_maps` wrong in every way.
+
+    Those are left out that differ from the right ride by no more than the errors of the methods by which they are
+    found: such a mistake does not show in this motion.
+    """
+    exact = motion.exact
+    error = max(measure_distance(motion, one.q, one.qd, exact.q, exact.qd) for one in _rides(motion.problem))
+    found = (one for map_ in coordinate_maps() for one in _predict(motion, map_))
+    return tuple(
+        one
+        for one in found
+        if measure_distance(motion, one.q, one.qd, exact.q, exact.qd) > _TELLING * max(error, ROUND_OFF)
+    )
 
 
-def _predict(motion: Motion, map_: CoordinateMap) -> Iterator[Prediction]:
+def _predict(motion: TransientMotion, map_: CoordinateMap) -> Iterator[Prediction]:
     back, rates_back = np.linalg.inv(map_.positions).T, np.linalg.inv(map_.rates).T
     exact, problem, simple = motion.exact, motion.problem, map_.simple
     yield Prediction(f"{map_.what} on the way back", simple, exact.q @ back, exact.qd @ rates_back)
@@ -105,7 +118,9 @@ def _rear_wheel(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarra
     return observe_wheel(surface, bicycle.rear_wheel_radius, centre, axle, velocity, spin)
 
 
-def distance(motion: Motion, q: np.ndarray, qd: np.ndarray, to_q: np.ndarray, to_qd: np.ndarray) -> float:
+def measure_distance(
+    motion: TransientMotion, q: np.ndarray, qd: np.ndarray, to_q: np.ndarray, to_qd: np.ndarray
+) -> float:
     """Root mean square of the differences of two rides from the second sample on, relative to the motion's sizes."""
     n = min(len(q), len(to_q))
     apart = [(q[1:n] - to_q[1:n]) / motion.sizes, (qd[1:n] - to_qd[1:n]) / motion.scale.rates]

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from ...engines.engine import REQUIRED, SHAPES, Engine, load_engine, why_failed
 from ...engines.guard import GuardedEngine, call_engine
 from ..measure import LARGEST_NOISE, ROUND_OFF
-from .report import Check, judge
+from .report import ConformanceCheck, make_check
 
 _FACTS = ("name", "version", "gives", "settings")
 _CALLS = {"check": 2, "step_noise": 1, "simulate": 3}
@@ -20,21 +20,21 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 _OPTIONAL = tuple(name for name in SHAPES if name not in REQUIRED)
 
 
-def guard_engine(engine: Engine | str) -> tuple[GuardedEngine | None, Check]:
+def guard_engine(engine: Engine | str) -> tuple[GuardedEngine | None, ConformanceCheck]:
     """Put an engine behind the guard, and check that it has what the protocol asks for.
 
     Returns
     -------
     engine : GuardedEngine or None
         None where a member is missing or breaks.
-    check : Check
+    check : ConformanceCheck
     """
     claim = "it has what velodrome.engines.engine.Engine lists, of the types that it states"
     if isinstance(engine, str):
         try:
             engine = load_engine(engine)
         except ValueError as error:
-            return None, judge("protocol", claim, [str(error)])
+            return None, make_check("protocol", claim, [str(error)])
     inner = engine.inner if isinstance(engine, GuardedEngine) else engine
     members, wrong = {}, []
     for name in (*_FACTS, *_CALLS):
@@ -43,12 +43,12 @@ def guard_engine(engine: Engine | str) -> tuple[GuardedEngine | None, Check]:
         except Exception as error:  # another package's code may break in any way
             wrong.append(f"its {name} cannot be read: {why_failed(error)}")
     if wrong:
-        return None, judge("protocol", claim, wrong)
+        return None, make_check("protocol", claim, wrong)
     guarded = GuardedEngine(inner, **{fact: members[fact] for fact in _FACTS})
     wrong = [*_wrong_facts(guarded), *_wrong_calls(members)]
     model = guarded.settings
     usable = isinstance(model, type) and issubclass(model, BaseModel) and isinstance(guarded.gives, tuple)
-    return guarded if usable else None, judge("protocol", claim, wrong)
+    return guarded if usable else None, make_check("protocol", claim, wrong)
 
 
 def _wrong_facts(engine: GuardedEngine) -> Iterator[str]:
@@ -79,9 +79,9 @@ def _wrong_calls(members: Mapping[str, Any]) -> Iterator[str]:
             continue
 
 
-def check_settings(engine: GuardedEngine) -> Check:
+def check_settings(engine: GuardedEngine) -> ConformanceCheck:
     """Check the model of the settings: defaults, refusals, bounds, descriptions, units and step noise."""
-    return judge(
+    return make_check(
         "settings",
         "every setting has a default, bounds and a description; what is unknown or no number is refused",
         _wrong_settings(engine),

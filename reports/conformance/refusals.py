@@ -8,8 +8,8 @@ from typing import Any
 from ...engines.admission import ride_engine
 from ...engines.engine import Problem, UnsuitableProblem, why_failed
 from ...engines.guard import GuardedEngine
-from .motions import SAMPLES, Motion, awkward_interval, make_motion
-from .report import Check, judge
+from .motions import SAMPLES, TransientMotion, awkward_interval, make_motion
+from .report import ConformanceCheck, make_check
 from .rides import Ride
 
 _ROOM = 4.0  # of two errors of one computation
@@ -32,7 +32,7 @@ def suits(engine: GuardedEngine, problem: Problem, settings: Any) -> tuple[bool,
 
 def check_refusals(
     engine: GuardedEngine, settings: Any, ride: Ride, wrong: list[str], suitable: dict[str, bool]
-) -> Check:
+) -> ConformanceCheck:
     """Check refusals of grounds, found before, and of output times that the step does not meet."""
     seen = [f"it rides on the {name}" if good else f"it refuses the {name}" for name, good in suitable.items()]
     found = list(wrong)
@@ -53,7 +53,7 @@ def check_refusals(
     else:
         found += _wrong_ride(engine, settings, ride, awkward)
         seen.append(f"it rides with an output interval of {interval:.6g} s")
-    return judge(
+    return make_check(
         "refusals",
         "check refuses what cannot be run, a ground by UnsuitableProblem and times by ValueError, in one line; the "
         "rest is ridden",
@@ -69,7 +69,7 @@ def _wrong_words(error: Exception, what: str) -> Iterator[str]:
         yield f"{what} says {words[:80]!r}; it must say in one line what is wrong and what would be right"
 
 
-def _wrong_ride(engine: GuardedEngine, settings: Any, ride: Ride, awkward: Motion) -> Iterator[str]:
+def _wrong_ride(engine: GuardedEngine, settings: Any, ride: Ride, awkward: TransientMotion) -> Iterator[str]:
     """What is wrong with the samples of a ride whose output times lie between steps."""
     accepted = f"check accepts an output interval of {awkward.problem.times[1]:.6g} s, and"
     try:

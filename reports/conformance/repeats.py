@@ -7,14 +7,14 @@ import numpy as np
 from ...engines.engine import REFERENCE, SHAPES, Trajectory
 from ...reference.dae import dynamics
 from ..measure import state_error
-from .report import Check, judge, skip
+from .report import ConformanceCheck, make_check, skip_check
 from .rides import Ride
 
 _FEWEST = 5  # samples in which two rides cannot agree by chance
 _MANY = 0.5  # of the numbers: that many are not equal to the last bit by chance
 
 
-def check_bits(ride: Ride, again: Trajectory) -> Check:
+def check_bits(ride: Ride, again: Trajectory) -> ConformanceCheck:
     """Check that a ride is the same to the bit when it is repeated after another one."""
     first, wrong = ride.trajectory, []
     for name in SHAPES:
@@ -29,10 +29,10 @@ def check_bits(ride: Ride, again: Trajectory) -> Check:
         for name in ("steps", "unconverged_steps", "largest_residual", "ended")
         if getattr(first, name) != getattr(again, name)
     ]
-    return judge("same bits", "a ride is the same to the last bit when it is repeated after another one", wrong)
+    return make_check("same bits", "a ride is the same to the last bit when it is repeated after another one", wrong)
 
 
-def check_own_work(ride: Ride, engine: str) -> Check:
+def check_own_work(ride: Ride, engine: str) -> ConformanceCheck:
     """Check that an engine has not taken coordinates or forces from the reference.
 
     An engine that integrates by itself rounds its start to its own coordinates and every step after it. So its ride
@@ -41,10 +41,10 @@ def check_own_work(ride: Ride, engine: str) -> Check:
     """
     name, claim = "own work", "its coordinates and forces are computed by itself, not taken from the reference"
     if engine == REFERENCE:
-        return skip(name, claim, "it is the reference")
+        return skip_check(name, claim, "it is the reference")
     n, wrong = len(ride.trajectory.time), []
     if n < _FEWEST:
-        return skip(name, claim, f"its ride has fewer than {_FEWEST} samples")
+        return skip_check(name, claim, f"its ride has fewer than {_FEWEST} samples")
     least = state_error(ride.motion.round_off.first(n), ride.motion.exact, ride.motion.scale)
     apart = state_error(ride.followed, ride.motion.exact, ride.motion.scale)
     if apart <= least:
@@ -55,7 +55,7 @@ def check_own_work(ride: Ride, engine: str) -> Check:
     forces = ride.trajectory.contact_force
     if forces is not None and any(np.mean(forces == taken) > _MANY for taken in _forces_of_the_reference(ride)):
         wrong.append("its contact forces are the reference's to the last bit; an engine that has none gives None")
-    return judge(name, claim, wrong, [f"apart from the reference by {apart:.2g}, more than {least:.2g}"])
+    return make_check(name, claim, wrong, [f"apart from the reference by {apart:.2g}, more than {least:.2g}"])
 
 
 def _forces_of_the_reference(ride: Ride) -> list[np.ndarray]:

@@ -13,7 +13,7 @@ _WIDTH = 118
 
 
 @dataclass(frozen=True)
-class Check:
+class ConformanceCheck:
     """One check of an engine.
 
     Attributes
@@ -52,16 +52,16 @@ class ConformanceReport:
     engine, version : str
     settings : dict
         With which it was examined, JSON values.
-    checks : tuple of Check
+    checks : tuple of ConformanceCheck
     """
 
     engine: str
     version: str
     settings: dict[str, Any]
-    checks: tuple[Check, ...]
+    checks: tuple[ConformanceCheck, ...]
 
     @property
-    def failed(self) -> tuple[Check, ...]:
+    def failed(self) -> tuple[ConformanceCheck, ...]:
         """The checks that failed."""
         return tuple(check for check in self.checks if check.outcome == "failed")
 
@@ -70,7 +70,7 @@ class ConformanceReport:
         """Whether no check failed."""
         return not self.failed
 
-    def __getitem__(self, name: str) -> Check:
+    def __getitem__(self, name: str) -> ConformanceCheck:
         """Return the check of a name."""
         for check in self.checks:
             if check.name == name:
@@ -98,12 +98,14 @@ class ConformanceError(AssertionError):
         self.report = report
 
 
-def judge(name: str, claim: str, wrong: Iterable[str], seen: Iterable[str] = (), tolerance: str = "") -> Check:
+def make_check(
+    name: str, claim: str, wrong: Iterable[str], seen: Iterable[str] = (), tolerance: str = ""
+) -> ConformanceCheck:
     """Make a check that fails if anything is ``wrong``, and else says what was ``seen``."""
     faults = tuple(wrong)
-    return Check(name, "failed" if faults else "passed", claim, faults or tuple(seen), tolerance)
+    return ConformanceCheck(name, "failed" if faults else "passed", claim, faults or tuple(seen), tolerance)
 
 
-def skip(name: str, claim: str, why: str) -> Check:
+def skip_check(name: str, claim: str, why: str) -> ConformanceCheck:
     """Make a check that was not done."""
-    return Check(name, "skipped", claim, (why,))
+    return ConformanceCheck(name, "skipped", claim, (why,))

@@ -15,7 +15,7 @@ from ...reference.bicycle import BODIES
 from ...reference.kinematics import WHEELS
 from ..measure import describe_mismatch
 from .explain import EXPLAINED, explains, fit_factor, fit_lag
-from .report import Check, judge, skip
+from .report import ConformanceCheck, make_check, skip_check
 from .rides import Ride
 
 LIMIT = "error of the start, step_noise and four times the error of the coordinates themselves"
@@ -24,23 +24,23 @@ _REPORTS = ("contact_point", "gap", "slip", "kinetic_energy", "potential_energy"
 _ORDERS = {"(x, y, z, w)": [3, 0, 1, 2], "(z, y, x, w)": [3, 2, 1, 0], "(w, z, y, x)": [0, 3, 2, 1]}
 
 
-def check_bodies(ride: Ride) -> Check:
+def check_bodies(ride: Ride) -> ConformanceCheck:
     """Check the poses of the four bodies."""
     wrong = []
     for one in ride.mismatch(["body_position", "body_quaternion"]):
         wrong.append(describe_mismatch(one.as_json()))
         wrong += _explain_positions(ride) if one.quantity == "body_position" else _explain_quaternions(ride)
-    return judge(
+    return make_check(
         f"bodies on {ride.motion.name}", "its bodies are where its coordinates put them", wrong, tolerance=LIMIT
     )
 
 
-def check_reports(ride: Ride) -> Check:
+def check_reports(ride: Ride) -> ConformanceCheck:
     """Check the contact points, gaps, slip and energies that the engine gives."""
     name, claim = f"reports on {ride.motion.name}", "contacts and energies that it gives follow from its coordinates"
     given = [field for field in _REPORTS if getattr(ride.trajectory, field) is not None]
     if not given:
-        return skip(name, claim, "it gives none")
+        return skip_check(name, claim, "it gives none")
     wrong, seen = [], [f"it gives {', '.join(given)}"]
     if ride.mismatch(["qd"]):
         given = [field for field in given if field not in _OF_RATES]
@@ -50,7 +50,7 @@ def check_reports(ride: Ride) -> Check:
         explanation = _explain_report(ride, one.quantity)
         if explanation is not None:
             wrong.append(explanation)
-    return judge(name, claim, wrong, seen, LIMIT)
+    return make_check(name, claim, wrong, seen, LIMIT)
 
 
 def _explain_positions(ride: Ride) -> Iterator[str]:

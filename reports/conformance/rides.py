@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ...engines.engine import Trajectory
 from ...reference.kinematics import YAW
 from ..measure import LARGEST_NOISE, ROUND_OFF, START_ERROR, Mismatch, evaluate_ride, find_mismatches, noise
-from .motions import Motion
+from .motions import TransientMotion
 
 _SINGLE = 2.0**-23
 
@@ -22,14 +23,14 @@ class Ride:
 
     Attributes
     ----------
-    motion : Motion
+    motion : TransientMotion
     trajectory : Trajectory
         As `velodrome.engines.admission.ride_engine` admits it.
     step_noise : float
         Relative error that a step of the engine may add beyond its method, as it says itself.
     """
 
-    motion: Motion
+    motion: TransientMotion
     trajectory: Trajectory
     step_noise: float
 
@@ -74,7 +75,7 @@ class Ride:
         """Largest error of the coordinates against the reference, relative to the motion's sizes."""
         return float(np.abs((self.q - self.exact.q) / self.motion.sizes).max()) + START_ERROR
 
-    def altered(self, **changes: np.ndarray) -> Ride:
+    def altered(self, **changes: Any) -> Ride:
         """The ride with other samples of some fields."""
         return Ride(self.motion, replace(self.trajectory, **changes), self.step_noise)
 

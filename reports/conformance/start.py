@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...reference.kinematics import COORDINATES
-from .explain import explain_columns, rate_names
-from .report import Check, judge
+from .explain import explain_numbers, rate_names
+from .report import ConformanceCheck, make_check
 from .rides import Ride, without_turns
 
 # A state goes through rotations and back: some dozens of products and sums, each rounded, none of them cancelling.
@@ -14,7 +14,7 @@ _ROUNDINGS = 64
 _MANY = 3  # a map mistakes so many at once; what is off in more is moved as a whole
 
 
-def check_start(ride: Ride, mapped: bool) -> Check:
+def check_start(ride: Ride, mapped: bool) -> ConformanceCheck:
     """Check that the first sample is the problem's start, but for whole turns of the angles.
 
     Parameters
@@ -38,8 +38,8 @@ def check_start(ride: Ride, mapped: bool) -> Check:
             what = ", ".join(names[i] for i in off) if len(off) < len(names) else f"all, from {names[0]} on"
             wrong.append(f"its first sample is off in {what}, by {apart.max():.2g} at the most: it moves its start")
             off = [] if mapped else [int(np.argmax(apart))]
-        wrong += explain_columns(own[None], asked[None], off, names, factors=not mapped)
-    return judge(
+        wrong += explain_numbers(own[None], asked[None], off, names, factors=not mapped)
+    return make_check(
         f"start on {ride.motion.name}",
         "its first sample is the state that the problem starts from, but for whole turns",
         wrong,

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..measure import describe_mismatch
-from .explain import explain_columns, fit_lag, rate_names, size_of
-from .report import Check, judge
+from .explain import explain_numbers, fit_lag, rate_names, size_of
+from .report import ConformanceCheck, make_check
 from .rides import Ride
 
 _CONSTANT = 0.25  # a lag in the first samples is that of the whole ride up to this share
@@ -20,7 +20,7 @@ _FIRST = 5  # samples
 _ROOM = 4.0  # of two errors of one computation, as in `velodrome.reports.measure.consistency`
 
 
-def check_clock(ride: Ride) -> Check:
+def check_clock(ride: Ride) -> ConformanceCheck:
     """Check that every sample is of the time that it carries.
 
     A ride whose clock is wrong runs the right course at wrong times: its difference from the reference's is the
@@ -30,7 +30,7 @@ def check_clock(ride: Ride) -> Check:
     q = ride.q.copy()
     q[1:] -= half * ride.exact.qd[1:]
     told = _lag(ride.altered(q=q)) is not None
-    return judge(
+    return make_check(
         f"clock on {ride.motion.name}",
         "every sample is of the time that it carries",
         [] if lag is None else [f"its samples look {_late(lag)}, all by the same: its clock is not that of its state"],
@@ -39,14 +39,14 @@ def check_clock(ride: Ride) -> Check:
     )
 
 
-def check_rates(ride: Ride) -> Check:
+def check_rates(ride: Ride) -> ConformanceCheck:
     """Check that the rates are the derivatives of the coordinates."""
     half, wrong = ride.step / 2, [describe_mismatch(one.as_json()) for one in ride.mismatch(["qd"])]
     slope = np.gradient(ride.exact.qd, ride.trajectory.time, axis=0, edge_order=2)
     late = ride.trajectory.qd - half * slope
     late[0] = ride.trajectory.qd[0]
     told = bool(ride.altered(qd=late).mismatch(["qd"]))
-    return judge(
+    return make_check(
         f"rates on {ride.motion.name}",
         "its rates are the derivatives of its coordinates",
         [*wrong, *_explain_rates(ride)] if wrong else [],
@@ -82,4 +82,4 @@ def _explain_rates(ride: Ride) -> Iterator[str]:
     apart = np.sqrt(np.mean((given - expected) ** 2, axis=0))
     # One fault spreads into the others by the motion: the worst, and what is as wrong.
     off = [int(i) for i in np.flatnonzero(apart >= apart.max() / 2)]
-    yield from explain_columns(given, expected, off, rate_names())
+    yield from explain_numbers(given, expected, off, rate_names())

@@ -18,12 +18,14 @@ from .precision import (
     eigenvalue_pairs,
     engine_document,
 )
+from .quantities import QUANTITIES, Quantity
 from .steady import steady_trajectory
 
 __all__ = [
     "DISTURBANCES",
     "IDENTIFY_LEVELS",
     "LARGEST_NOISE",
+    "QUANTITIES",
     "ROUND_OFF",
     "SAME_BITS",
     "START_ERROR",
@@ -34,6 +36,7 @@ __all__ = [
     "Mismatch",
     "Mode",
     "Modes",
+    "Quantity",
     "Scale",
     "compared_time",
     "comparison_horizon",

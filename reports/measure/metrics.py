@@ -19,9 +19,8 @@ from .consistency import evaluate_ride, find_mismatches, largest_speed
 from .fall import fell_at, until_fall
 from .friction import cone_is_left, normal_force, required_friction
 from .limits import ROUND_OFF
+from .quantities import QUANTITIES
 
-# Quantities that have a largest value and one at the end, where they have any.
-_WITH_PARTS = ("position_error", "orientation_error")
 SETTLED_SHARE = 0.2  # from here on contacts that start unsettled have settled, of any model here [s]
 
 
@@ -99,8 +98,8 @@ def flatten_metrics(metrics: Mapping[str, Any]) -> dict[str, Any]:
     for name, value in metrics.items():
         if isinstance(value, Mapping):
             found |= {f"{name}_{part}": number for part, number in value.items()}
-        elif name in _WITH_PARTS:
-            found |= dict.fromkeys((f"{name}_max", f"{name}_end"))
+        elif name in QUANTITIES and QUANTITIES[name].parts:
+            found |= {f"{name}_{part}": None for part in QUANTITIES[name].parts}
         elif isinstance(value, list):
             found[name] = ", ".join(part if isinstance(part, str) else part["quantity"] for part in value) or None
         else:

@@ -7,26 +7,11 @@ from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
 from ...engines.engine import REFERENCE
+from ..drawing import COLUMNS
+from ..measure import QUANTITIES
 
-# One for each column of `velodrome.reports.drawing.summary.COLUMNS`.
-COLUMN_MEANINGS = {
-    "position_error": "Largest distance of the point D, on the steering axis, from where the reference has it at the "
-    "same time.",
-    "orientation_error": "Largest angle between the rear frame and the reference's.",
-    "rate_error": "Largest difference of any of the nine rates from the reference's: rates of D relative to its "
-    "largest speed, the others to the largest angular rate.",
-    "contact_force_error": "Largest difference of a contact force from the reference's, relative to the largest force "
-    "that the reference needs.",
-    "radius_drift_rate": "Slope of the distance from the bowl's axis, less the reference's: does the circle widen or "
-    "shrink of itself?",
-    "energy_drift": "Largest change of the total energy, relative to the start's. Nothing here dissipates.",
-    "max_slip": "Largest speed of a wheel's material at its contact point: zero for a wheel that rolls.",
-    "cpu_time": "Process time of the integration alone; it says as much of the machine as of the engine.",
-}
-HORIZON = (
-    "Time up to which the comparison means anything: until then the motion's own instability has not grown the "
-    "engine's first error to the size of the motion."
-)
+COLUMN_MEANINGS = {metric: QUANTITIES[metric].meaning for _, _, metric, _ in COLUMNS}
+HORIZON = QUANTITIES["horizon"].meaning
 
 
 def explain_columns(

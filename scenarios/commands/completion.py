@@ -8,12 +8,12 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ..names import announced_names, library_names
+from ..names import announced_names, list_library
 
 
 def complete_scenario(incomplete: str) -> list[str]:
     """Names of the library's scenarios, and paths to TOML files and folders on the way to them."""
-    return [*_beginning(library_names(), incomplete), *_paths(incomplete, ".toml")]
+    return [*_beginning(list_library(), incomplete), *_paths(incomplete, ".toml")]
 
 
 def complete_engine(incomplete: str) -> list[str]:

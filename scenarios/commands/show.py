@@ -27,9 +27,10 @@ def show_command(
     from rich.console import Console
 
     from ..show import kind_of, make_document, make_schema
+    from ..sweep import SweepFile
     from .present_show import show_document
 
-    document = make_schema(kind_of(name), name) if schema else make_document(name)
+    document = make_schema(kind_of(name), name, SweepFile) if schema else make_document(name, SweepFile)
     with ending_with(0):
         if as_json or schema:
             print_json(document)

@@ -11,7 +11,7 @@ from ...reference.critical import reconnections
 from ...reference.families import FAMILIES, trace
 from ...reference.special import SpecialPoint, special_points
 from .evidence import Evidence, families_command_line
-from .ledger import Check, LedgerLine, above, below, claim_line, equals, source
+from .ledger import LedgerLine, SelfCheck, above, below, claim_line, equals, source
 from .profile import abscissa, curve_distance, figure_coordinates, nearest_point
 from .search import search_motions
 
@@ -108,9 +108,9 @@ def _small_curvature_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     yield _alike_line(evidence, "at alpha = 1/200 the curves are very similar to the plane's", _PLANE, _SMALL, FAMILIES)
 
 
-def _check_pivots(ends: list[np.ndarray]) -> Check:
+def _check_pivots(ends: list[np.ndarray]) -> SelfCheck:
     spin = max(abs(float(u[REAR_SPEED])) for u in ends)
-    return Check("largest rear speed of G and H", spin, 1e-12)
+    return SelfCheck("largest rear speed of G and H", spin, 1e-12)
 
 
 def _find_cusps(evidence: Evidence, alpha: float) -> tuple[SpecialPoint, SpecialPoint] | None:
@@ -139,7 +139,7 @@ def _collision_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     # The distance of two turning points that merge is proportional to the square root of alpha's distance from there.
     order = float(np.log(near[0] / near[1]) / np.log(_NEAR[0] / _NEAR[1]))
     after = _find_cusps(evidence, touch.alpha * (1 + _NEAR[0]))
-    touching = [Check("residual of the touching point's equations", touch.residual, 1e-12)]
+    touching = [SelfCheck("residual of the touching point's equations", touch.residual, 1e-12)]
     yield claim_line(
         section="3.3",
         claim=claim,
@@ -167,7 +167,7 @@ def _collision_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     yield _separation_line(evidence, touching)
 
 
-def _separation_line(evidence: Evidence, touching: list[Check]) -> LedgerLine:
+def _separation_line(evidence: Evidence, touching: list[SelfCheck]) -> LedgerLine:
     gaps, direction = [], np.zeros(3)
     for alpha in (_AFTER, 0.03, 0.02):
         second, fourth = (figure_coordinates(evidence.bicycle, evidence.samples(alpha, number)) for number in (2, 4))
@@ -235,5 +235,5 @@ def _role_line(evidence: Evidence) -> LedgerLine:
         thresholds=[above("alphas at which families touch", len(touches), 0)],
         measured="; ".join(f"{' and '.join(map(str, t.families))} touch at alpha = {t.alpha:.11f}" for t in touches),
         source=_TOUCHING,
-        checks=[Check("largest residual of the touching points' equations", residual, 1e-12)],
+        checks=[SelfCheck("largest residual of the touching points' equations", residual, 1e-12)],
     )

@@ -9,7 +9,7 @@ import numpy as np
 from ...reference.circular import LEAN, STEER, CircularMotion, newton, rear_rate_condition
 from ...reference.families import find_motions
 from .evidence import Evidence
-from .ledger import Check, LedgerLine, Source, Threshold, above, below, claim_line, figure_line, source
+from .ledger import LedgerLine, SelfCheck, Source, Threshold, above, below, claim_line, figure_line, source
 
 NAMES = ("P1", "P2", "P3", "P4")
 _ROUND_OFF = 1e-14  # of numbers of order ten
@@ -75,7 +75,7 @@ def own_errors(evidence: Evidence, name: str, motion: CircularMotion) -> dict[st
 
 def _description_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     one, two, three, four = (named_motion(evidence, name) for name in NAMES)
-    solved = [Check("largest residual", max(m.residual for m in (one, two, three, four)), 1e-12)]
+    solved = [SelfCheck("largest residual", max(m.residual for m in (one, two, three, four)), 1e-12)]
     command = " && ".join(circular_command_line(evidence, name) for name in NAMES)
     solved_motions = source("the motions P1 to P4", find_motions, command=command)
 

@@ -16,7 +16,7 @@ from ...reference.families import FAMILIES, Family, find_motions, trace
 from ...reference.sections import SectionEnd, sample_family, stable_sections
 from ...reference.special import SpecialPoint, special_points
 from ...reference.surface import Paraboloid
-from .ledger import Check
+from .ledger import SelfCheck
 from .printed import read_printed
 from .search import OTHER_GRID, FoundMotion, find_missing, search_motions
 
@@ -90,7 +90,7 @@ class Evidence:
         """Return static equilibria, pivoting motions and whole curves, found from a grid of starts."""
         return self.once(("search", "alpha", alpha), lambda: search_motions(Steady(self.bicycle, Paraboloid(alpha))))
 
-    def searched_again(self, *alphas: float) -> Check:
+    def searched_again(self, *alphas: float) -> SelfCheck:
         """Check that a search from other starts finds the same, so that counts do not depend on the grid."""
         lone = 0
         for alpha in alphas:
@@ -99,7 +99,7 @@ class Evidence:
                 lambda a=alpha: search_motions(Steady(self.bicycle, Paraboloid(a)), OTHER_GRID),
             )
             lone += find_missing(self.found(alpha), again)
-        return Check("motions and curves found by only one of two searches from different starts", float(lone), 0.0)
+        return SelfCheck("motions and curves found by only one of two searches from different starts", float(lone), 0.0)
 
     def motions(self, alpha: float, number: int, rear_rate: float) -> list[CircularMotion]:
         """Return the motions of a family at a rear rate."""
@@ -113,14 +113,14 @@ class Evidence:
         points = self.once(("touching points",), lambda: reconnections(self.bicycle, largest=LARGEST_TOUCHING))
         return next((point for point in points if point.families == families), None)
 
-    def residual(self, alphas: tuple[float, ...] | None = None) -> Check:
+    def residual(self, alphas: tuple[float, ...] | None = None) -> SelfCheck:
         """Check the largest residual of the full equations over all points of all families.
 
         The families are solved from eight reduced equations; the full equations are a different form of them.
         """
         alphas = self.cases if alphas is None else alphas
         worst = max(self._residual(alpha, number) for alpha in alphas for number in FAMILIES)
-        return Check("largest residual of the 21 equations along the families", worst, LARGEST_RESIDUAL)
+        return SelfCheck("largest residual of the 21 equations along the families", worst, LARGEST_RESIDUAL)
 
     def _residual(self, alpha: float, number: int) -> float:
         family = self.family(alpha, number)

@@ -24,7 +24,7 @@ _RELATIONS: dict[str, Callable[[float, float], bool]] = {
 
 
 @dataclass(frozen=True)
-class Check:
+class SelfCheck:
     """A test of the measurement itself, passed if the value is within the limit.
 
     Attributes
@@ -156,7 +156,7 @@ class LedgerLine:
         What was computed, by which functions and command.
     thresholds : tuple of Threshold
         Conditions behind the verdict. The verdict on a printed figure depends on the first one that is met.
-    checks : tuple of Check
+    checks : tuple of SelfCheck
         Tests of the measurement: residuals, an independent way to the same figure.
     """
 
@@ -169,7 +169,7 @@ class LedgerLine:
     thresholds: tuple[Threshold, ...] = ()
     printed: str | None = None
     value: float | None = None
-    checks: tuple[Check, ...] = field(default=())
+    checks: tuple[SelfCheck, ...] = field(default=())
 
     @property
     def holds(self) -> bool:
@@ -249,7 +249,7 @@ def figure_line(
     value: float,
     error: float,
     source: Source,
-    checks: Iterable[Check] = (),
+    checks: Iterable[SelfCheck] = (),
     kind: str = "number",
 ) -> LedgerLine:
     """Make a line on a printed figure.
@@ -264,7 +264,7 @@ def figure_line(
     error : float
         Error of the measurement; it must be too small to change the verdict.
     source : Source
-    checks : iterable of Check
+    checks : iterable of SelfCheck
         Further tests of the measurement.
     kind : str
 
@@ -273,7 +273,7 @@ def figure_line(
     LedgerLine
     """
     margin = abs(abs(Decimal(value) - Decimal(printed)) - unit_of(printed) / 2)
-    tests = (Check("own error, against the distance from the limit of rounding", error, float(margin)), *checks)
+    tests = (SelfCheck("own error, against the distance from the limit of rounding", error, float(margin)), *checks)
     digits = max(3, -int(Decimal(printed).as_tuple().exponent) + 4)
     thresholds = figure_thresholds(value, printed)
     line = LedgerLine(
@@ -297,7 +297,7 @@ def claim_line(
     thresholds: Iterable[Threshold],
     measured: str,
     source: Source,
-    checks: Iterable[Check],
+    checks: Iterable[SelfCheck],
     kind: str = "structure",
     printed: str | None = None,
 ) -> LedgerLine:
@@ -318,7 +318,7 @@ def claim_line(
 
 
 def count_line(
-    section: str, claim: str, printed: int, value: int, measured: str, source: Source, checks: Iterable[Check] = ()
+    section: str, claim: str, printed: int, value: int, measured: str, source: Source, checks: Iterable[SelfCheck] = ()
 ) -> LedgerLine:
     """Make a line on a printed count."""
     condition = equals("count", value, printed)
@@ -344,7 +344,7 @@ def count_by_cut(
     counts: Mapping[str, int],
     measured: str,
     source: Source,
-    checks: Iterable[Check] = (),
+    checks: Iterable[SelfCheck] = (),
 ) -> LedgerLine:
     """Make a line on a printed count of pieces that can be counted in several ways, with the count under each way."""
     conditions = tuple(equals(cut, value, printed) for cut, value in counts.items())
@@ -369,7 +369,7 @@ def untestable_line(section: str, claim: str, why: str, kind: str = "structure")
     return LedgerLine(section=section, claim=claim, kind=kind, measured=why, verdict=UNTESTABLE, source=nothing)
 
 
-def tested(line: LedgerLine, *more: Check) -> LedgerLine:
+def tested(line: LedgerLine, *more: SelfCheck) -> LedgerLine:
     """Add tests to a line; a line whose measurement fails a test does not hold, whatever the figures are."""
     checks = (*line.checks, *more)
     passes = line.verdict == UNTESTABLE or all(check.passes for check in checks)

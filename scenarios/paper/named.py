@@ -11,7 +11,7 @@ from ...reference.continuation import sign_changes
 from ...reference.families import FAMILIES, Family, front_rate_slope, trace
 from ...reference.special import SpecialPoint, special_points, straight_motion
 from .evidence import LONGEST_PAPER_STEP, OTHER_STEP, Evidence, families_command_line
-from .ledger import Check, LedgerLine, above, below, claim_line, count_line, figure_line, source, untestable_line
+from .ledger import LedgerLine, SelfCheck, above, below, claim_line, count_line, figure_line, source, untestable_line
 from .limits import find_limit
 from .model import model_check
 from .search import search_motions
@@ -144,7 +144,7 @@ def _straight_motion_lines(evidence: Evidence, number: int, name: str) -> Iterat
     far = np.argsort(samples.radius)[[-1, -5]]
     weights = samples.radius[far] ** 2
     limit_rate = float((weights * samples.front_rate[far]) @ [1, -1] / (weights @ [1, -1]))
-    independent = Check("against the limit of large circles", abs(limit_rate - straight.front_rate), 1e-6)
+    independent = SelfCheck("against the limit of large circles", abs(limit_rate - straight.front_rate), 1e-6)
     printed = evidence.figures[name]["front_rate"]
     claim = f"{name}: front rate"
     solved = source(
@@ -278,7 +278,7 @@ def _limit_line(family: Family, name: str, side: int, steer: float, sign: int) -
         f"d^{far.rate_exponent:.4f}, to {far.front_rate:.0f}, and the steer's distance falls like "
         f"d^{far.steer_exponent:.4f}; extrapolated steer {far.steer:.6f}, circle of D {far.radius:.4f} m",
         source=source("the family followed on at fixed leans whose distance from pi/2 halves", find_limit),
-        checks=[Check("largest residual on the way, relative", far.residual, 1e-12)],
+        checks=[SelfCheck("largest residual on the way, relative", far.residual, 1e-12)],
     )
 
 

@@ -13,7 +13,7 @@ from ...reference.kinematics import FRONT_ANGLE, LEAN, PITCH, REAR_ANGLE, STEER,
 from ...reference.simulate import simulate
 from ...reference.surface import Paraboloid
 from .evidence import Evidence, families_command_line
-from .ledger import Check, LedgerLine, above, below, claim_line, source
+from .ledger import LedgerLine, SelfCheck, above, below, claim_line, source
 from .search import mirrored
 
 _STEADY = (LEAN, PITCH, STEER)
@@ -30,7 +30,7 @@ def orbit_lines(evidence: Evidence) -> Iterator[LedgerLine]:
         change = _measure_turn(evidence, name)
         constant, sinus = max(constant, change[0]), max(sinus, change[1])
         normal, turning = max(normal, change[2]), min(turning, change[3])
-    integrated = Check("largest departure of what is constant", constant, _KEPT)
+    integrated = SelfCheck("largest departure of what is constant", constant, _KEPT)
     turned = source(
         "one turn of Q1 and of Q2, integrated from the solved motion", simulate, command="velodrome run q1 q2"
     )

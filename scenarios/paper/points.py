@@ -12,7 +12,7 @@ from ...reference.stability import Linearisation, linearise
 from ...reference.surface import Paraboloid
 from .configurations import circular_command_line, named_motion, own_errors, solved_point
 from .evidence import Evidence
-from .ledger import Check, LedgerLine, above, below, claim_line, figure_line, source, untestable_line
+from .ledger import LedgerLine, SelfCheck, above, below, claim_line, figure_line, source, untestable_line
 
 _STATES = (("x", "D's x in the heading frame"), ("y", "D's y"), ("lean", "lean"), ("steer", "steer"))
 
@@ -54,7 +54,7 @@ def _spectrum_lines(evidence: Evidence, name: str, motion: CircularMotion) -> It
                 thresholds=[below("smallest size of an eigenvalue", abs(value), 1e-9, "1/s")],
                 measured=f"smallest {abs(value):.0e}",
                 source=computed,
-                checks=[Check("its own error", float(error[i]), 1e-9)],
+                checks=[SelfCheck("its own error", float(error[i]), 1e-9)],
                 kind="number",
                 printed="0",
             )
@@ -85,7 +85,7 @@ def _stability_lines(evidence: Evidence) -> Iterator[LedgerLine]:
         reduced = linearise(evidence.bicycle, surface, *motion.state())
         rest = np.delete(reduced.eigenvalues, int(np.abs(reduced.eigenvalues).argmin()))
         growth = float(np.real(rest).max())
-        field = Check("largest of X at the motion", float(np.abs(reduced.field).max()), 1e-9)
+        field = SelfCheck("largest of X at the motion", float(np.abs(reduced.field).max()), 1e-9)
         sense, bar = ("anticlockwise", "forward") if forward else ("clockwise", "reversed")
         command = circular_command_line(evidence, name)
         half, than = np.pi / 2, (above, below) if forward else (below, above)
@@ -109,7 +109,7 @@ def _stability_lines(evidence: Evidence) -> Iterator[LedgerLine]:
             source=source("eigenvalues of the reduced Jacobian at the motion", linearise, command=command),
             checks=[
                 field,
-                Check("own error over its size", float(eigenvalue_errors(reduced).max()) / abs(growth), 1e-3),
+                SelfCheck("own error over its size", float(eigenvalue_errors(reduced).max()) / abs(growth), 1e-3),
             ],
             kind="stability",
         )
@@ -144,5 +144,5 @@ def _reference_point_line(evidence: Evidence) -> LedgerLine:
             rotations,
             command=" && ".join(circular_command_line(evidence, name) for name in ("Q1", "Q2")),
         ),
-        checks=[Check("largest residual", max(named_motion(evidence, n).residual for n in ("Q1", "Q2")), 1e-12)],
+        checks=[SelfCheck("largest residual", max(named_motion(evidence, n).residual for n in ("Q1", "Q2")), 1e-12)],
     )

@@ -10,7 +10,7 @@ from ...reference.circular import Steady
 from ...reference.families import FAMILIES, rear_rate_slope, trace
 from .evidence import Evidence
 from .fast import FlatEnd, at_angle, expand_flat, follow_flat_end, solve_flat, with_angle
-from .ledger import Check, LedgerLine, above, below, claim_line, source
+from .ledger import LedgerLine, SelfCheck, above, below, claim_line, source
 
 _NEAREST = 1e-7  # [rad] from a lean of pi/2: nearer, round-off over the distance is no longer small
 _FAR = 1e4  # [rad/s] a hundred times the rates at which the families' curves are cut off
@@ -65,7 +65,7 @@ def rate_lines(evidence: Evidence) -> Iterator[LedgerLine]:
         ),
         checks=[
             evidence.residual(),
-            Check("least share of the rear wheel's rate at infinite speed (must not be zero)", -least, -1e-3),
+            SelfCheck("least share of the rear wheel's rate at infinite speed (must not be zero)", -least, -1e-3),
         ],
     )
 

@@ -12,7 +12,7 @@ from ...reference.stability import linearise
 from ...reference.surface import Paraboloid
 from .configurations import circular_command_line, named_motion
 from .evidence import Evidence, families_command_line
-from .ledger import Check, LedgerLine, above, below, claim_line, count_line, equals, source
+from .ledger import LedgerLine, SelfCheck, above, below, claim_line, count_line, equals, source
 from .pencil import generalised_eigenvalues, linearised_dae, number_of_finite, spurious
 from .structure import GAP_ROWS, derivatives, rank
 
@@ -29,7 +29,7 @@ def reduction_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     gaps = slopes["q"][GAP_ROWS] - slopes["p"][GAP_ROWS] @ np.linalg.solve(contact, slopes["q"][9:15])
     dependent, smallest = rank(gaps[:, [2, 5]])
     independent = len(q) - dependent
-    solvable = [Check("round-off over the smallest singular value", 1e-12 / smallest, 1e-6)]
+    solvable = [SelfCheck("round-off over the smallest singular value", 1e-12 / smallest, 1e-6)]
     command = circular_command_line(evidence, "Q2")
     ranked = source("rank of the gaps' derivatives at Q2", derivatives, rank, command=command)
     yield count_line(
@@ -60,7 +60,7 @@ def reduction_lines(evidence: Evidence) -> Iterator[LedgerLine]:
         value=states,
         measured=f"X(v*) = 0 to {field:.0e} at Q2",
         source=linearised,
-        checks=[Check("largest of X at Q2", field, 1e-9)],
+        checks=[SelfCheck("largest of X at Q2", field, 1e-9)],
     )
     yield _same_equilibria_line(evidence)
     singular, smallest = rank(slopes["qdd"])
@@ -70,7 +70,7 @@ def reduction_lines(evidence: Evidence) -> Iterator[LedgerLine]:
         thresholds=[below("rank of E's rows of the equations", singular, len(slopes["qdd"]))],
         measured=f"of {len(slopes['qdd'])} equations {singular} have accelerations in them",
         source=source("rank of the equations' derivatives by the accelerations", derivatives, rank, command=command),
-        checks=[Check("round-off over the smallest singular value", 1e-12 / smallest, 1e-6)],
+        checks=[SelfCheck("round-off over the smallest singular value", 1e-12 / smallest, 1e-6)],
     )
     yield _spurious_line(evidence)
     yield _zero_eigenvalue_line(evidence)
@@ -134,7 +134,7 @@ def _spurious_line(evidence: Evidence) -> LedgerLine:
             generalised_eigenvalues,
             number_of_finite,
         ),
-        checks=[Check("finite eigenvalues, Q1 less Q2", abs(orders[0] - orders[1]), 0.0)],
+        checks=[SelfCheck("finite eigenvalues, Q1 less Q2", abs(orders[0] - orders[1]), 0.0)],
         kind="stability",
     )
 

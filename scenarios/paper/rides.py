@@ -18,7 +18,7 @@ from ...reference.surface import Paraboloid
 from .configurations import named_motion
 from .energy import motion_of_energy
 from .evidence import Evidence
-from .ledger import Check, LedgerLine, above, below, claim_line, source
+from .ledger import LedgerLine, SelfCheck, above, below, claim_line, source
 
 _OUTPUT = 0.05  # [s]
 _LEAVES = 0.01  # departure from the circle, relative to its radius
@@ -101,7 +101,9 @@ def _unstable_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     precise = integrate("exact", 0.0)
     # An error of order two is divided by four when the step is halved: the ride leaves ln 4 / growth later.
     delay, expected = half.at - whole.at, np.log(4) / growth
-    grown = Check("growth rate of the precise ride, relative to the eigenvalue", abs(precise.rate / growth - 1), 1e-2)
+    grown = SelfCheck(
+        "growth rate of the precise ride, relative to the eigenvalue", abs(precise.rate / growth - 1), 1e-2
+    )
     yield claim_line(
         section="4.2",
         claim="even with just numerical errors Q1 does not keep its circle",
@@ -113,7 +115,7 @@ def _unstable_lines(evidence: Evidence) -> Iterator[LedgerLine]:
         f"order two that grows with the eigenvalue); the precise integrator at {precise.at:.2f} s, growing at "
         f"{precise.rate:.5f} 1/s",
         source=source("rides from Q1 by two integrators", simulate_modified_euler, simulate, linearise),
-        checks=[grown, Check("delay at half the step, less the expected", abs(delay - expected), 0.02)],
+        checks=[grown, SelfCheck("delay at half the step, less the expected", abs(delay - expected), 0.02)],
         kind="simulation",
     )
     yield _rounded_start_line(evidence, motion, surface, step)
@@ -144,7 +146,7 @@ def _rounded_start_line(evidence: Evidence, motion: CircularMotion, surface: Par
         measured=f"off by 1 % at {leaves[0]:.3f} s, by the precise integrator at {leaves[1]:.3f} s: here it is the two "
         "printed decimals that matter, not the integrator",
         source=source("rides from v* as printed by two integrators", simulate_modified_euler, simulate),
-        checks=[Check("integrators' difference", abs(leaves[0] - leaves[1]), 0.01)],
+        checks=[SelfCheck("integrators' difference", abs(leaves[0] - leaves[1]), 0.01)],
         kind="simulation",
     )
 
@@ -178,7 +180,7 @@ def _energy_line(evidence: Evidence, rides: dict[int, PreciseMotion]) -> LedgerL
         measured=f"over {_LONG:g} s of the two disturbed rides of Q2 by {drift:.0e} of itself, what the tolerance of "
         f"{_TOLERANCE:.0e} leaves",
         source=source("energy along two disturbed rides of Q2", simulate, observe),
-        checks=[Check("evaluations of the right-hand side (must be many)", -evaluations, -1000)],
+        checks=[SelfCheck("evaluations of the right-hand side (must be many)", -evaluations, -1000)],
         kind="simulation",
     )
 
@@ -216,7 +218,7 @@ def _measure_settling(evidence: Evidence, ride: PreciseMotion, motion: CircularM
 
 def _stable_lines(evidence: Evidence, rides: dict[int, PreciseMotion]) -> Iterator[LedgerLine]:
     motion, surface = named_motion(evidence, "Q2"), Paraboloid(evidence.figures["Q2"]["alpha"])
-    whole = [Check("rides that ended early", float(sum(ride.ended is not None for ride in rides.values())), 0.0)]
+    whole = [SelfCheck("rides that ended early", float(sum(ride.ended is not None for ride in rides.values())), 0.0)]
     circle = float(np.hypot(*motion.position[:2]))
     off = [float(np.abs(radius(ride) - circle).max()) for ride in rides.values()]
     ridden = source("rides from Q2, disturbed, over 1200 s", simulate)
@@ -245,7 +247,7 @@ def _stable_lines(evidence: Evidence, rides: dict[int, PreciseMotion]) -> Iterat
         measured=f"to {plus.limit:.7f} (+) and {minus.limit:.7f} rad/s (-), constant to {left:.0e}; the circles of "
         f"family 2 that have the disturbed energies have {plus.predicted:.7f} and {minus.predicted:.7f}",
         source=source("rides from Q2, disturbed, and the circles of their energies", simulate, motion_of_energy),
-        checks=[*whole, Check("limits against the prediction from energy", error, 1e-6)],
+        checks=[*whole, SelfCheck("limits against the prediction from energy", error, 1e-6)],
         kind="simulation",
     )
     slowest = float(np.sort(np.real(linearise(evidence.bicycle, surface, *motion.state()).eigenvalues))[-2])
@@ -260,7 +262,7 @@ def _stable_lines(evidence: Evidence, rides: dict[int, PreciseMotion]) -> Iterat
         measured=f"what oscillates decays at {-plus.decay:.4f} and {-minus.decay:.4f} 1/s, the slowest eigenvalue's "
         f"{-slowest:.4f}; the change of energy stays",
         source=source("rides from Q2, disturbed, and the eigenvalues at Q2", simulate, linearise),
-        checks=[*whole, Check("decay over the slowest eigenvalue's, less one", departs, 0.1)],
+        checks=[*whole, SelfCheck("decay over the slowest eigenvalue's, less one", departs, 0.1)],
         kind="simulation",
     )
 

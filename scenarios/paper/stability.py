@@ -16,7 +16,7 @@ from ...reference.special import special_points
 from ...reference.stability import Linearisation, growth_rate, linearise
 from ...reference.surface import Paraboloid
 from .evidence import OTHER_STEP, Evidence, families_command_line
-from .ledger import Check, LedgerLine, Source, Threshold, above, below, claim_line, equals, source
+from .ledger import LedgerLine, SelfCheck, Source, Threshold, above, below, claim_line, equals, source
 from .profile import abscissa
 from .rides import disturbed_decay
 
@@ -100,28 +100,30 @@ def _least_growth(evidence: Evidence, alpha: float) -> float:
     return float(min(rates))
 
 
-def _check_disturbed_ride(evidence: Evidence, alpha: float, number: int, ends: tuple[SectionEnd, SectionEnd]) -> Check:
+def _check_disturbed_ride(
+    evidence: Evidence, alpha: float, number: int, ends: tuple[SectionEnd, SectionEnd]
+) -> SelfCheck:
     """Check that a disturbed ride half-way in a section decays as the eigenvalues predict."""
     motion, reduced = _half_way(evidence, alpha, number, ends)
     decay = disturbed_decay(evidence.bicycle, Paraboloid(alpha), motion)
     slowest = growth_rate(Paraboloid(alpha), reduced.eigenvalues, motion.yaw_rate)
     what = f"family {number}: decay of a disturbed ride ({decay:.5f} 1/s) over the slowest eigenvalue's, less one"
-    return Check(what, abs(decay / slowest - 1), 0.1)
+    return SelfCheck(what, abs(decay / slowest - 1), 0.1)
 
 
-def _section_checks(evidence: Evidence, alpha: float, sections: dict) -> list[Check]:
+def _section_checks(evidence: Evidence, alpha: float, sections: dict) -> list[SelfCheck]:
     """Check that ends are crossings, that a second tracing has the same ones, and that inside nothing grows."""
     checks = [evidence.residual((alpha,))]
     for number, pairs in sections.items():
         again = evidence.sections(alpha, number, OTHER_STEP)
         many = abs(len(again) - len(pairs))
-        checks.append(Check(f"family {number}: sections missing from a second tracing", many, 0.0))
+        checks.append(SelfCheck(f"family {number}: sections missing from a second tracing", many, 0.0))
         for ends, same in zip(pairs, again, strict=False):
             off = max(abs(a.motion.rear_rate - b.motion.rear_rate) for a, b in zip(ends, same, strict=True))
             # Energy extrema are less accurate: there the growth rate leaves zero like a square root.
-            checks.append(Check(f"family {number}: ends against the second tracing", off, 1e-6))
+            checks.append(SelfCheck(f"family {number}: ends against the second tracing", off, 1e-6))
             inside = _growth_half_way(evidence, alpha, number, ends)
-            checks.append(Check(f"family {number}: growth rate half-way (must be negative)", inside, -1e-4))
+            checks.append(SelfCheck(f"family {number}: growth rate half-way (must be negative)", inside, -1e-4))
     return checks
 
 
@@ -206,7 +208,7 @@ def _second_and_fourth_line(evidence: Evidence) -> LedgerLine:
     if two is None or four is None:
         missing = equals("families 2 and 4 with stable sections", sum(each is not None for each in (two, four)), 2)
         return claim_line("5", claim, [missing], "one of them has none", _VANISHING, [])
-    residual = Check("growth rate where the last sections vanish", max(two.residual, four.residual), 1e-9)
+    residual = SelfCheck("growth rate where the last sections vanish", max(two.residual, four.residual), 1e-9)
     return claim_line(
         section="5",
         claim=claim,
@@ -269,7 +271,7 @@ def _none_from_line(evidence: Evidence) -> LedgerLine:
             command="velodrome critical",
             search=evidence.found(alphas[-1]).described,
         ),
-        checks=[Check("growth rate where it vanishes", residual, 1e-9)],
+        checks=[SelfCheck("growth rate where it vanishes", residual, 1e-9)],
         kind="stability",
     )
 
@@ -286,6 +288,6 @@ def _only_small_line(evidence: Evidence) -> LedgerLine:
         measured=f"up to a curvature of {curvature:.6f} 1/m at the bottom: a radius of {1 / curvature:.1f} m, "
         f"{1 / curvature / evidence.bicycle.wheelbase:.0f} wheelbases",
         source=_VANISHING,
-        checks=[Check("growth rate where the last section vanishes", point.residual, 1e-9)],
+        checks=[SelfCheck("growth rate where the last section vanishes", point.residual, 1e-9)],
         kind="stability",
     )

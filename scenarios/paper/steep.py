@@ -14,7 +14,7 @@ from ...reference.kernels.steady import STANDING
 from .bowl import profiles
 from .evidence import Evidence, families_command_line
 from .fast import carry_pivot, pivot_at, squared_rates, with_angle
-from .ledger import Check, LedgerLine, Source, above, below, claim_line, count_by_cut, equals, source
+from .ledger import LedgerLine, SelfCheck, Source, above, below, claim_line, count_by_cut, equals, source
 from .limits import FlatLimit, find_limit
 from .search import FoundMotion, distance, search_coordinates, search_motions
 
@@ -38,13 +38,13 @@ def steep_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     yield _never_without_line(evidence)
 
 
-def _check_residual(found: FoundMotion) -> Check:
+def _check_residual(found: FoundMotion) -> SelfCheck:
     worst = 0.0
     for curve in found.curves:
         for u in curve[::5]:
             size = 1 + float(np.abs(u).max()) + abs(float(u[SIGMA]))
             worst = max(worst, float(np.abs(found.equations.residual(u)).max()) / size)
-    return Check("largest residual of the 21 equations along the curves", worst, 1e-12)
+    return SelfCheck("largest residual of the 21 equations along the curves", worst, 1e-12)
 
 
 def _changed_line(evidence: Evidence) -> LedgerLine:
@@ -118,7 +118,7 @@ def _first_and_third_lines(evidence: Evidence, found: FoundMotion) -> Iterator[L
     solved, again = _check_residual(found), evidence.searched_again(_STEEP)
     exchanged = [solved]
     if touch is not None:
-        exchanged.append(Check("residual of the touching point's equations", touch.residual, 1e-12))
+        exchanged.append(SelfCheck("residual of the touching point's equations", touch.residual, 1e-12))
     where = "nowhere" if touch is None else f"at alpha = {touch.alpha:.11f}"
     yield claim_line(
         section="3.3",
@@ -156,7 +156,7 @@ def _first_and_third_lines(evidence: Evidence, found: FoundMotion) -> Iterator[L
         checks=[
             solved,
             again,
-            Check("residual on the way to the corner", max(rest_end.residual, pivot_end.residual), 1e-12),
+            SelfCheck("residual on the way to the corner", max(rest_end.residual, pivot_end.residual), 1e-12),
         ],
     )
     yield _combined_somewhere_line(evidence)
@@ -204,7 +204,7 @@ def _four_still_line(evidence: Evidence, found: FoundMotion) -> Iterator[LedgerL
         checks=[
             _check_residual(found),
             evidence.searched_again(evidence.cases[0], _STEEP),
-            Check(
+            SelfCheck(
                 "distance of solutions that count as the same, over the smallest between two curves",
                 _SAME / _smallest_distance(found),
                 1.0,
@@ -255,7 +255,7 @@ def _combined_somewhere_line(evidence: Evidence) -> LedgerLine:
         "runs to A; not at alpha = 1",
         source=source("the touching point, and the alpha at which G comes to rest", reconnections, pivot_at),
         checks=[
-            Check("residual of the touching point's equations", np.inf if touch is None else touch.residual, 1e-12),
+            SelfCheck("residual of the touching point's equations", np.inf if touch is None else touch.residual, 1e-12),
         ],
     )
 
@@ -304,7 +304,7 @@ def _never_without_line(evidence: Evidence) -> LedgerLine:
             search=found[0].described if found else None,
         ),
         checks=[
-            Check("squared rates of the two between, over 1 rad^2/s^2 (must be negative)", highest, -1.0),
+            SelfCheck("squared rates of the two between, over 1 rad^2/s^2 (must be negative)", highest, -1.0),
             evidence.searched_again(*inside),
             *(_check_residual(each) for each in found),
         ],
@@ -370,7 +370,7 @@ def _always_lines(evidence: Evidence) -> Iterator[LedgerLine]:
     )
 
 
-def _check_steers_apart(found: FoundMotion) -> Check:
+def _check_steers_apart(found: FoundMotion) -> SelfCheck:
     steers = np.sort([u[STEER] for u in found.static])
     gap = float(np.diff(steers).min()) if len(steers) > 1 else np.inf
-    return Check("round-off over the distance of two static equilibria", 1e-12 / gap, 1e-6)
+    return SelfCheck("round-off over the distance of two static equilibria", 1e-12 / gap, 1e-6)

@@ -16,7 +16,7 @@ from ...reference.kinematics import COORDINATES, YAW, angular_velocities, body_v
 from ...reference.surface import Paraboloid
 from .brackets import growth
 from .evidence import Evidence
-from .ledger import Check, LedgerLine, below, claim_line, count_line, equals, source
+from .ledger import LedgerLine, SelfCheck, below, claim_line, count_line, equals, source
 
 CONTACT_ROWS, GAP_ROWS, ROLLING_ROWS = slice(9, 15), slice(15, 17), slice(17, 21)
 _BODIES, _HINGES = 4, 3
@@ -44,9 +44,9 @@ def rank(matrix: np.ndarray) -> tuple[int, float]:
     return many, float(values[many - 1] / values[0])
 
 
-def _check_rank(smallest: float) -> Check:
+def _check_rank(smallest: float) -> SelfCheck:
     """Check that no singular value is near the limit of the rank."""
-    return Check("limit of round-off over the smallest singular value that counts", _ROUND_OFF / smallest, 1e-3)
+    return SelfCheck("limit of round-off over the smallest singular value that counts", _ROUND_OFF / smallest, 1e-3)
 
 
 def _body_lines(printed: dict[str, int], bicycle: Bicycle, q: np.ndarray) -> Iterator[LedgerLine]:
@@ -63,7 +63,7 @@ def _body_lines(printed: dict[str, int], bicycle: Bicycle, q: np.ndarray) -> Ite
     many = np.repeat(q[None], 9, axis=0)
     motion = np.concatenate([body_velocities(bicycle, many, unit), angular_velocities(bicycle, many, unit)], axis=2)
     free, smallest = rank(motion.reshape(9, -1))
-    hinged = Check("4 x 6 - 3 x 5 less the rank", abs(6 * _BODIES - 5 * _HINGES - free), 0.0)
+    hinged = SelfCheck("4 x 6 - 3 x 5 less the rank", abs(6 * _BODIES - 5 * _HINGES - free), 0.0)
     yield count_line(
         section="2.1",
         claim="without contacts the bicycle has nine coordinates: 4 x 6 - 3 x 5",
@@ -81,7 +81,7 @@ def _body_lines(printed: dict[str, int], bicycle: Bicycle, q: np.ndarray) -> Ite
         thresholds=[below("largest entry of the difference", error, 1e-14)],
         measured=f"product of the three turns: off by {error:.0e}",
         source=source("the frame's rotation against the product of three turns", rotations),
-        checks=[Check("lean at which the order is tested, negated (must not be zero)", -abs(q[4]), -0.1)],
+        checks=[SelfCheck("lean at which the order is tested, negated (must not be zero)", -abs(q[4]), -0.1)],
     )
 
 
@@ -143,7 +143,7 @@ def _constraint_lines(
         measured=f"velocities, their brackets, brackets of those span {', '.join(map(str, reached))} dimensions: "
         "none of the four integrates",
         source=source("rank of the velocity fields and of their Lie brackets, by central differences", growth),
-        checks=[Check("1e-4 over the smallest singular value that counts", 1e-4 / smallest, 0.1)],
+        checks=[SelfCheck("1e-4 over the smallest singular value that counts", 1e-4 / smallest, 0.1)],
     )
 
 
@@ -157,7 +157,7 @@ def _equation_lines(
         "algebraic": (rows[CONTACT_ROWS.start : GAP_ROWS.stop], "contact equations and gaps"),
         "nonholonomic": (rows[ROLLING_ROWS], "rolling constraints"),
     }
-    left = Check("largest residual of the 21 equations at the solved state", float(np.abs(rows).max()), 1e-11)
+    left = SelfCheck("largest residual of the 21 equations at the solved state", float(np.abs(rows).max()), 1e-11)
     counted = source("number of equations and unknowns of the DAE, solved at a state", residual, dynamics)
     for name, (part, what) in parts.items():
         text = f"{len(part)} {what}"
@@ -203,7 +203,7 @@ def _symmetry_lines(
     lean = q.copy()
     lean[4] += 1e-3
     # Accelerations are of order 10 to 100.
-    moved = Check("change by a lean of 1e-3, negated (must be seen)", -change(lean, qd, np.eye(3)), -1e-3)
+    moved = SelfCheck("change by a lean of 1e-3, negated (must be seen)", -change(lean, qd, np.eye(3)), -1e-3)
     changed = source("accelerations at a state and at the turned one", dynamics)
     yield claim_line(
         section="3.1",
@@ -256,5 +256,5 @@ def _constant_lines(printed: dict[str, int], evidence: Evidence) -> Iterator[Led
         measured=f"the equations have rank 20 along all families: smallest relative singular value {widest:.0e}, the "
         f"next >= {least:.0e}",
         source=source("singular values of the equations' Jacobian along all families", Steady.jacobian),
-        checks=[Check("smallest over next singular value", widest / least, 1e-3), residual_check],
+        checks=[SelfCheck("smallest over next singular value", widest / least, 1e-3), residual_check],
     )

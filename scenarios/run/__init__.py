@@ -1,8 +1,7 @@
 """A scenario in every engine: planned, run, measured, and stored as a run folder."""
 
-from ..scenario import configure_engine
+from ..scenario import configure_engine, installed_engines
 from .folder import RunPlan, library_versions, write_run_recording
-from .installed import installed_engines
 from .runner import (
     RunOutcome,
     RunResult,

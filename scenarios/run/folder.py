@@ -104,6 +104,7 @@ def write_manifest(
         "complete": complete,
         "engines": engines,
         "left_out": plan.left_out,
+        "warnings": list(plan.start.problem.bicycle.warnings()),
         "verdicts": list(verdicts),
         "libraries": library_versions(),
         "suite": find_commit(),

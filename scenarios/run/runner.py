@@ -23,13 +23,13 @@ from ..scenario import (
     Scenario,
     Start,
     configure_engine,
+    installed_engines,
     join_complaints,
     list_engine_faults,
     make_start,
     refuse_engine,
 )
 from .folder import RUN_VERSION, RunPlan, new_folder, resolve_plan, write_manifest, write_page, write_run_recording
-from .installed import installed_engines
 
 # (engine, simulated time reached, duration)
 RunWatch = Callable[[str, float, float], None]
@@ -222,6 +222,8 @@ def ride_plan(
         Of the engines that were done before Ctrl-C was pressed, if it was.
     """
     rides = Rides({}, {})
+    for line in plan.start.problem.bicycle.warnings():
+        note(line)
     problem, duration = plan.start.problem, plan.scenario.simulation.duration
     try:
         for name, (engine, settings) in plan.engines.items():

@@ -1,7 +1,7 @@
 """Scenario files: their schema, the surfaces they can name, and the start they describe."""
 
 from .bicycle_file import BicycleFile, read_bicycle_file
-from .engine_settings import configure_engine, list_engine_faults, refuse_engine
+from .engine_settings import configure_engine, installed_engines, list_engine_faults, refuse_engine
 from .parameters import PARAMETERS
 from .resolved import resolve_scenario
 from .schema import (
@@ -23,8 +23,8 @@ from .table import (
     format_validation_error,
     join_complaints,
     list_complaints,
-    place_error,
     read_toml,
+    set_keys,
     show_value,
 )
 
@@ -41,6 +41,7 @@ __all__ = [
     "configure_engine",
     "error_place",
     "format_validation_error",
+    "installed_engines",
     "join_complaints",
     "library_names",
     "list_complaints",
@@ -51,12 +52,12 @@ __all__ = [
     "name_surface",
     "output_times",
     "parse_surface",
-    "place_error",
     "read_bicycle_file",
     "read_scenario_file",
     "read_toml",
     "refuse_engine",
     "resolve_scenario",
+    "set_keys",
     "show_value",
     "validate_scenario",
 ]

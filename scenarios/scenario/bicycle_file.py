@@ -20,7 +20,7 @@ from math import cos, isfinite, sin
 from pathlib import Path
 from typing import Any
 
-import yaml
+from yaml import YAMLError, safe_load
 
 from ...reference.bicycle import Bicycle
 from ..error import ScenarioError
@@ -109,14 +109,13 @@ def read_bicycle_file(path: Path) -> BicycleFile:
             raise ScenarioError(f"{shown}: there is no such file; give a bicycle file, e.g. one of BicycleParameters")
         text = path.read_text(encoding="utf-8-sig")
         entries, deviations = _read_entries(text, path.suffix.lower())
-        values = {name: _number(name, value) for name, value in entries.items()}
-        values, given = _split_deviations(values)
+        values, given = _split_deviations({name: _number(name, value) for name, value in entries.items()})
         given |= {name: _number(name, value)[0] for name, value in deviations.items()}
         convention, parameters, uncertainties, ignored = _interpret(values, given)
         return BicycleFile(path.stem, Bicycle(**parameters), uncertainties, convention, ignored)
     except ScenarioError:
         raise
-    except (OSError, ValueError, yaml.YAMLError) as error:
+    except (OSError, ValueError, RecursionError, YAMLError) as error:
         raise ScenarioError(f"{shown}: {show_value(' '.join(str(error).split()))}") from error
 
 
@@ -127,16 +126,16 @@ def _read_entries(text: str, suffix: str) -> tuple[Mapping[str, Any], Mapping[st
         table = document.get("bicycle", {key: value for key, value in document.items() if key != "uncertainties"})
         return _table("bicycle", table), _table("uncertainties", document.get("uncertainties", {}))
     if suffix in (".yml", ".yaml"):
-        document = _table("the file", yaml.safe_load(text))
-        return _table("values", document.get("values", document)), {}
+        content = _table("the file", safe_load(text))
+        return _table("values", content.get("values", content)), {}
     entries: dict[str, Any] = {}
     for number, line in enumerate(text.splitlines(), 1):
-        content = line.partition("#")[0].strip()
-        if not content:
+        written = line.partition("#")[0].strip()
+        if not written:
             continue
-        name, separator, value = (part.strip() for part in content.partition("="))
+        name, separator, value = (part.strip() for part in written.partition("="))
         if not separator:
-            raise ValueError(f"line {number}: {content!r} must be a name and a value, as in c = 0.0685+/-0.0017")
+            raise ValueError(f"line {number}: {written!r} must be a name and a value, as in c = 0.0685+/-0.0017")
         if name in entries:
             raise ValueError(f"line {number}: {name} is given a second time")
         entries[name] = value

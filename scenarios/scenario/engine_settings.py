@@ -15,6 +15,20 @@ from ..error import ScenarioError
 from .table import UnknownName, join_complaints, list_complaints, list_unknown, show_value
 
 
+def installed_engines() -> list[str]:
+    """Names of all installed engines, the reference first.
+
+    Raises
+    ------
+    ScenarioError
+        If two packages announce an engine of one name.
+    """
+    try:
+        return engine_names()
+    except ValueError as error:
+        raise ScenarioError(str(error)) from error
+
+
 def configure_engine(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
     """Load an engine and validate its settings.
 
@@ -63,8 +77,8 @@ def list_engine_faults(engines: Any, skipped: Collection[str] = ()) -> list[str]
     if not isinstance(engines, Mapping):
         return []
     try:
-        there = engine_names()
-    except ValueError:  # two packages announce one engine: no fault of the scenario
+        there = installed_engines()
+    except ScenarioError:  # two packages announce one engine: no fault of the scenario
         return []
     faults = []
     for name, values in engines.items():

@@ -12,11 +12,11 @@ from ...engines.names import suggest_name
 from ...reference.bicycle import Bicycle, require_rigid_bodies
 from ..error import ScenarioError
 from ..names import LIBRARY as LIBRARY
-from ..names import library_names as library_names
+from ..names import list_library
 from .engine_settings import list_engine_faults
 from .parameters import PARAMETERS
 from .surfaces import SurfaceTable
-from .table import Table, join_complaints, list_complaints, place_error, read_toml, show_value, validate_known
+from .table import Table, join_complaints, list_complaints, read_toml, set_keys, show_value, validate_known
 
 # The tables that the motion depends on.
 OF_THE_MOTION = ("surface", "motion", "perturbation", "bicycle")
@@ -209,6 +209,11 @@ def _line_of_text(text: str) -> str:
     return text
 
 
+def library_names() -> list[str]:
+    """Return the names of the library's scenarios, sorted."""
+    return list_library()
+
+
 def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tuple[str, Scenario]:
     """Read a scenario by library name or by path, apply changes, validate.
 
@@ -247,7 +252,7 @@ def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tupl
     faults = []
     for key, value in (changes or {}).items():
         try:
-            data = place_error(data, {key: value})
+            data = set_keys(data, {key: value})
         except ValueError as error:
             faults.append(f"--set {error}")
     try:

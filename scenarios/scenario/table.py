@@ -40,7 +40,7 @@ def read_toml(text: str) -> dict[str, Any]:
         raise ValueError("it is nested too deeply") from None
 
 
-def place_error(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+def set_keys(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """A copy of nested tables with dotted keys set.
 
     Parameters

@@ -7,14 +7,16 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel
+
 from ...engines.engine import describe_engine, load_engine, package_of
 from ...engines.names import suggest_name
 from ...reference.bicycle import Bicycle
 from ..error import ScenarioError
-from ..run import installed_engines
 from ..scenario import (
     PARAMETERS,
     configure_engine,
+    installed_engines,
     join_complaints,
     library_names,
     list_engine_faults,
@@ -22,7 +24,6 @@ from ..scenario import (
     resolve_scenario,
     show_value,
 )
-from ..sweep import SweepFile
 from .fields import list_fields, list_tables
 from .schemas import scenario_schema, settings_schema
 
@@ -51,7 +52,7 @@ def kind_of(name: str) -> str:
     )
 
 
-def make_document(name: str) -> dict[str, Any]:
+def make_document(name: str, sweep: type[BaseModel]) -> dict[str, Any]:
     """Make the document of `velodrome show`.
 
     Parameters
@@ -59,6 +60,8 @@ def make_document(name: str) -> dict[str, Any]:
     name : str
         A scenario of the library, a path to a scenario file, an engine, ``bicycle``, or ``scenario`` or ``sweep`` for
         what such files may hold.
+    sweep : type
+        Model of sweep files.
 
     Returns
     -------
@@ -79,7 +82,7 @@ def make_document(name: str) -> dict[str, Any]:
     if kind == BICYCLE:
         return _bicycle()
     if name in FILES:
-        schema = scenario_schema() if name == "scenario" else SweepFile.model_json_schema()
+        schema = scenario_schema() if name == "scenario" else sweep.model_json_schema()
         return {"kind": "file", "name": name, "tables": [table.as_json() for table in list_tables(schema)]}
     return _scenario(name)
 

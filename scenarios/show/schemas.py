@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from pydantic import BaseModel
+
 from ...engines.engine import load_engine, why_failed
 from ...engines.guard import call_engine
 from ..error import ScenarioError
-from ..run import installed_engines
-from ..scenario import Scenario
-from ..sweep import SweepFile
+from ..scenario import Scenario, installed_engines
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def make_schema(kind: str, name: str) -> dict[str, Any]:
+def make_schema(kind: str, name: str, sweep: type[BaseModel]) -> dict[str, Any]:
     """Make a JSON schema.
 
     Parameters
@@ -24,6 +24,8 @@ def make_schema(kind: str, name: str) -> dict[str, Any]:
         ``scenario``, ``sweep``, ``bicycle`` or ``engine``.
     name : str
         Of the engine; not looked at otherwise.
+    sweep : type
+        Model of sweep files, which belong to a room that this one does not know.
 
     Returns
     -------
@@ -38,7 +40,7 @@ def make_schema(kind: str, name: str) -> dict[str, Any]:
     if kind == "engine":
         return _headed(settings_schema(name), f"Settings of {name}: the table [engines.{name}] of a scenario file")
     if kind == "sweep":
-        return _headed(SweepFile.model_json_schema(), "A sweep file")
+        return _headed(sweep.model_json_schema(), "A sweep file")
     scenario = scenario_schema()
     if kind == "bicycle":
         return _headed(scenario["properties"]["bicycle"], "The table [bicycle] of a scenario file")

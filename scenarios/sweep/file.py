@@ -30,7 +30,7 @@ _Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
 def flatten_table(table: Any) -> Any:
     """Replace tables in tables by dotted keys: ``{"surface": {"alpha": 1}}`` becomes ``{"surface.alpha": 1}``."""
     if not isinstance(table, Mapping):
-        return table  # the schema says what is wrong with it
+        return table  # validation reports the error
     found: dict[str, Any] = {}
     for key, value in table.items():
         if isinstance(value, Mapping) and value:
@@ -41,7 +41,7 @@ def flatten_table(table: Any) -> Any:
 
 
 def _allow_tables(schema: dict[str, Any]) -> None:
-    """Let the JSON schema of dotted keys have tables in tables too; `flatten_table` reads both."""
+    """Allow nested tables in the JSON schema of dotted keys; `flatten_table` reads both forms."""
     leaf = schema["additionalProperties"]
     schema["additionalProperties"] = {"anyOf": [leaf, {"type": "object"}]}
 
@@ -164,7 +164,7 @@ def read_sweep(path: Path) -> tuple[SweepFile, dict[str, Any]]:
 
 
 def _base(source: Any, path: Path) -> Scenario | None:
-    """The base scenario; None where what should say it is neither text nor a table."""
+    """Return the base scenario; None where its entry is neither text nor a table."""
     if isinstance(source, dict):
         return validate_scenario(source, "its tables")
     if not isinstance(source, str):

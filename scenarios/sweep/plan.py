@@ -22,8 +22,8 @@ from ..scenario import (
     list_complaints,
     list_engine_faults,
     make_start,
-    place_error,
     refuse_engine,
+    set_keys,
 )
 from .file import SweepFile, read_sweep
 from .points import count_points, make_points
@@ -31,7 +31,7 @@ from .points import count_points, make_points
 MOST_TASKS = 5_000_000  # tasks; about 2 GB in the planning process
 # Types of pydantic's errors that a value of the right type may have.
 _OF_A_POINT = ("value_error", "greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")
-_TOLD = 20  # complaints after which the rest of the points is not looked at
+_LARGEST_COMPLAINT_COUNT = 20  # with more complaints, the remaining points are not checked
 _CHECKED = 50  # kinds of runs whose engine is asked beforehand; each may need a motion, a tenth of a second
 
 
@@ -111,7 +111,7 @@ def plan_sweep(path: Path) -> SweepPlan:
     # Of engines that ride, a grid may have other settings; those are checked at every point.
     faults = [refuse_engine(engine, names) for engine in sweep.engines if engine not in names]
     faults += [f"scenario: {fault}" for fault in list_engine_faults(base.get("engines"), skipped=riding)]
-    at_points: dict[str, str] = {}  # complaint to complaint with the first point that it is about
+    at_points: dict[str, str] = {}  # by complaint, the complaint with the first point that it concerns
     if count_points(sweep) * len(sweep.engines) > MOST_TASKS:
         raise ScenarioError(
             f"{path}: {count_points(sweep) * len(sweep.engines)} runs; at most {MOST_TASKS} fit one sweep"
@@ -134,7 +134,7 @@ def plan_sweep(path: Path) -> SweepPlan:
             if (engine, digest) not in seen:
                 seen.add((engine, digest))
                 tasks.append(Task(len(tasks), f"{len(tasks):07d}-{digest[:12]}", engine, own, refused))
-        if len(at_points) > _TOLD:
+        if len(at_points) > _LARGEST_COMPLAINT_COUNT:
             break
     faults += at_points.values()
     if faults:
@@ -147,7 +147,7 @@ def plan_sweep(path: Path) -> SweepPlan:
 
 def concerning(engine: str, changes: Mapping[str, Any]) -> dict[str, Any]:
     """Select the changes without settings of other engines; the reference's concern all, which are compared with it."""
-    return {key: value for key, value in changes.items() if _engine_of(key) in (None, engine, REFERENCE)}
+    return {key: value for key, value in changes.items() if _find_engine(key) in (None, engine, REFERENCE)}
 
 
 def prune_settings(data: dict[str, Any], engine: str) -> dict[str, Any]:
@@ -158,28 +158,29 @@ def prune_settings(data: dict[str, Any], engine: str) -> dict[str, Any]:
     return data | {"engines": {name: engines[name] for name in (REFERENCE, engine) if name in engines}}
 
 
-def _engine_of(key: str) -> str | None:
+def _find_engine(key: str) -> str | None:
+    """Return the engine to which the setting of a dotted key belongs; None if the key is no engine's setting."""
     table, _, rest = key.partition(".")
     return rest.partition(".")[0] if table == "engines" else None
 
 
 def _name_other_engines(sweep: SweepFile, changes: Mapping[str, Any]) -> Iterator[str]:
-    """Say of every changed setting of an engine that is not of the sweep that it is none of its."""
+    """Yield a complaint about every changed setting of an engine that the sweep does not use."""
     riding = (*sweep.engines, REFERENCE)
     for key in changes:
-        engine = _engine_of(key)
+        engine = _find_engine(key)
         if engine is not None and engine not in riding:
             yield f"{key}: {engine!r} is not among the sweep's engines ({suggest_name(engine, riding)})"
 
 
 def point_text(changes: Mapping[str, Any]) -> str:
-    """What a complaint about a point begins with: nothing where the point changes nothing."""
+    """Return the beginning of a complaint about a point; empty where the point changes nothing."""
     at = ", ".join(f"{key} = {value!r}" for key, value in changes.items())
     return f"at {at}: " if at else ""
 
 
 class _FileError(ScenarioError):
-    """What is wrong with the file itself, not with a point of it.
+    """Error of the sweep file itself, not of one of its points.
 
     Attributes
     ----------
@@ -218,7 +219,7 @@ class _Checker:
             If the file is wrong.
         """
         try:
-            data = prune_settings(place_error(self._base, changes), engine)
+            data = prune_settings(set_keys(self._base, changes), engine)
         except ValueError as error:
             raise _FileError([str(error)]) from error
         refused = None
@@ -237,14 +238,14 @@ class _Checker:
             scenario = Scenario.model_validate(data)
         except ValidationError as error:
             complaints = list_complaints(error)
-            if _is_of_file(error, stated):
+            if _is_file_error(error, stated):
                 raise _FileError([*complaints, *list_engine_faults(data.get("engines"))]) from error
             raise ScenarioError(join_complaints(complaints)) from error
         resolved = scenario.model_dump(mode="json", exclude_none=True)
-        # In this order: a set's order differs from one process to the next.
+        # Not a set, whose order differs between processes.
         for name in dict.fromkeys((engine, REFERENCE)):
             self._configure(name, resolved["engines"].get(name, {}), stated)
-        self._ask(engine, scenario, resolved)
+        self._check_engine(engine, scenario, resolved)
         return resolved
 
     def _configure(self, engine: str, settings: dict[str, Any], stated: Collection[str]) -> None:
@@ -253,13 +254,13 @@ class _Checker:
             try:
                 configure_engine(engine, settings)
             except ScenarioError as error:
-                if _is_of_file(error.__cause__, stated, ("engines", engine)):
+                if _is_file_error(error.__cause__, stated, ("engines", engine)):
                     raise _FileError([str(error)]) from error
                 raise
             self._settings.add(text)
 
-    def _ask(self, engine: str, scenario: Scenario, data: Mapping[str, Any]) -> None:
-        """Raise what the engine refuses, such as a step that does not divide the output interval."""
+    def _check_engine(self, engine: str, scenario: Scenario, data: Mapping[str, Any]) -> None:
+        """Raise an error if the engine refuses the run, such as a step that does not divide the output interval."""
         kind = canonical_text([engine, data["engines"].get(engine, {}), data["simulation"]])
         if kind not in self._kinds and len(self._kinds) < _CHECKED:
             self._kinds[kind] = _why_refused(engine, scenario)
@@ -277,19 +278,19 @@ def _why_refused(engine: str, scenario: Scenario) -> str | None:
     try:
         library.check(problem, settings)
     except UnsuitableProblem:
-        return None  # so does ground that is unsuitable for the engine
+        return None  # as does ground that does not suit the engine
     except ValueError as error:
         return f"engines.{engine}: {error}"
     except Exception:
-        return None  # and an engine that breaks
+        return None  # as does an engine that breaks
     return None
 
 
-def _is_of_file(cause: BaseException | None, stated: Collection[str], place: tuple[str, ...] = ()) -> bool:
-    """Tell what is wrong with the file from what is wrong with a point.
+def _is_file_error(cause: BaseException | None, stated: Collection[str], place: tuple[str, ...] = ()) -> bool:
+    """Return whether an error is one of the sweep file itself and not of one of its points.
 
-    Of a point are values that do not go together, and a drawn value out of its range. Of the file are names that are
-    none, values of another type, and values out of range that the file itself states.
+    Errors of a point are values that contradict one another and drawn values out of range. Errors of the file are
+    unknown names, values of another type, and values out of range that the file itself states.
     """
     if not isinstance(cause, ValidationError):
         return True

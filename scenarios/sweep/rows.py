@@ -30,6 +30,7 @@ METRICS: dict[str, pa.DataType] = {
     "family": pa.int64(),
     "growth_rate": pa.float64(),
     "size": pa.float64(),
+    "warnings": pa.string(),
     **dict.fromkeys(_ERRORS, pa.float64()),
     **dict.fromkeys(
         ("rate_error", "rear_rate_error", "contact_force_error", "contact_force_error_at", "settled_force_error"),

@@ -18,7 +18,7 @@ from ...engines.guard import call_engine
 from ...reports.measure import flatten_metrics
 from ..error import ScenarioError
 from ..run import claimed_noise, configure_engine, measure_one
-from ..scenario import OF_THE_MOTION, Scenario, Start, make_start, place_error, validate_scenario
+from ..scenario import OF_THE_MOTION, Scenario, Start, make_start, set_keys, validate_scenario
 from .plan import canonical_text, prune_settings
 from .rows import METRICS, REFUSED, reason_line
 
@@ -64,13 +64,14 @@ class Tasks:
         return _to_json_values(row), _to_json_values(timing)
 
     def _run_engine(self, name: str, changes: Mapping[str, Any], timing: dict[str, Any]) -> dict[str, Any]:
-        scenario = validate_scenario(prune_settings(place_error(self._base, changes), name), "task")
+        scenario = validate_scenario(prune_settings(set_keys(self._base, changes), name), "task")
         engine, version, settings = _load_configured_engine(name, canonical_text(scenario.engines.get(name, {})))
         facts: dict[str, Any] = {"version": version}
         start = self._starts(_start_parameters(scenario))
         if isinstance(start, str):
             return facts | {"status": "no-motion", "reason": reason_line(start)}
         facts |= {"family": start.family, "growth_rate": start.growth_rate, "size": start.size}
+        facts["warnings"] = "; ".join(start.problem.bicycle.warnings()) or None
         try:
             engine.check(start.problem, settings)
         except UnsuitableProblem:

@@ -30,14 +30,14 @@ _GRACE = 60.0  # seconds beyond its time limit after which a child without a par
 
 @dataclass(frozen=True)
 class Setup:
-    """What every worker of a sweep needs to know.
+    """Settings that all workers of a sweep share.
 
     Attributes
     ----------
     base : dict
         The base scenario as resolved, JSON values.
     time_limit : float
-        Of a task, wall-clock time [s].
+        Wall-clock time of a task [s].
     memory_limit : float or None
         Address space that a task may use in addition to that of an idle worker [MB].
     """

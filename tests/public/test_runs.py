@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import velodrome
+from tests.sealing import change_document
 from velodrome.engines.engine import SHAPES
 from velodrome.scenarios.run import runner
 
@@ -184,8 +185,8 @@ def test_progress_is_told_and_nothing_is_printed(capfd: pytest.CaptureFixture[st
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"scenario": "q9"}, "no scenario 'q9' in the library; there are forward-left"),
-        ({"engines": ["warp"]}, "engine 'warp' is not installed; there are reference"),
+        ({"scenario": "q9"}, "no scenario 'q9' in the library (there are forward-left"),
+        ({"engines": ["warp"]}, "engine 'warp' is not installed (there are reference"),
         ({"duration": -1}, "simulation.duration"),
         ({"changes": {"motion.warp": 1}}, "unknown key 'warp'"),
         ({"settings": {NATIVE: {"stepp": 1}}}, f"engines.{NATIVE}: unknown key 'stepp'"),
@@ -246,7 +247,7 @@ def test_a_manifest_that_lacks_a_part_is_refused(part: str, tmp_path: Path) -> N
     run = velodrome.run("q2", engines=[NATIVE], duration=0.1, out=tmp_path)
     assert run.folder is not None
     path = run.folder / "manifest.json"
-    path.write_text(json.dumps({name: value for name, value in json.loads(path.read_text()).items() if name != part}))
+    change_document(path, lambda manifest: manifest.pop(part))
     with pytest.raises(velodrome.ScenarioError, match=f"not the files of one run: KeyError: '{part}'"):
         velodrome.load(run.folder)
 

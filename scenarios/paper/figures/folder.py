@@ -18,7 +18,6 @@ from ....reference.surface import Paraboloid
 from ....reports.figures import solution_figure, use_style, write_figure
 from ...files import make_folder, write_json, write_text
 from ...motions import families_document
-from ...run import RunWatch
 from ...scenario import Start, load_scenario, make_start
 from ..energy import motion_of_energy
 from ..ledger import LedgerLine
@@ -36,9 +35,11 @@ DISTURBED_SCENARIO = {"+0.1 rad/s": "q2-plus", "−0.1 rad/s": "q2-minus"}
 DEPARTURE, SETTLING = 100.0, 60.0  # durations simulated from Q1 and about Q2 [s]
 
 DrawnFigure = tuple[Figure, str]
+# (what is drawn, how far it is, how far it goes)
+FigureWatch = Callable[[str, float, float], None]
 
 
-def write_figures(out: Path, progress: RunWatch, endings: Iterable[str] = ENDINGS) -> list[Path]:
+def write_figures(out: Path, progress: FigureWatch, endings: Iterable[str] = ENDINGS) -> list[Path]:
     """Compute and write Figures 2 to 9, their captions, and the tables at Q1 and Q2.
 
     Parameters
@@ -74,7 +75,7 @@ def write_figures(out: Path, progress: RunWatch, endings: Iterable[str] = ENDING
     return [*written, *(out / name for name in ("captions.md", "tables.md", "linearisation.json"))]
 
 
-def write_paper(out: Path, lines: Sequence[LedgerLine], progress: RunWatch) -> list[Path]:
+def write_paper(out: Path, lines: Sequence[LedgerLine], progress: FigureWatch) -> list[Path]:
     """Write the ledger, as JSON and as a page of Markdown, and all figures and tables into a folder.
 
     Raises

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from planted import plant, reported
+from planting import changed, plant, reported
 from pydantic import BaseModel, Field
 
 from velodrome.engines.engine import REFERENCE, Problem, Settings, Trajectory, UnsuitableProblem, load_engine
@@ -21,9 +21,9 @@ from velodrome.testing import ConformanceReport, check_engine, examine_engine
 MEMBERS = ("name", "version", "gives", "settings", "check", "step_noise", "simulate")
 
 
-def variant(name: str = REFERENCE, /, **members: Any) -> Any:
-    """An installed engine with other members."""
-    inner = load_engine(name)
+def variant(engine: Any = REFERENCE, /, **members: Any) -> Any:
+    """An engine, or an installed one, with other members."""
+    inner = load_engine(engine) if isinstance(engine, str) else engine
     return SimpleNamespace(**{name: getattr(inner, name) for name in MEMBERS} | members)
 
 
@@ -139,6 +139,30 @@ def test_a_ride_that_remembers_the_one_before_is_told() -> None:
         return replace(found, q=found.q + 1e-15 * len(rides))
 
     assert "its q differs by" in said(examine_engine(variant(simulate=remember)), "same bits")
+
+
+def test_what_is_listed_and_not_given_is_told() -> None:
+    engine = plant("exudyn", reported(lambda *_: {"slip": None}))
+    assert "it lists slip in gives, and gives None" in said(examine_engine(engine), "ride on plane")
+
+
+def test_forces_that_are_no_numbers_are_told() -> None:
+    engine = plant("exudyn", changed("contact_force", by=lambda force: np.nan * force))
+    report = examine_engine(engine)
+    assert "not finite in some samples: contact_force" in said(report, "ride on plane")
+    assert "nan" not in str(report)
+
+
+def test_an_engine_of_single_precision_may_conform() -> None:
+    """Coordinates, rates and poses of 24 bits, from steps that say so."""
+
+    def single(trajectory: Trajectory, *_: Any) -> dict[str, Any]:
+        names = ("q", "qd", "body_position", "body_quaternion")
+        return {name: getattr(trajectory, name).astype(np.float32).astype(float) for name in names}
+
+    engine = plant("mujoco-multipliers", reported(single))
+    check_engine(variant(engine, step_noise=lambda settings: 2.0**-23))
+    assert examine_engine(engine).failed
 
 
 def test_progress_that_falls_is_told() -> None:

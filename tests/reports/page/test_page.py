@@ -427,7 +427,7 @@ def pixels(path: Path) -> dict[str, int]:
 def test_an_engine_that_is_switched_off_is_not_seen(address: str, dark: bool, tmp_path: Path):
     paint = assign_colours(RUNS)
     ink = {name: make_css(paint[name] if dark else paper_colour(name, paint[name])) for name in RUNS}
-    size = (1280, 7000 if dark else 3600)  # the tables, the toolbar, the ride from above and some curves; or all
+    size = (1280, 7000 if dark else 4600)  # the tables, the toolbar, the ride from above and some curves; or all
     assert headless.picture(address, tmp_path / "all.png", dark, size) == []
     everything = pixels(tmp_path / "all.png")
     hidden = ["one", "bare"]

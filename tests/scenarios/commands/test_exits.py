@@ -265,7 +265,7 @@ def test_bad_input_leaves_no_file_of_verdicts(velodrome, tmp_path: Path) -> None
     "left", [[], [Verdict("reference", CHANGES, None, None, None, "holds", "since the baseline")]], ids=["none", "told"]
 )
 def test_an_engine_of_which_nothing_was_judged_fails(left: list[Verdict], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gate, "judge_sample", lambda *_: left)
+    monkeypatch.setattr("velodrome.scenarios.gate.checks.judge_sample", lambda *_: left)
     verdicts, _ = gate.check_gate(lambda *_: None, ["plane-circle"], ["reference"])
     _, last = verdicts[-1]
     assert (last.engine, last.status) == ("reference", "missing")

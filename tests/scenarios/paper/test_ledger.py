@@ -13,7 +13,7 @@ from velodrome.scenarios.paper.ledger import (
     REPRODUCED,
     ROUNDS,
     TRUNCATED,
-    Check,
+    SelfCheck,
     Threshold,
     above,
     below,
@@ -29,7 +29,7 @@ from velodrome.scenarios.paper.ledger import (
 from velodrome.scenarios.paper.printed import read_printed
 from velodrome.scenarios.paper.table import ledger_markdown, show_ledger
 
-GOOD, BAD = Check("residual", 1e-14, 1e-12), Check("residual", 1e-3, 1e-12)
+GOOD, BAD = SelfCheck("residual", 1e-14, 1e-12), SelfCheck("residual", 1e-3, 1e-12)
 HOLDS, FALLS = below("a length", 1.0, 2.0, "m"), below("a length", 3.0, 2.0, "m")
 SEEN = source("something", json.dumps, command="velodrome critical", search="from here and there")
 
@@ -66,7 +66,7 @@ def test_what_fails_is_the_papers_only_if_the_measurement_passes_its_tests() -> 
     assert claim_line("3", "a claim", [FALLS], "", SEEN, []).fault == "ours"
     failed = claim_line("3", "a claim", [HOLDS], "", SEEN, [BAD])
     assert failed.fault == "ours", "a measurement that fails its tests proves nothing"
-    assert claim_line("3", "a claim", [HOLDS], "", SEEN, [Check("no number", float("nan"), 1.0)]).fault == "ours"
+    assert claim_line("3", "a claim", [HOLDS], "", SEEN, [SelfCheck("no number", float("nan"), 1.0)]).fault == "ours"
     assert claim_line("3", "a claim", [], "", SEEN, [GOOD]).verdict == FAILS, "no condition, no proof"
     assert claim_line("3", "a claim", [below("no number", float("nan"), 1.0)], "", SEEN, [GOOD]).verdict == FAILS
     assert count_line("3", "a count", 4, 5, "", SEEN, [GOOD]).fault == "paper"
@@ -120,7 +120,7 @@ def test_the_document_and_the_tables_hold_every_line() -> None:
     assert not found["holds"]
     assert ledger_document(lines[::2])["holds"]
     lost = ledger_document(
-        [claim_line("3", "a claim", [below("?", float("nan"), 1)], "", SEEN, [Check("?", float("nan"), 1)])]
+        [claim_line("3", "a claim", [below("?", float("nan"), 1)], "", SEEN, [SelfCheck("?", float("nan"), 1)])]
     )
     (line,) = json.loads(json.dumps(lost, allow_nan=False))["lines"]
     assert line["checks"][0]["value"] is None

@@ -48,7 +48,7 @@ def test_fields_have_the_units_the_defaults_and_the_ranges_of_their_model() -> N
 
 @pytest.mark.parametrize("name", OURS)
 def test_every_setting_of_ours_says_what_it_is(name: str) -> None:
-    document = make_document(name)
+    document = make_document(name, SweepFile)
     engine = load_engine(name)
     assert (document["kind"], document["name"], document["version"]) == ("engine", name, engine.version)
     assert document["gives"] == list(engine.gives)
@@ -79,7 +79,7 @@ def _takes(name: str, key: str, value: Any) -> bool:
 
 @pytest.mark.parametrize("name", library_names())
 def test_a_scenario_is_shown_with_every_number_and_its_unit(name: str) -> None:
-    document = make_document(name)
+    document = make_document(name, SweepFile)
     _, scenario = load_scenario(name)
     assert document["bicycle"] == asdict(scenario.make_bicycle())
     stated = tomllib.loads((LIBRARY / f"{name}.toml").read_text(encoding="utf-8"))
@@ -104,7 +104,7 @@ def test_a_scenario_is_shown_with_every_number_and_its_unit(name: str) -> None:
 
 
 def test_the_bicycle_is_shown_with_units_and_meanings() -> None:
-    document = make_document("bicycle")
+    document = make_document("bicycle", SweepFile)
     assert document["parameters"] == asdict(Bicycle())
     assert set(document["units"]) == set(document["descriptions"]) == set(document["parameters"]) == set(PARAMETERS)
     assert (document["units"]["front_wheel_Iyy"], document["units"]["rear_frame_x"]) == ("kg m^2", "m")
@@ -112,7 +112,7 @@ def test_the_bicycle_is_shown_with_units_and_meanings() -> None:
 
 
 def test_tables_of_a_scenario_file_are_all_told() -> None:
-    tables = make_document("scenario")["tables"]
+    tables = make_document("scenario", SweepFile)["tables"]
     kinds = [table["kind"] for table in tables if table["table"] == "surface"]
     assert kinds == ["plane", "paraboloid", "sphere", "cone", "torus", "profile", "height-field"]
     names = {table["table"] for table in tables}
@@ -173,13 +173,13 @@ def test_names_are_whole_at_sixty_columns_and_the_same_at_any_width(
     assert all(len(line) <= 60 for line in lines if line.startswith("    "))
     assert not any(line != line.rstrip() for line in lines)
     if name == "mujoco-exact-contact":
-        for key in make_document(name)["settings"]:
+        for key in make_document(name, SweepFile)["settings"]:
             assert any(line == key or line.startswith((f"{key} = ", f"{key}, ")) for line in lines), key
 
 
 def test_json_is_the_document_with_its_version(velodrome) -> None:
     found = velodrome("show", "exudyn", "--json").json()
-    assert found == {"schema_version": 1} | make_document("exudyn")
+    assert found == {"schema_version": 1} | make_document("exudyn", SweepFile)
 
 
 @pytest.mark.parametrize("name", ["q2", "scenario", "sweep", "exudyn", "bicycle"])
@@ -203,7 +203,7 @@ def _scenario_files() -> list[Path]:
 def test_the_schema_takes_every_scenario_that_the_suite_takes_and_no_other(path: Path) -> None:
     validation = pytest.importorskip("jsonschema")
     data = tomllib.loads(path.read_text(encoding="utf-8"))
-    schema = make_schema("sweep" if "grid" in data or "latin_hypercube" in data else "scenario", "")
+    schema = make_schema("sweep" if "grid" in data or "latin_hypercube" in data else "scenario", "", SweepFile)
     faults = list(validation.Draft202012Validator(schema).iter_errors(data))
     assert bool(faults) == (path.stem == "newcomer"), faults
 
@@ -212,7 +212,7 @@ def test_the_schema_takes_every_scenario_that_the_suite_takes_and_no_other(path:
 def test_the_schema_takes_the_sweeps_of_the_examples(path: Path) -> None:
     validation = pytest.importorskip("jsonschema")
     data = tomllib.loads(path.read_text(encoding="utf-8"))
-    validation.Draft202012Validator(make_schema("sweep", "")).validate(data)
+    validation.Draft202012Validator(make_schema("sweep", "", SweepFile)).validate(data)
 
 
 @pytest.mark.parametrize(
@@ -233,7 +233,7 @@ def test_the_schema_takes_the_sweeps_of_the_examples(path: Path) -> None:
 )
 def test_the_schema_refuses_what_the_suite_refuses(change: dict[str, Any]) -> None:
     validation = pytest.importorskip("jsonschema")
-    checker = validation.Draft202012Validator(make_schema("scenario", ""))
+    checker = validation.Draft202012Validator(make_schema("scenario", "", SweepFile))
     data = tomllib.loads((LIBRARY / "q2.toml").read_text(encoding="utf-8"))
     assert checker.is_valid(data)
     assert not checker.is_valid(data | change)

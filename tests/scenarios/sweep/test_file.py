@@ -10,7 +10,7 @@ from sweeping import UPRIGHT, planned, written
 
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.names import LIBRARY
-from velodrome.scenarios.scenario.table import place_error
+from velodrome.scenarios.scenario.table import set_keys
 from velodrome.scenarios.sweep.file import read_sweep
 from velodrome.scenarios.sweep.plan import plan_sweep
 from velodrome.scenarios.sweep.points import make_points
@@ -47,7 +47,7 @@ def test_a_latin_hypercube_has_one_point_in_every_slice_and_is_the_same_again(tm
 
 def test_changes_leave_what_they_are_made_of_alone() -> None:
     data = {"a": {"b": 1}}
-    assert place_error(data, {"a.c": 2, "d.e": 3}) == {"a": {"b": 1, "c": 2}, "d": {"e": 3}}
+    assert set_keys(data, {"a.c": 2, "d.e": 3}) == {"a": {"b": 1, "c": 2}, "d": {"e": 3}}
     assert data == {"a": {"b": 1}}
 
 

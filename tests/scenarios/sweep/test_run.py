@@ -16,7 +16,7 @@ from sweeping import UPRIGHT, data_set, here, planned, rows, swept
 
 from velodrome.engines.admission import ride_engine
 from velodrome.engines.storage import METADATA_KEY
-from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.bicycle import LARGEST_EXCESS, Bicycle
 from velodrome.reports.measure import flatten_metrics
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run.runner import claimed_noise, measure_one, plan_run
@@ -59,7 +59,7 @@ def test_a_row_has_the_parameters_and_the_metrics_of_a_run(tmp_path: Path) -> No
     measured = measure_one(alone.start, rides["mujoco-multipliers"], rides["reference"], step_noise=noise)
     differing = set(columns.TIMING)
     flat = {name: value for name, value in flatten_metrics(measured).items() if name not in differing}
-    assert set(flat) == set(columns.METRICS) - {"family", "growth_rate", "size"}
+    assert set(flat) == set(columns.METRICS) - {"family", "growth_rate", "size", "warnings"}
     assert {name: found[1][name] for name in flat} == flat
     assert (found[1]["status"], found[1]["reason"]) == ("done", None)
 
@@ -279,10 +279,14 @@ def test_a_point_that_is_none_is_a_row_and_the_others_ride(tmp_path: Path) -> No
         tensor = np.diag(inertia)
         tensor[0, 2] = tensor[2, 0] = Bicycle().rear_frame_Ixz
         principal = np.linalg.eigvalsh(tensor)
-        possible = principal[0] > 0 and principal[2] <= principal[0] + principal[1]
+        possible = principal[0] > 0 and principal[2] <= (principal[0] + principal[1]) * (1 + LARGEST_EXCESS)
         assert row["status"] == ("done" if possible else "refused")
         if not possible:
             assert "are not those of a rigid body" in row["reason"]
+        elif principal[2] > principal[0] + principal[1]:
+            assert "no rigid body has such moments" in row["warnings"]
+        else:
+            assert row["warnings"] is None
             assert row["version"] is not None
     assert outcome.counts["reference"].keys() == {"done", "refused"}
     document = summarise_sweep(plan, outcome)

@@ -1,0 +1,178 @@
+"""The references name everything: commands, options, fields, settings, metrics, keys of documents, public names."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_pages import commands, describe_commands, option_names
+from documents import COMMON, documented, find_key, find_paths
+from engine_settings import describe_engines, own_engines
+from generated import GENERATORS, MARK, fill_page
+from pages import source_pages
+from scenario_files import describe_scenario_file, describe_sweep_file, scenario_tables
+
+import velodrome
+from velodrome.engines.engine import load_engine
+from velodrome.engines.storage import trajectory_columns
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reports.measure import QUANTITIES
+from velodrome.scenarios.scenario.schema import Scenario
+from velodrome.scenarios.sweep.file import Hypercube, SweepFile
+
+FACES = ("velodrome", "velodrome.engines.coordinates", "velodrome.engines.rolling", "velodrome.testing")
+
+
+def marks() -> list[tuple[str, str]]:
+    return [
+        (mark, arguments.strip())
+        for page in source_pages()
+        for mark, arguments in MARK.findall(page.read_text(encoding="utf-8"))
+    ]
+
+
+def test_every_reference_has_its_place_in_a_page() -> None:
+    assert {mark for mark, _ in marks()} == set(GENERATORS)
+    assert sorted(module for mark, module in marks() if mark == "api") == sorted(FACES)
+
+
+def test_a_page_with_a_wrong_mark_is_refused() -> None:
+    with pytest.raises(ValueError, match="nothing is generated under 'metric'"):
+        fill_page("<!-- generated: metric -->")
+
+
+@pytest.mark.parametrize("module", FACES)
+def test_every_public_name_is_in_the_reference(module: str) -> None:
+    text = fill_page(f"<!-- generated: api {module} -->")
+    for name in import_module(module).__all__:
+        assert f"### `{name}`" in text, name
+        assert f":: {module}.{name}\n" in text, name
+
+
+def test_every_command_and_option_is_in_the_reference() -> None:
+    text = describe_commands()
+    for name, command in commands().items():
+        (part,) = [part for part in text.split("\n## ") if part.startswith(f"`velodrome {name}`")]
+        for spelling in option_names(command):
+            assert f"`{spelling}" in part, f"{name} {spelling}"
+
+
+def test_every_field_of_a_scenario_and_a_sweep_is_in_the_reference() -> None:
+    text = describe_scenario_file()
+    models = [model for models in scenario_tables().values() for model in models]
+    for model in (Scenario, *models):
+        for name, field in model.model_fields.items():
+            assert f"\n`{name}`\n: " in text, f"{model.__name__}.{name}"
+            assert name == "kind" or field.description, f"{model.__name__}.{name} has no description"
+    for name in Bicycle.__dataclass_fields__:
+        assert f"| `{name}` |" in text
+    swept = describe_sweep_file()
+    for model in (SweepFile, Hypercube):
+        for name, field in model.model_fields.items():
+            assert f"`{name}`\n: " in swept, f"{model.__name__}.{name}"
+            assert field.description, f"{model.__name__}.{name} has no description"
+
+
+def test_every_setting_is_in_the_reference_with_its_range() -> None:
+    parts = dict(zip(own_engines(), describe_engines().split("(engine-")[1:], strict=True))
+    for name, part in parts.items():
+        for setting, field in load_engine(name).settings.model_fields.items():
+            assert f"\n`{setting}`\n: " in part, f"{name}: {setting}"
+            assert field.description, f"{name}: {setting} has no description"
+    assert "number from 1e-06 to 0.02 [s]; default `0.002`" in parts["mujoco-native"]
+
+
+def test_every_metric_has_a_definition_and_none_is_left() -> None:
+    run = velodrome.run("q2-plus", engines="mujoco-native", duration=0.5)
+    for engine, row in run.metrics.items():
+        assert list(row) == list(QUANTITIES), engine
+        for name, value in row.items():
+            quantity = QUANTITIES[name]
+            if isinstance(value, dict):
+                assert tuple(value) == quantity.parts, name
+            if value is None:
+                assert quantity.absent, f"{name} is null, and nothing says when"
+            assert isinstance(value, str | list | None) or quantity.unit, f"{name} has no unit"
+
+
+def test_every_column_of_a_trajectory_is_in_the_reference() -> None:
+    text = fill_page("<!-- generated: trajectory-columns -->")
+    for field, columns in trajectory_columns():
+        assert f"`{field}` [" in text
+        assert all(f"`{column}`" in text for column, _ in columns)
+
+
+RUN = "run q2-plus --engine mujoco-multipliers --duration 0.5 --json --out"
+SWEEP = 'scenario = "q2"\n[grid]\nsimulation.duration = [1.0]\nperturbation.lean_rate = [0.0, 0.1]\n'
+DOCUMENTS = {
+    "list": ["list --json"],
+    "run": [f"{RUN} runs"],
+    "circular": ["circular --alpha 0.005 --rear-rate 18 --family 1 --json"],
+    "families": ["families --alpha 0.005 --json"],
+    "manifest": [f"{RUN} runs"],
+    "bicycle": ["bicycle --json"],
+    "show": ["show exudyn --json"],
+    "diff": [f"{RUN} before", f"{RUN} after", "diff before/* after/* --json"],
+    "check": ["check plane-circle --engine mujoco-multipliers --json"],
+    "precision": [
+        "precision q2 --engine mujoco-multipliers --duration 1 --levels 2 --set simulation.output_rate=25 --json"
+    ],
+    "sweep": ["sweep sweep.toml --json"],
+    "critical": ["critical --json"],
+    "atlas": ["atlas --size 2000 --json"],
+    "paper": ["paper --json"],
+}
+QUICK = ("list", "circular", "manifest", "run", "bicycle", "show")
+# What is null or absent in these documents, and other ways to say no.
+SOMETIMES = ("absent", "the reason", "Verdicts", "As in", "that differ", "criterion")
+
+
+def test_every_document_is_looked_at() -> None:
+    assert set(DOCUMENTS) == set(documented())
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in DOCUMENTS]
+)
+def test_every_key_of_a_document_is_in_the_reference(name: str, tmp_path: Path) -> None:
+    (tmp_path / "sweep.toml").write_text(SWEEP, encoding="utf-8")
+    printed = ""
+    for line in DOCUMENTS[name]:
+        printed = typed(line, tmp_path)
+    if name == "manifest":
+        (path,) = tmp_path.glob("runs/*/manifest.json")
+        printed = path.read_text(encoding="utf-8")
+    document: dict[str, Any] = json.loads(printed)
+    keys = documented()[name]["keys"]
+    paths = [path for path in find_paths(document) if path not in COMMON]
+    found = {path: find_key(path, list(keys)) for path in paths}
+    assert [path for path, key in found.items() if key is None] == []
+    unseen = {key for key in keys if key not in found.values()}
+    assert [key for key in unseen if not any(word in keys[key] for word in SOMETIMES)] == []
+
+
+def typed(line: str, folder: Path) -> str:
+    """What a command prints on stdout; patterns are those of a shell."""
+    code = "from velodrome.scenarios.cli import main; main()"
+    script = f"{sys.executable} -c '{code}' {line}"
+    done = subprocess.run(
+        ["bash", "-c", script], cwd=folder, env=os.environ, capture_output=True, text=True, timeout=600, check=False
+    )
+    assert done.returncode in (0, 1), done.stderr
+    return done.stdout
+
+
+def test_a_key_that_nobody_documented_is_seen() -> None:
+    keys = ["engines.*.points[].step", "alpha", "verdicts[]"]
+    assert find_key("alpha", keys) == "alpha"
+    assert find_key("verdicts", keys) == "verdicts[]"
+    assert find_key("verdicts[].limit", keys) == "verdicts[]"
+    assert find_key("engines.exudyn.points[].step", keys) == "engines.*.points[].step"
+    assert find_key("engines.exudyn.points[].error", keys) is None
+    assert find_key("alphas", keys) is None
