@@ -168,11 +168,12 @@ def find_named_points(families: Sequence[Mapping[str, Any]], front_radius: float
     found: dict[tuple, NamedPoint] = {}
     for family in families:
         for name, point in family["special_points"].items():
-            if len(name) != 1:
+            letters = set(name) - set(" ()")
+            if not all(letter.isupper() for letter in letters):
                 continue
             speed = float(scaled_speed(point["front_rate"], front_radius))
             key = (point["kind"], round(point["lean"], 6), round(point["steer"], 6))
-            both = sorted({name, *(found[key].name if key in found else "")} - set(" ()"))
+            both = sorted(letters | set(found[key].name if key in found else "") - set(" ()"))
             label = both[0] + "".join(f" ({other})" for other in both[1:])
             found[key] = NamedPoint(label, point["kind"], speed, point["lean"], point["steer"], False)
     return list(found.values())
