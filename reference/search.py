@@ -26,7 +26,7 @@ from .surface import SurfaceOfRevolution, evaluate, is_level
 
 # Leans against the ground and steers of the starts [rad]. With left and right exchanged a motion has a steer in
 # (0, pi); a steer of 0 or pi belongs to straight motion.
-LEANS, STEERS = np.linspace(-1.3, 1.3, 14), np.pi * (np.arange(12) + 0.5) / 12
+LEANS, STEERS = np.linspace(-1.5, 1.5, 16), np.pi * (np.arange(12) + 0.5) / 12
 _MOST = 15  # Gauss-Newton steps: from the grid, what converges takes six or so
 _NEAR = 0.4  # distance, in the arclength's metric, within which a start may lie on a segment of a followed curve
 _SAME = 1e-6  # two solutions in one plane across a curve: round-off, 1e-14, and a double root's square root of it

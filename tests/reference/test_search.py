@@ -64,7 +64,7 @@ def random_motions(bicycle: Bicycle, surface: SurfaceOfRevolution, starts: int) 
     random, equations = np.random.default_rng(7), Steady(bicycle, surface)
     found: list[np.ndarray] = []
     for _ in range(starts):
-        lean, steer, rate = random.uniform(-1.3, 1.3), random.uniform(0.05, 3.09), random.uniform(0.5, 40.0)
+        lean, steer, rate = random.uniform(-1.5, 1.5), random.uniform(0.05, 3.09), random.uniform(0.5, 40.0)
         for guess in guesses_at(bicycle, surface, lean, steer):
             try:
                 unknowns, _ = newton(equations, guess, rear_rate_condition(rate), most=30)
