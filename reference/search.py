@@ -3,7 +3,8 @@
 At fixed lean (against the ground) and steer the bicycle rolls in one circle of the tangent plane, so that two angles
 describe every circular motion on the level plane, and to leading order on a bowl too: there the circle around the axis
 whose geodesic curvature is that of the plane's circle. Starts are therefore a grid of both angles. From each,
-Gauss-Newton steps lead to the nearest circular motion, and the curve through it is followed unless it is known.
+Gauss-Newton steps lead to the nearest circular motion and to a static equilibrium, in which short curves begin, and the
+curves through them are followed unless they are known.
 
 The search is deterministic. It finds the curves that one of its starts leads to; a closed curve smaller than the grid's
 spacing may be missed.
@@ -11,7 +12,7 @@ spacing may be missed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,20 @@ from scipy.optimize import brentq
 
 from .anchors import above_ground, start_on_plane
 from .bicycle import Bicycle
-from .circular import CONTACT, LEAN, PITCH, SIGMA, STEER, Steady, as_solved, nearest_condition, newton, plane_condition
+from .circular import (
+    CONTACT,
+    LEAN,
+    PITCH,
+    SIGMA,
+    STEER,
+    Condition,
+    Steady,
+    as_solved,
+    nearest_condition,
+    newton,
+    plane_condition,
+    unknown_condition,
+)
 from .continuation import Point, metric, tangent
 from .kernels import curve as kernel
 from .surface import SurfaceOfRevolution, evaluate, is_level
@@ -27,6 +41,7 @@ from .surface import SurfaceOfRevolution, evaluate, is_level
 # Leans against the ground and steers of the starts [rad]. With left and right exchanged a motion has a steer in
 # (0, pi); a steer of 0 or pi belongs to straight motion.
 LEANS, STEERS = np.linspace(-1.5, 1.5, 16), np.pi * (np.arange(12) + 0.5) / 12
+_STATIC = 1e-12  # squared speed, of order one, of a static equilibrium: round-off
 _MOST = 15  # Gauss-Newton steps: from the grid, what converges takes six or so
 _NEAR = 0.4  # distance, in the arclength's metric, within which a start may lie on a segment of a followed curve
 _SAME = 1e-6  # two solutions in one plane across a curve: round-off, 1e-14, and a double root's square root of it
@@ -50,8 +65,9 @@ class Start:
 def describe_search() -> str:
     """Describe the starts in words."""
     return (
-        f"Gauss-Newton steps from {len(LEANS)} leans of {LEANS[0]:g} to {LEANS[-1]:g} rad against the ground and "
-        f"{len(STEERS)} steers between 0 and pi, and the whole curves through what they lead to"
+        f"Gauss-Newton steps, to the nearest motion and to a static equilibrium, from {len(LEANS)} leans of "
+        f"{LEANS[0]:g} to {LEANS[-1]:g} rad against the ground and {len(STEERS)} steers between 0 and pi, and the "
+        "whole curves through what they lead to"
     )
 
 
@@ -72,9 +88,10 @@ def search_starts(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Iterator[St
     for steer in STEERS:
         for lean in LEANS:
             for guess in guesses_at(bicycle, surface, float(lean), float(steer)):
-                found = _solve_nearest(equations, guess)
-                if found is not None:
-                    yield Start(found, tangent(equations, found))
+                for condition in (nearest_condition(), unknown_condition(SIGMA, 0.0)):
+                    found = _solve(equations, guess, condition)
+                    if found is not None:
+                        yield Start(found, tangent(equations, found))
 
 
 def guesses_at(bicycle: Bicycle, surface: SurfaceOfRevolution, lean: float, steer: float) -> Iterator[np.ndarray]:
@@ -139,14 +156,14 @@ def _tilted(bicycle: Bicycle, surface: SurfaceOfRevolution, level: np.ndarray, r
     return u
 
 
-def _solve_nearest(equations: Steady, guess: np.ndarray) -> np.ndarray | None:
-    """Return the circular motion nearest to a guess; None if there is none nearby."""
+def _solve(equations: Steady, guess: np.ndarray, condition: Callable[[np.ndarray], Condition]) -> np.ndarray | None:
+    """Return the circular motion, under a condition, that a guess leads to; None if there is none."""
     try:
-        found, _ = newton(equations, guess, nearest_condition(), most=_MOST)
+        found, _ = newton(equations, guess, condition, most=_MOST)
     except ValueError:
         return None
     found[[LEAN, PITCH, STEER]] = (found[[LEAN, PITCH, STEER]] + np.pi) % (2 * np.pi) - np.pi
-    possible = found[SIGMA] >= 0 and 0 < found[STEER] < np.pi and above_ground(equations, found)
+    possible = found[SIGMA] > -_STATIC and 0 < found[STEER] < np.pi and above_ground(equations, found)
     return as_solved(found) if possible else None
 
 

@@ -111,7 +111,7 @@ def test_toml_of_ours_is_read_with_its_uncertainties(tmp_path: Path) -> None:
 def test_a_toml_file_has_every_parameter(tmp_path: Path) -> None:
     path = tmp_path / "partial.toml"
     path.write_text("wheelbase = 1.1\ntrail = 0.07\n")
-    with pytest.raises(ScenarioError, match="steer_axis_tilt, rear_wheel_radius, .* missing; a bicycle file has every"):
+    with pytest.raises(ScenarioError, match=r"steer_axis_tilt, rear_wheel_radius, .* missing; a bicycle"):
         read_bicycle_file(path)
 
 
