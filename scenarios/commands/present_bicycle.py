@@ -57,9 +57,21 @@ def _make_eigenvalue_table(study: BicycleStudy) -> Table:
         cells = []
         for mode in dict.fromkeys(study.modes):
             values = [study.followed[k, c] for c, name in enumerate(study.modes) if name == mode]
-            oscillates = len(values) == 2 and abs(values[0].imag) > 1e-9 * abs(values[0])
-            shown = values[:1] if oscillates else values
-            sign = " ± " if oscillates else ""
-            cells.append(", ".join(f"{v.real:.4f}{f'{sign}{abs(v.imag):.4f} i' if oscillates else ''}" for v in shown))
+            if len(values) == 2 and _is_complex(values[0]):
+                cells.append(_format_eigenvalue(values[0], sign="±"))
+            else:
+                # Capsize and castering may be a pair as well: each then shows its half.
+                cells.append(", ".join(_format_eigenvalue(value) for value in values))
         table.add_row(f"{study.speeds[k]:g}", *cells)
     return table
+
+
+def _is_complex(value: complex) -> bool:
+    return abs(value.imag) > 1e-9 * abs(value)
+
+
+def _format_eigenvalue(value: complex, sign: str | None = None) -> str:
+    """Format an eigenvalue [1/s]; with a sign of its imaginary part if another than its own is to be shown."""
+    if not _is_complex(value):
+        return f"{value.real:.4f}"
+    return f"{value.real:.4f} {sign or ('+' if value.imag > 0 else '-')} {abs(value.imag):.4f} i"

@@ -18,8 +18,9 @@ def show_circular(console: Console, found: dict[str, Any]) -> None:
     else:
         for name, value in found["surface"].items():
             table.add_row("surface" if name == "kind" else name, _format_value(value))
+    table.add_row("family", "none of the benchmark's" if found["family"] is None else str(found["family"]))
     for name, unit in (
-        *(("family", ""), ("rear_rate", "rad/s"), ("front_rate", "rad/s"), ("yaw_rate", "rad/s")),
+        *(("rear_rate", "rad/s"), ("front_rate", "rad/s"), ("yaw_rate", "rad/s")),
         *(("lean", "rad"), ("steer", "rad"), ("pitch", "rad"), ("energy", "J"), ("residual", "")),
     ):
         table.add_row(name, f"{found[name]:.12g}", unit)
@@ -52,7 +53,7 @@ def show_families(console: Console, document: Mapping[str, Any]) -> None:
     for family in document["families"]:
         points = family["points"]
         console.print(
-            f"family {family['family']}: {len(points['lean'])} points, from {family['ends'][0]} to {family['ends'][1]}",
+            f"{_curve_name(family)}: {len(points['lean'])} points, from {family['ends'][0]} to {family['ends'][1]}",
             style="bold",
             markup=False,
             highlight=False,
@@ -71,6 +72,14 @@ def show_families(console: Console, document: Mapping[str, Any]) -> None:
             console.print(f"Lyapunov stable: rear rate {line}", style="green", markup=False, highlight=False)
     for number, reason in document["absent"].items():
         console.print(f"family {number}: no curve: {reason}", style="yellow", markup=False, soft_wrap=True)
+
+
+def _curve_name(family: Mapping[str, Any]) -> str:
+    """Name a curve by the families on it."""
+    if family["family"] is None:
+        return "no family of the benchmark's"
+    numbers = [family["family"], *family["joined_families"]]
+    return f"famil{'ies' if len(numbers) > 1 else 'y'} {', '.join(map(str, numbers))}"
 
 
 def show_critical(console: Console, document: Mapping[str, Any]) -> None:

@@ -31,8 +31,9 @@ class FamilyCurve:
 
     Attributes
     ----------
-    number : int
-        Number of the family, 1 to 4.
+    numbers : tuple of int
+        Numbers of the families on the curve, 1 to 4: several if families have joined, none if the curve is not
+        connected with the benchmark bicycle's families.
     ends : tuple of str
         Kinds of the curve's two ends, see `velodrome.reference.families.Family`.
     samples : Samples
@@ -47,7 +48,7 @@ class FamilyCurve:
         Points with a letter in the paper, folds, cusps and extremes of the energy.
     """
 
-    number: int
+    numbers: tuple[int, ...]
     ends: tuple[str, str]
     samples: Samples = field(repr=False)
     modes: np.ndarray = field(repr=False)
@@ -55,10 +56,16 @@ class FamilyCurve:
     stable_sections: tuple[tuple[SectionEnd, SectionEnd], ...] = field(repr=False)
     special_points: tuple[SpecialPoint, ...] = field(repr=False)
 
+    @property
+    def number(self) -> int | None:
+        """Smallest number of the families on the curve; None if it has no number."""
+        return self.numbers[0] if self.numbers else None
+
     def as_json(self) -> dict[str, Any]:
         """Return this curve's part of the document of `velodrome families`."""
         return {
             "family": self.number,
+            "joined_families": list(self.numbers[1:]),
             "ends": list(self.ends),
             "points": self._list_points(),
             "stable_sections": [_describe_section(*ends) for ends in self.stable_sections],
@@ -163,7 +170,7 @@ def follow_families(bicycle: Bicycle, surface: SurfaceOfRevolution) -> SolutionF
 def examine_curve(family: Family) -> FamilyCurve:
     """Sample a curve and find its stable sections and special points."""
     return FamilyCurve(
-        number=family.number,
+        numbers=family.numbers,
         ends=family.ends,
         samples=sample_family(family),
         modes=follow_modes(family),

@@ -178,6 +178,9 @@ def _interpret(
     if own & set(values):
         _require_known(values, own, "the suite's names (wheelbase, trail, ...)")
         _require_known(deviations, own, "the suite's names (wheelbase, trail, ...)")
+        missing = [name for name in Bicycle.__dataclass_fields__ if name not in values and name != "gravity"]
+        if missing:
+            raise ValueError(f"{', '.join(missing)} missing; a bicycle file has every parameter")
         return "the suite's names, z up", values, deviations, ()
     for name in [name for name in values if _GAIN.fullmatch(name)]:
         if values.pop(name) != 0:

@@ -17,7 +17,7 @@ from ...reference.rim import require_clear_rims
 from ...reference.stability import growth_rate, linearise
 from ...reference.surface import Plane, Surface, SurfaceOfRevolution, evaluate
 from ..error import ScenarioError
-from .schema import CircularTable, Scenario, Simulation
+from .schema import CircularTable, Scenario, Simulation, UprightTable
 from .surfaces import make_bowl
 
 # Runs that disturb the same motion in different ways share its computation.
@@ -99,7 +99,9 @@ def _compute_undisturbed(
         family, motion = _find_motion(bicycle, make_bowl(surface), table.rear_rate, table.family, near)  # type: ignore[arg-type]
         return family, motion, *motion.state()
     rates = (0.0, 0.0, table.speed / bicycle.rear_wheel_radius)
-    q, qd = consistent_state(bicycle, surface, (float(bicycle.reference_point[0]), 0.0), 0.0, 0.0, rates)
+    # Where the disturbed bicycle stands: there may be no ground at the origin.
+    place = (float(bicycle.reference_point[0]) + scenario.perturbation.x, scenario.perturbation.y)
+    q, qd = consistent_state(bicycle, surface, place, 0.0, 0.0, rates)
     return None, None, q, qd
 
 
@@ -110,10 +112,11 @@ def _disturb_state(
     if change == type(change)():
         return q, qd
     lean = float(q[LEAN]) + change.lean
+    moved = (0.0, 0.0) if isinstance(scenario.motion, UprightTable) else (change.x, change.y)
     q, qd = consistent_state(
         bicycle,
         surface,
-        (float(q[0]) + change.x, float(q[1]) + change.y),
+        (float(q[0]) + moved[0], float(q[1]) + moved[1]),
         lean,
         float(q[STEER]) + change.steer,
         (qd[LEAN] + change.lean_rate, qd[STEER] + change.steer_rate, qd[REAR_ANGLE] + change.rear_rate),

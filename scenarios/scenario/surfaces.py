@@ -10,7 +10,7 @@ from pydantic import Field, TypeAdapter, ValidationError, field_validator, model
 from ...reference.bowls import Cone, Sphere, Torus
 from ...reference.height_field import HeightField
 from ...reference.profile import PolynomialProfile, SplineProfile
-from ...reference.surface import Paraboloid, Plane, Surface, SurfaceOfRevolution
+from ...reference.surface import InclinedPlane, Paraboloid, Plane, Surface, SurfaceOfRevolution
 from ..error import ScenarioError
 from .table import Table, format_validation_error, read_toml, show_value
 
@@ -45,6 +45,18 @@ class PlaneTable(Table):
     def make(self) -> Plane:
         """The surface."""
         return Plane()
+
+
+class InclinedPlaneTable(Table):
+    """A plane through the origin that rises in one direction."""
+
+    kind: Literal["inclined-plane"]
+    slope: float = Field(gt=0, le=1e3, description="rise over run [-]")
+    direction: float = Field(0.0, ge=-10.0, le=10.0, description="in which it rises, from the x axis towards y [rad]")
+
+    def make(self) -> InclinedPlane:
+        """The surface."""
+        return InclinedPlane(self.slope, self.direction)
 
 
 class ParaboloidTable(Table):
@@ -149,12 +161,20 @@ class HeightFieldTable(Table):
 
 
 SurfaceTable = Annotated[
-    PlaneTable | ParaboloidTable | SphereTable | ConeTable | TorusTable | ProfileTable | HeightFieldTable,
+    PlaneTable
+    | InclinedPlaneTable
+    | ParaboloidTable
+    | SphereTable
+    | ConeTable
+    | TorusTable
+    | ProfileTable
+    | HeightFieldTable,
     Field(discriminator="kind"),
 ]
 
 _KINDS: dict[type, str] = {
     Plane: "plane",
+    InclinedPlane: "inclined-plane",
     Paraboloid: "paraboloid",
     Sphere: "sphere",
     Cone: "cone",
