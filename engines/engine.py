@@ -340,8 +340,8 @@ def _find_entry_points() -> dict[str, EntryPoint]:
         # The same package may be on the path twice, e.g. with an editable install.
         if other is not point and _distribution(other) != _distribution(point):
             raise ValueError(
-                f"engine {point.name!r} is announced by two packages, {_distribution(other)} and {_distribution(point)}; "
-                "uninstall one of them"
+                f"engine {point.name!r} is announced by two packages, {_distribution(other)} and "
+                f"{_distribution(point)}; uninstall one of them"
             )
     return found
 
