@@ -44,7 +44,7 @@ from .continuation import (
 )
 from .curve import sample_curve
 from .kernels.steady import STANDING, direction
-from .search import Start, describe_search, guesses_at, is_on_curve, search_starts
+from .search import FoundStart, describe_search, guesses_at, is_on_curve, search_starts
 from .standing import require_standing, stands
 from .surface import SurfaceOfRevolution, has_tip
 
@@ -210,7 +210,7 @@ def trace_all(
     return curves, {number: why for number, why in absent.items() if number not in numbers}
 
 
-def _searched_anchor(equations: Steady, found: Start) -> Anchor:
+def _searched_anchor(equations: Steady, found: FoundStart) -> Anchor:
     """Make an anchor, without a family, of a motion that the search has found."""
     covector = metric(found.unknowns) * found.along
     condition = plane_condition(found.unknowns, covector, 0.0)

@@ -48,7 +48,7 @@ _SAME = 1e-6  # two solutions in one plane across a curve: round-off, 1e-14, and
 
 
 @dataclass(frozen=True)
-class Start:
+class FoundStart:
     """A circular motion that the search has found.
 
     Attributes
@@ -71,7 +71,7 @@ def describe_search() -> str:
     )
 
 
-def search_starts(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Iterator[Start]:
+def search_starts(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Iterator[FoundStart]:
     """Find circular motions from the grid of angles, turning to the left, many of them on the same curve.
 
     Parameters
@@ -91,7 +91,7 @@ def search_starts(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Iterator[St
                 for condition in (nearest_condition(), unknown_condition(SIGMA, 0.0)):
                     found = _solve(equations, guess, condition)
                     if found is not None:
-                        yield Start(found, tangent(equations, found))
+                        yield FoundStart(found, tangent(equations, found))
 
 
 def guesses_at(bicycle: Bicycle, surface: SurfaceOfRevolution, lean: float, steer: float) -> Iterator[np.ndarray]:
@@ -167,7 +167,7 @@ def _solve(equations: Steady, guess: np.ndarray, condition: Callable[[np.ndarray
     return as_solved(found) if possible else None
 
 
-def is_on_curve(equations: Steady, points: Sequence[Point], start: Start) -> bool:
+def is_on_curve(equations: Steady, points: Sequence[Point], start: FoundStart) -> bool:
     """Return whether a followed curve passes through a motion.
 
     Near the motion, the curve's point in the plane through the motion and across its tangent is solved for; it must be
