@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..studies import BicycleStudy
+from .tables import Column, print_table
 
 _SHOWN_SPEEDS = 11
 
@@ -21,7 +22,8 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
     for one in fields(source.bicycle):
         deviation = source.uncertainties.get(one.name)
         value = f"{getattr(source.bicycle, one.name):.9g}"
-        table.add_row(one.name, value, "" if deviation is None else f"± {deviation:.2g}")
+        # A file that states no deviation of a number has 0.
+        table.add_row(one.name, value, f"± {deviation:.2g}" if deviation else "")
     console.print(table)
     for line in source.bicycle.warnings():
         console.print(line, style="yellow", markup=False, soft_wrap=True)
@@ -34,11 +36,11 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
             matrices.add_row(name if k == 0 else "", *(f"{value:.12g}" for value in row))
     console.print(matrices)
     console.print()
-    console.print(_eigenvalues(study))
+    print_table(console, _eigenvalue_columns(study))
     console.print()
     for mode, speed in (("weave", study.weave_speed), ("capsize", study.capsize_speed)):
         deviation = study.deviations.get(mode)
-        spread = "" if deviation is None else f" ± {deviation:.2g}"
+        spread = f" ± {deviation:.2g}" if deviation else ""
         console.print(f"{mode} speed: {'none' if speed is None else f'{speed:.12g}{spread} m/s'}", highlight=False)
     ranges = [
         f"{start:.9g} to {end:.9g}" if end < inf else f"{start:.9g} and above" for start, end in study.stable_speeds
@@ -46,20 +48,18 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
     console.print(f"stable speeds: {'; '.join(ranges) + ' m/s' if ranges else 'none'}", highlight=False)
 
 
-def _eigenvalues(study: BicycleStudy) -> Table:
-    """Make the table of eigenvalues at some of the speeds, a column for each mode [1/s]."""
-    table = Table(box=None, pad_edge=False)
-    for title in ("speed", *dict.fromkeys(study.modes)):
-        table.add_column(title, justify="right", no_wrap=True)
+def _eigenvalue_columns(study: BicycleStudy) -> list[Column]:
+    """Return the speeds shown and a column for each mode with its eigenvalues there [1/s]."""
     last = len(study.speeds) - 1
     places = sorted({round(k * last / (_SHOWN_SPEEDS - 1)) for k in range(_SHOWN_SPEEDS)})
-    for k in places:
+    columns = [Column("speed", [f"{study.speeds[k]:g}" for k in places])]
+    for mode in dict.fromkeys(study.modes):
         cells = []
-        for mode in dict.fromkeys(study.modes):
+        for k in places:
             values = [study.followed[k, c] for c, name in enumerate(study.modes) if name == mode]
             oscillates = len(values) == 2 and abs(values[0].imag) > 1e-9 * abs(values[0])
             shown = values[:1] if oscillates else values
             sign = " ± " if oscillates else ""
             cells.append(", ".join(f"{v.real:.4f}{f'{sign}{abs(v.imag):.4f} i' if oscillates else ''}" for v in shown))
-        table.add_row(f"{study.speeds[k]:g}", *cells)
-    return table
+        columns.append(Column(mode, cells))
+    return columns
