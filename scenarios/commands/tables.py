@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from rich.cells import cell_len
 from rich.console import Console
+from rich.segment import Segments
 from rich.table import Table
 from rich.text import Text
 
@@ -64,12 +65,14 @@ def print_table(console: Console, columns: Sequence[Column], keys: int = 1, gap:
             if column.unit:
                 header.append("\n").append(column.unit, "dim")
             justify = "right" if column.right else "left"
-            # Without a least width, rich cuts columns that it may not wrap.
-            table.add_column(header, justify=justify, no_wrap=True, min_width=column.width)
+            table.add_column(header, justify=justify, no_wrap=True)
         for row in zip(*(column.cells for column in (*leading, *part)), strict=True):
             # Brackets in a name are no markup.
             table.add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in row))
-        console.print(table, crop=False)
+        # Made at its own width, since rich cuts columns of a table that is wider than the terminal.
+        whole = sum(column.width + gap for column in (*leading, *part))
+        options = console.options.update_width(max(whole, console.width))
+        console.print(Segments(console.render(table, options)), crop=False)
 
 
 def _split_columns(columns: Sequence[Column], room: int, gap: int) -> Iterator[Sequence[Column]]:
