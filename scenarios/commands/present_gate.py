@@ -35,7 +35,7 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed
             Column("hold", held),
             Column("friction\nneeded", friction),
             Column("CPU time,\nreference 1", cpu),
-            Column("moved most, against its limit", moved, right=False),
+            Column("moved most,\nagainst its limit", moved, right=False),
         ]
         print_table(console, columns)
     for name, verdict in verdicts:
