@@ -1,12 +1,12 @@
 PYTHON ?= python3
 BIN := .venv/bin
-# The stamp's time is that of the last set-up: a changed list of packages sets up again.
+# Time stamp of the last set-up. The environment is set up again if a list of packages is newer.
 STAMP := .venv/set-up
 DOCS_STAMP := .venv/set-up-docs
-# The oldest versions of the direct dependencies that the suite claims to work with.
+# Environment with the oldest supported versions of the direct dependencies.
 LOWEST := .venv-lowest
 LOWEST_STAMP := $(LOWEST)/set-up
-# Two processes, a file of tests in one of them: what its tests share is computed once.
+# Run the tests in two processes, each file in one of them, so that fixtures of a file are computed once.
 PYTEST := -m pytest -n 2 --dist loadfile
 
 .PHONY: run test test-all test-lowest test-machines test-machines-short test-wheel lint check docs
@@ -23,14 +23,14 @@ test-all: $(STAMP)
 test-lowest: $(LOWEST_STAMP)
 	$(LOWEST)/bin/python $(PYTEST)
 
-# The tests that round-off could sway, as other CPUs would run them.
+# Run the tests that are sensitive to round-off with the instructions of other CPUs.
 test-machines: $(STAMP)
 	$(BIN)/python -m tests.machines
 
 test-machines-short: $(STAMP)
 	$(BIN)/python -m tests.machines --short
 
-# The package as it is installed elsewhere: built, put into an empty environment, and used from there.
+# Build the package, install it into an empty environment, and use it from there.
 test-wheel: $(STAMP)
 	$(BIN)/python -m tests.wheel
 
@@ -44,7 +44,7 @@ lint: $(STAMP)
 check: $(STAMP)
 	$(BIN)/velodrome check
 
-# The site, to be read from build/docs/html/index.html without a network; any warning is an error.
+# Build the documentation, which starts at build/docs/html/index.html; warnings are errors.
 docs: $(DOCS_STAMP)
 	$(BIN)/python -m sphinx -W --keep-going -q -j 2 -b html -d build/docs/doctrees docs build/docs/html
 
@@ -54,7 +54,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
 	touch $@
 
-# What only the documentation needs.
+# Packages for the documentation.
 $(DOCS_STAMP): $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,docs]'
 	touch $@

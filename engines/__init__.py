@@ -1,1 +1,1 @@
-"""The same bicycle in each engine."""
+"""The protocol of engines, and the engines of the suite."""

@@ -1,4 +1,4 @@
-"""What an engine gives is looked at before anything is made of it: an engine may come from anywhere."""
+"""Simulation with an engine, and validation of the trajectory that it returns."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from ..reference.rim import find_second_touch, require_clear_rims
 from .engine import REQUIRED, SHAPES, Engine, EngineError, Problem, Progress, Settings, Trajectory
 from .guard import simulate_guarded
 
-# By how much a sample's time may be off, relative to it. `velodrome.reference.simulate.steps_per_output` lets a step be
-# off by as much. An engine that adds its step up errs by half a unit of round-off an addition at the most: less in nine
-# million steps.
+# Largest relative error of a sample's time, the same as `velodrome.reference.simulate.steps_per_output` allows for a
+# step. An engine that sums up its steps errs by at most half a unit of round-off per addition: less than this limit in
+# nine million steps.
 CLOCK_ERROR = 1e-9
 
 
 def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
-    """Run a problem in an engine and look at what it gives.
+    """Run a problem in an engine and validate the trajectory.
 
-    A state that is not finite ends the ride before it, and so does a rim that touches the ground at a second place.
-    An engine may look for that in its own steps; here any engine's samples are looked at. The engine's own times are
-    held against those asked for; what agrees up to `CLOCK_ERROR` carries the latter, so that engines can be compared
+    The trajectory is cut before a state that is not finite, and where a rim touches the ground at a second place. An
+    engine may detect this in its own steps; here the samples of every engine are checked. The engine's times must agree
+    with the problem's up to `CLOCK_ERROR`; they are then replaced by the problem's, so that engines can be compared
     sample by sample.
 
     Parameters
@@ -41,10 +41,10 @@ def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progr
     Raises
     ------
     EngineError
-        If a rim lies inside the ground at the start, or the engine gives no trajectory, or one that is none of this
-        problem: what is wrong with it.
+        If a rim lies inside the ground at the start, or the engine returns no trajectory, or one that does not fit the
+        problem. The message states the fault.
     Exception
-        Whatever the engine raises.
+        Any exception that the engine raises.
     """
     try:
         require_clear_rims(problem.bicycle, problem.surface, problem.q, may_sink=True)
@@ -53,43 +53,43 @@ def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progr
     trajectory = simulate_guarded(engine, problem, settings, progress)
     if not isinstance(trajectory, Trajectory):
         raise EngineError(f"it gave a {type(trajectory).__name__}, not a Trajectory")
-    for wrong in _faults(engine, problem, settings, trajectory):
+    for wrong in _list_faults(engine, problem, settings, trajectory):
         raise EngineError(wrong)
-    trajectory = _own(trajectory)
+    trajectory = _copy_arrays(trajectory)
     asked = problem.times[: len(trajectory.time)]
     if not np.array_equal(trajectory.time, asked):
         trajectory = replace(trajectory, time=asked.copy())
-    finite = np.all([np.isfinite(_rows(getattr(trajectory, name))).all(axis=1) for name in REQUIRED], axis=0)
+    finite = np.all([np.isfinite(_flatten_samples(getattr(trajectory, name))).all(axis=1) for name in REQUIRED], axis=0)
     if finite.all():
-        return _until_second_touch(problem, trajectory)
+        return _cut_at_second_touch(problem, trajectory)
     bad = int(np.argmin(finite))
     if bad == 0:
         raise EngineError("its first state is not finite")
     ended = f"its state is not finite at {trajectory.time[bad]:.6g} s"
-    return _until_second_touch(problem, replace(trajectory.first(bad), ended=trajectory.ended or ended))
+    return _cut_at_second_touch(problem, replace(trajectory.first(bad), ended=trajectory.ended or ended))
 
 
-def _own(trajectory: Trajectory) -> Trajectory:
-    """Copy a trajectory's numbers: an engine may use its arrays again for the next ride, and have numpy's numbers."""
+def _copy_arrays(trajectory: Trajectory) -> Trajectory:
+    """Copy a trajectory's arrays, which an engine may reuse, and convert numpy's scalars to Python's."""
     given = {name: value for name in SHAPES if (value := getattr(trajectory, name)) is not None}
     copies: dict[str, Any] = {name: np.array(value, dtype=float, order="C") for name, value in given.items()}
     return replace(trajectory, **copies, steps=int(trajectory.steps), cpu_time=float(trajectory.cpu_time))
 
 
-def _until_second_touch(problem: Problem, trajectory: Trajectory) -> Trajectory:
-    """The ride up to where a rim touches a second place, at least its first sample; all of it if none does."""
+def _cut_at_second_touch(problem: Problem, trajectory: Trajectory) -> Trajectory:
+    """Return the trajectory up to where a rim touches a second place; it keeps at least its first sample."""
     ending = find_second_touch(problem.bicycle, problem.surface, trajectory.time, trajectory.q, trajectory.qd)
     if ending is None:
         return trajectory
     return replace(trajectory.until(ending.time), ended=ending.why)
 
 
-def _rows(values: np.ndarray) -> np.ndarray:
+def _flatten_samples(values: np.ndarray) -> np.ndarray:
     return values.reshape(len(values), -1)
 
 
-def _time_faults(asked: np.ndarray, own: np.ndarray) -> Iterator[str]:
-    """What is wrong with an engine's sampling times, in words."""
+def _list_time_faults(asked: np.ndarray, own: np.ndarray) -> Iterator[str]:
+    """List the faults of an engine's sample times."""
     if len(own) > len(asked):
         yield f"it gives {len(own)} samples; {len(asked)} are asked for"
         return
@@ -103,15 +103,15 @@ def _time_faults(asked: np.ndarray, own: np.ndarray) -> Iterator[str]:
         )
 
 
-def _faults(engine: Engine, problem: Problem, settings: Settings, trajectory: Trajectory) -> Iterator[str]:
-    """What makes it no trajectory of the problem, in words."""
-    for name, said, own in (
+def _list_faults(engine: Engine, problem: Problem, settings: Settings, trajectory: Trajectory) -> Iterator[str]:
+    """List the faults that make a result no valid trajectory of the problem."""
+    for name, stated, own in (
         ("engine", trajectory.engine, engine.name),
         ("version", trajectory.version, engine.version),
         ("settings", trajectory.settings, settings.model_dump(mode="json")),
     ):
-        if said != own:
-            yield f"its trajectory is of {name} {said!r}, not {own!r}"
+        if stated != own:
+            yield f"its trajectory is of {name} {stated!r}, not {own!r}"
     samples = np.size(trajectory.time)
     for name, shape in SHAPES.items():
         value = getattr(trajectory, name)
@@ -129,7 +129,7 @@ def _faults(engine: Engine, problem: Problem, settings: Settings, trajectory: Tr
             yield f"its {name} has shape {value.shape}; it must be {(samples, *shape)}"
     if samples == 0:
         yield "its trajectory has no sample"
-    yield from _time_faults(problem.times, trajectory.time)
+    yield from _list_time_faults(problem.times, trajectory.time)
     if samples < len(problem.times) and trajectory.ended is None:
         yield f"it ends at {trajectory.time[-1]:.6g} s and does not say why"
     for name, kind, what in (("steps", Integral, "a whole number"), ("cpu_time", Real, "a finite number of seconds")):

@@ -1,13 +1,13 @@
-"""The suite's coordinates and an engine's rigid bodies, both ways.
+"""Conversion between the suite's coordinates and an engine's rigid bodies.
 
 The nine coordinates and their order are `COORDINATES`, the four bodies `BODIES`; the theory page of the documentation
 states the axes.
 
-- An engine of coordinates has its bodies' poses from `body_positions` and `body_quaternions`, and their twists from
-  `body_velocities` and `angular_velocities`: these also place the bodies at the start.
-- An engine of rigid bodies has its coordinates and rates from `coordinates_from_bodies`, and with `start_on_turn` on
-  the turns on which the problem starts. Angles that are known modulo a whole turn are continued by `unwrap`.
-- Orientations go from matrices to quaternions (w, x, y, z) by `quaternions`, and back by `rotation_matrices`.
+- An engine that uses these coordinates gets the poses of its bodies from `body_positions` and `body_quaternions`, and
+  their twists from `body_velocities` and `angular_velocities`. These functions also place the bodies at the start.
+- An engine of rigid bodies gets its coordinates and rates from `coordinates_from_bodies`; `start_on_turn` shifts them
+  to the turns on which the problem starts. `unwrap` continues angles that are known modulo a whole turn.
+- `quaternions` converts rotation matrices to quaternions (w, x, y, z), and `rotation_matrices` converts them back.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ __all__ = [
 
 
 def start_on_turn(q: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Shift angles by whole turns, so that a ride starts on the turns on which its problem does.
+    """Shift angles by whole turns so that the first sample has the turns of the problem's start.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def start_on_turn(q: np.ndarray, start: np.ndarray) -> np.ndarray:
 
 
 def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
-    """Rotation matrices (..., 3, 3) of quaternions (w, x, y, z) of any length but zero, shape (..., 4)."""
+    """Return the rotation matrices (..., 3, 3) of quaternions (w, x, y, z), shape (..., 4), of any nonzero length."""
     w, x, y, z = np.moveaxis(np.asarray(quaternions, float), -1, 0)
     s = 2 / (w * w + x * x + y * y + z * z)
     rows = (

@@ -1,7 +1,7 @@
-"""What every engine takes and gives: `Problem` in, `Trajectory` out.
+"""The interface of engines: `Engine`, its input `Problem` and its output `Trajectory`.
 
 An engine is any object that satisfies `Engine` and is announced under the entry-point group
-``velodrome.engines``; the suite never names one.
+``velodrome.engines``. The suite finds engines by this group alone.
 """
 
 # pandas and pyarrow carry no types.
@@ -45,7 +45,7 @@ class Problem:
     bicycle : Bicycle
     surface : Surface
     q, qd : ndarray, shape (9,)
-        Generalised coordinates and rates at the start, wheel angles and yaw included.
+        Generalised coordinates and rates at the start, including wheel angles and yaw.
     times : ndarray, shape (n,)
         Output times, rising from 0 [s].
     """
@@ -57,7 +57,7 @@ class Problem:
     times: np.ndarray
 
 
-# Shapes of what a trajectory samples, but for the number of samples; the first five must be given.
+# Shapes of a trajectory's sampled fields without the axis of samples; the first five fields are required.
 SHAPES: dict[str, tuple[int, ...]] = {
     "time": (),
     "q": (9,),
@@ -76,19 +76,19 @@ REQUIRED = tuple(SHAPES)[:5]
 
 @dataclass(frozen=True, kw_only=True)
 class Trajectory:
-    """What an engine computed. What it cannot give is None, never made up.
+    """The result of an engine. Fields that the engine does not compute are None.
 
-    All fields are given by name.
+    All fields are keyword-only.
 
     Attributes
     ----------
     engine, version : str
         Name and version of the engine.
     settings : dict
-        The settings it ran with, JSON values.
+        JSON values of the settings that it ran with.
     time : ndarray, shape (n,)
-        Times of the samples by the engine's own clock [s], one for each of the problem's, or fewer where the run
-        ended early. `velodrome.engines.admission.ride_engine` holds them against the problem's.
+        Times of the samples by the engine's own clock [s], one for each output time of the problem, or fewer if the run
+        ended early. `velodrome.engines.admission.ride_engine` compares them with the problem's.
     q, qd : ndarray, shape (n, 9)
         Generalised coordinates and rates.
     body_position : ndarray, shape (n, 4, 3)
@@ -112,14 +112,14 @@ class Trajectory:
     ended : str or None
         Why the run ended before the problem's last time; None if it did not.
     friction : float or None
-        Coefficient of friction that its contacts have in every direction; None where wheels are bound to roll.
+        Coefficient of friction of its contacts in every direction; None if the wheels are constrained to roll.
     unconverged_steps : int or None
-        Steps in which an iteration, such as Newton's method or a contact solver, stopped before it met its
-        tolerance; 0 where nothing iterates, None where the engine does not say.
+        Number of steps in which an iteration, such as Newton's method or a contact solver, stopped before it met its
+        tolerance; 0 if nothing iterates, None if the engine does not report it.
     largest_residual : float or None
-        Largest relative residual that an iteration left in any step: of a contact problem the residual of the
-        forces over the largest force, of Newton's method the residual over the forces that it brings into balance,
-        such as the weights. None where the engine does not say.
+        Largest relative residual that an iteration left in any step. For a contact problem it is the residual of the
+        forces relative to the largest force; for Newton's method the residual relative to the forces in balance, such
+        as the weights. None if the engine does not report it.
     """
 
     engine: str
@@ -144,23 +144,23 @@ class Trajectory:
     largest_residual: float | None = None
 
     def first(self, samples: int) -> Self:
-        """The ride up to a number of samples; steps and CPU time stay those of the whole."""
+        """Return the first samples of the trajectory; steps and CPU time remain those of the whole."""
         cut = {name: value[:samples] for name in SHAPES if (value := getattr(self, name)) is not None}
         return replace(self, **cut)
 
     def until(self, time: float) -> Self:
-        """The ride up to a time [s], its first sample at least; steps and CPU time stay those of the whole."""
+        """Return the samples up to a time [s], at least the first; steps and CPU time remain those of the whole."""
         return self.first(max(1, int(np.searchsorted(self.time, time, side="right"))))
 
     def to_arrow(self) -> pa.Table:  # pyright: ignore[reportUnknownParameterType, reportUnknownMemberType]
         """Return the trajectory as a table, with the columns of the stored Parquet files.
 
-        Units stand in the metadata of the columns, what is no column in that of the schema.
+        Units are in the metadata of the columns; everything that is not sampled is in the metadata of the schema.
 
         Returns
         -------
         pyarrow.Table
-            With n rows, in double precision.
+            A table with n rows in double precision.
         """
         from .storage import trajectory_table  # pyright: ignore[reportUnknownVariableType]
 
@@ -172,7 +172,7 @@ class Trajectory:
         Returns
         -------
         pandas.DataFrame
-            With n rows; the index is the time [s].
+            A data frame with n rows; the index is the time [s].
 
         Raises
         ------
@@ -184,28 +184,28 @@ class Trajectory:
         return trajectory_frame(self)
 
     def not_finite(self) -> list[str]:
-        """Names of what is given and is not finite in some samples."""
+        """Return the names of the given fields that are not finite in some samples."""
         given = ((name, getattr(self, name)) for name in SHAPES)
         return [name for name, value in given if value is not None and not np.all(np.isfinite(value))]
 
 
 class Settings(BaseModel):
-    """Base of an engine's settings: unknown names are refused, values are checked, nothing changes later."""
+    """Base of an engine's settings: unknown names are refused, values are checked, and instances are frozen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def refined(self, factor: float) -> Self:
-        """These settings with another step, for a study of convergence.
+        """Return these settings with another step, for a study of convergence.
 
         Parameters
         ----------
         factor : float
-            Of the step. A method that chooses its own steps scales what it chooses them by.
+            Factor on the step. An adaptive method scales the tolerance that determines its steps.
 
         Raises
         ------
         ValueError
-            If there is no step, or it would be out of its range.
+            If there is no step, or the new step would be out of its range.
         """
         values = self.model_dump()
         if "step" not in values:
@@ -214,38 +214,40 @@ class Settings(BaseModel):
 
 
 class Engine(Protocol):
-    """A multibody engine that rides the bicycle.
+    """A multibody engine that simulates the bicycle.
 
-    An engine is an object of any class with the members below. It joins the suite from a package of its own, through
-    an entry point of the group ``velodrome.engines`` whose name is the engine's; nothing in the suite is touched. To
-    write one:
+    An engine is an object of any class with the members below. Its package adds it to the suite through an entry point
+    of the group ``velodrome.engines`` with the engine's name; the suite itself is not changed. To write an engine:
 
     1. Derive its settings from `Settings`. Every field has a default, bounds and a description with its unit. With a
        field ``step`` the settings can be refined for studies of convergence; a method that chooses its own steps
        overrides ``refined`` and scales its tolerance by the factor to the power of its order.
-    2. In ``check`` refuse what cannot be run, before anything is computed: a ground that the engine does not know by
-       `UnsuitableProblem`, output times that its steps do not meet by ValueError, in one line that says what would
-       do. `velodrome.reference.simulate.steps_per_output` does the latter for a fixed step.
+    2. In ``check`` refuse what the engine cannot run, before anything is computed: raise `UnsuitableProblem` for a
+       ground that the engine does not know, and ValueError for output times that its steps do not meet. The message is
+       one line that says what would be right. `velodrome.reference.simulate.steps_per_output` checks the times for a
+       fixed step.
     3. Start from exactly the coordinates and rates of the problem, for its bicycle and on its ground.
-       `velodrome.engines.coordinates` has the poses and twists of the bodies there, `velodrome.engines.rolling` the
+       `velodrome.engines.coordinates` computes the poses and twists of the bodies, and `velodrome.engines.rolling` the
        contacts of the wheels.
-    4. Sample at the problem's times and stamp each sample with the engine's own clock. Call ``progress`` now and then.
-    5. Give coordinates, rates and poses of the bodies at every sample. Coordinates of rigid bodies come from
-       `velodrome.engines.coordinates.coordinates_from_bodies`. Angles go on beyond a turn, or not: whole turns do not
-       count.
-    6. List in ``gives`` what else the engine computes itself, and give it. What it does not compute is None, never
-       filled from the reference. Contact forces are those of the ground on the wheels, in inertial axes.
-    7. End a ride that cannot go on with the samples so far and the reason in ``ended``; raise `EngineError` where not
-       even the first sample can be computed. Count steps whose iterations did not converge.
-    8. State in ``step_noise`` what a step may leave beyond its method: 2^-52 for round-off, or the tolerance of its
-       iterations or of its steps. Limits follow from it.
-    9. Give the same bits in every ride of one problem, whatever was ridden before. Neither print to stdout nor change
-       the process; import what is slow to load where it is needed.
-    10. Hold it against all of this with `velodrome.testing.check_engine`, which says what looks wrong.
+    4. Sample at the problem's times and stamp each sample with the engine's own clock. Call ``progress`` from time to
+       time.
+    5. Return coordinates, rates and poses of the bodies at every sample. For rigid bodies,
+       `velodrome.engines.coordinates.coordinates_from_bodies` computes the coordinates. Whole turns of angles do not
+       matter.
+    6. List in ``gives`` the optional fields that the engine computes itself, and return them. Fields that it does not
+       compute are None, and are never filled from the reference. Contact forces are those of the ground on the wheels,
+       in inertial axes.
+    7. If a ride cannot go on, return the samples so far with the reason in ``ended``. If not even the first sample can
+       be computed, raise `EngineError`. Count the steps whose iterations did not converge.
+    8. Return from ``step_noise`` the relative error that a step may add beyond its method: 2^-52 for round-off, or the
+       tolerance of its iterations or of its steps. The suite derives limits from it.
+    9. Return the same bits for the same problem, whatever was simulated before. Do not print to stdout and do not
+       change the process. Import modules that load slowly only where they are needed.
+    10. Test the engine with `velodrome.testing.check_engine`, which diagnoses violations of these rules.
 
-    ``examples/velodrome-symbrim`` is a whole package with an engine.
+    ``examples/velodrome-symbrim`` is a complete package with an engine.
 
-    An engine may also have a ``description``, one line of text that says what it is, which `velodrome show` prints.
+    An engine may also have a ``description``, one line of text, which `velodrome show` prints.
     """
 
     @property
@@ -255,7 +257,7 @@ class Engine(Protocol):
 
     @property
     def version(self) -> str:
-        """Version of the library behind it."""
+        """Version of the library that it uses."""
         ...
 
     @property
@@ -274,14 +276,15 @@ class Engine(Protocol):
         Raises
         ------
         UnsuitableProblem
-            If no settings of this engine would do: a run that did not ask for it by name leaves it out.
+            If the engine cannot run the problem with any settings. Runs that do not name the engine leave it out.
         ValueError
-            With one line that says what is wrong and what would be right.
+            If the settings do not fit the problem. The message is one line that says what is wrong and what would be
+            right.
         """
         ...
 
     def step_noise(self, settings: Any) -> float:
-        """Relative error that one step may add beyond its method: round-off and unconverged iterations."""
+        """Return the relative error that one step may add beyond its method, by round-off and iterations."""
         ...
 
     def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
@@ -293,7 +296,7 @@ class Engine(Protocol):
         settings : Settings
             An instance of this engine's `settings`.
         progress : callable
-            To be called now and then with the simulated time reached [s].
+            To be called from time to time with the simulated time reached [s].
 
         Returns
         -------
@@ -312,51 +315,51 @@ _MEMBERS = (*_FACTS, "check", "step_noise", "simulate")
 
 
 class UnsuitableProblem(ValueError):
-    """A problem of a kind that an engine is not made for, such as a ground that it does not know."""
+    """Raised for a problem of a kind that an engine does not support, such as an unknown ground."""
 
 
-# Keys of documents that have a key an engine besides; no engine may bear such a name.
+# Keys in documents whose other keys are names of engines; engines with these names are ignored.
 RESERVED_NAMES = (VERSION_KEY, "sha256")
-# Files are called after engines, and a name may come from any package.
+# Files are named after engines, so that a name must not be a path.
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 
 
-def _announced() -> dict[str, EntryPoint]:
-    """Entry points by name; one whose name could lead a file elsewhere is no engine.
+def _find_entry_points() -> dict[str, EntryPoint]:
+    """Return the entry points of engines by name, without those whose names are not permitted.
 
     Raises
     ------
     ValueError
-        If two packages announce one name: which of them ran would hang on the order of the path.
+        If two packages announce the same name, since which of them is loaded would depend on the order of the path.
     """
     found: dict[str, EntryPoint] = {}
     for point in entry_points(group=ENTRY_POINT_GROUP):
         if not _NAME.fullmatch(point.name) or point.name in RESERVED_NAMES:
             continue
         other = found.setdefault(point.name, point)
-        # One package may stand on the path twice, as with an editable install.
-        if other is not point and _package(other) != _package(point):
+        # The same package may be on the path twice, e.g. with an editable install.
+        if other is not point and _distribution(other) != _distribution(point):
             raise ValueError(
-                f"engine {point.name!r} is announced by two packages, {_package(other)} and {_package(point)}; "
-                "uninstall one of them"
+                f"engine {point.name!r} is announced by two packages, {_distribution(other)} and "
+                f"{_distribution(point)}; uninstall one of them"
             )
     return found
 
 
-def _package(point: EntryPoint) -> str:
-    """What announces an entry point: its distribution's name, as package indices compare them."""
+def _distribution(point: EntryPoint) -> str:
+    """Return the normalised name of the distribution that announces an entry point."""
     return point.value if point.dist is None else re.sub(r"[-_.]+", "-", point.dist.name).lower()
 
 
 def engine_names() -> list[str]:
-    """Names of all installed engines, the reference first.
+    """Return the names of all installed engines, the reference first.
 
     Raises
     ------
     ValueError
-        If two packages announce an engine of one name.
+        If two packages announce engines with the same name.
     """
-    return sorted(_announced(), key=lambda name: (name != REFERENCE, name))
+    return sorted(_find_entry_points(), key=lambda name: (name != REFERENCE, name))
 
 
 def load_engine(name: str) -> Engine:
@@ -365,10 +368,10 @@ def load_engine(name: str) -> Engine:
     Raises
     ------
     ValueError
-        If no engine of that name is installed, or what is announced under it is no engine, or two packages
-        announce an engine of one name.
+        If no engine with that name is installed, or the announced object is not an engine, or two packages announce
+        engines with the same name.
     """
-    points = _announced()
+    points = _find_entry_points()
     if name not in points:
         raise ValueError(f"engine {name!r} is not installed ({suggest_name(name, engine_names())})")
     where = f"engine {name!r}, announced as {points[name].value},"
@@ -386,7 +389,7 @@ def load_engine(name: str) -> Engine:
 
 
 def describe_engine(engine: Engine) -> str:
-    """Say in a line what an engine is: its ``description`` if it has one, else the first line of its docstring."""
+    """Return a line that describes an engine: its ``description``, or the first line of its docstring."""
     own = engine.inner if isinstance(engine, GuardedEngine) else engine
     text = getattr(own, "description", None)
     if not isinstance(text, str) or not text.strip():
@@ -395,7 +398,10 @@ def describe_engine(engine: Engine) -> str:
 
 
 def why_failed(error: Exception) -> str:
-    """Say in one line why an engine failed: its own words where it chose them, else what broke in which line."""
+    """Return one line that says why an engine failed: the message of an `EngineError`, or the exception and its place.
+
+    The place is the file and the line in the engine's code.
+    """
     if isinstance(error, EngineError):
         return " ".join(str(error).split())
     place = None if isinstance(error, UnsuitableProblem) else where_raised(error)
@@ -404,24 +410,24 @@ def why_failed(error: Exception) -> str:
 
 
 def package_of(name: str) -> str | None:
-    """Return the distribution that announces an installed engine; None where the entry point does not say.
+    """Return the name of the distribution that announces an installed engine, or None if it is unknown.
 
     Raises
     ------
     KeyError
-        If no engine of that name is installed.
+        If no engine with that name is installed.
     """
-    distribution = _announced()[name].dist
+    distribution = _find_entry_points()[name].dist
     return None if distribution is None else distribution.name
 
 
 @cache
 def package_version(name: str) -> str:
-    """Version of an installed package; to look it up each time would take longer than a short ride."""
+    """Return the version of an installed package; cached, since a look-up takes longer than a short ride."""
     return version(name)
 
 
 def packages() -> dict[str, str]:
-    """Versions of the packages that announce engines, by name."""
-    found = (point.dist for point in _announced().values())
+    """Return the versions of the packages that announce engines, by name of the package."""
+    found = (point.dist for point in _find_entry_points().values())
     return {dist.name: dist.version for dist in found if dist is not None}

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Atomic writing of files."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from pathlib import Path
 
 @contextmanager
 def write_whole(path: Path) -> Iterator[Path]:
-    """Give a name beside ``path`` to write to; it takes the path's place when all is written, else it goes.
+    """Yield a temporary path to write to, which replaces ``path`` at the end; after an exception it is removed.
 
-    Its ending is the path's own, from which writers tell the format.
+    The temporary path is in the same folder and has the same suffix, from which writers infer the format.
     """
     partial = path.with_name(f".partial-{path.name}")
     try:

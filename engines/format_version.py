@@ -1,7 +1,7 @@
-"""The version of a document's format, which every document that leaves the suite carries.
+"""The format version, which every document written by the suite contains.
 
-A change that a reader of an older version would misread raises the number. A document without one is of version 1: it
-was written before there were numbers.
+The version is raised by changes that a reader of an older version would misread. A document without a version has
+version 1, since it was written before versions were introduced.
 """
 
 from __future__ import annotations
@@ -13,24 +13,25 @@ VERSION_KEY = "schema_version"
 
 
 def read_version(document: Mapping[str, Any], newest: int) -> int:
-    """Return a document's version.
+    """Return the format version of a document.
 
     Parameters
     ----------
     document : mapping
     newest : int
-        The newest version that is read here.
+        The newest version that the caller can read.
 
     Raises
     ------
     ValueError
-        If it is newer, or no version: what to do, in words that go on after the document's name and a colon.
+        If the version is newer, or not a version. The message says what to do and is meant to follow the document's
+        name and a colon.
     """
     version = document.get(VERSION_KEY, 1)
     if isinstance(version, bool) or not isinstance(version, int) or version < 1:
         raise ValueError(f"its {VERSION_KEY} is no whole number from 1 to {newest}")
     if version > newest:
-        # A number of thousands of digits cannot be written.
+        # Python refuses to convert an integer of thousands of digits to text.
         which = f"is {version}" if version < 10**6 else "is very large"
         raise ValueError(
             f"its {VERSION_KEY} {which}, and this velodrome reads up to {newest}: it was written by a newer one; "

@@ -1,4 +1,4 @@
-"""Trajectories as tables of Arrow and pandas, with the columns of the stored files."""
+"""Trajectories as pandas data frames, with the columns of the stored files."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 
 def import_pandas() -> Any:
-    """Return the module pandas, which the suite does not depend on.
+    """Return the module pandas, which is an optional dependency.
 
     Raises
     ------
     ImportError
-        If it is not installed: how to install it.
+        If pandas is not installed. The message says how to install it.
     """
     try:
         return import_module("pandas")

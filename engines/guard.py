@@ -1,4 +1,4 @@
-"""Calls into the code of an engine, which may come from anywhere: nothing that it raises ends the suite's process."""
+"""Calls of an engine's code that protect the suite's process from exits, prints and changes of the folder."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
-_LONGEST = 200  # letters of what an engine says as it exits
-# Packages that stand between a call and the engine's own code: none of their lines is where an engine is wrong.
+_LONGEST = 200  # characters that are quoted of an engine's exit message
+# Packages between a call and the engine's own code, whose lines are not reported as the place of an engine's error.
 _BETWEEN = (
     *("importlib", "importlib_metadata", "pydantic", "velodrome.scenarios", "velodrome.reports"),
     *("velodrome.engines.guard", "velodrome.engines.engine", "velodrome.engines.admission"),
@@ -28,29 +28,29 @@ _BETWEEN = (
 
 
 class EngineError(RuntimeError):
-    """An engine could not run a problem at all."""
+    """Raised if an engine cannot run a problem at all."""
 
 
 def call_engine(function: Callable[_P, _T], *arguments: _P.args, **keywords: _P.kwargs) -> _T:
-    """Call a function of an engine, or one that calls such.
+    """Call a function of an engine, or a function that calls one.
 
-    Python takes ``SystemExit``, ``KeyboardInterrupt``, ``GeneratorExit`` and whatever else is no `Exception` (a panic
-    of a Rust extension, for one) for a wish to end the process. An engine has no say in that: they are failures of
-    the engine. An interrupt from the user stays one, also where the engine swallows it or makes another error of it.
+    ``SystemExit``, ``KeyboardInterrupt``, ``GeneratorExit`` and other exceptions that are not an `Exception`, such as a
+    panic of a Rust extension, would end the process. If an engine raises them, they are treated as its failures. An
+    interrupt by the user is raised as such, even if the engine catches it or raises another exception instead.
 
-    What the function prints goes to stderr: stdout belongs to the command's own document. The current folder and the
-    standard streams are as before afterwards, whatever the function does to them.
+    Prints of the function go to stderr, since stdout is reserved for the command's document. The current folder and the
+    standard streams are restored afterwards.
 
     Raises
     ------
     EngineError
-        In place of what is no `Exception`: what the engine did, and where.
+        If the function raises something that is not an `Exception`. The message says what the engine did, and where.
     KeyboardInterrupt
-        If Ctrl-C was pressed meanwhile.
+        If Ctrl-C was pressed during the call.
     Exception
-        Whatever else the function raises.
+        Any other exception of the function.
     """
-    with _interrupts() as pressed, _surroundings_kept():
+    with _record_interrupts() as pressed, _protect_process():
         try:
             result = function(*arguments, **keywords)
         except BaseException as error:
@@ -59,19 +59,19 @@ def call_engine(function: Callable[_P, _T], *arguments: _P.args, **keywords: _P.
             if pressed or isinstance(error, Exception):
                 raise
             place = where_raised(error)
-            raise EngineError(_deed(error) + (f" ({place})" if place else "")) from error
+            raise EngineError(_describe_exit(error) + (f" ({place})" if place else "")) from error
         if pressed:
             raise KeyboardInterrupt
         return result
 
 
 @contextmanager
-def _surroundings_kept() -> Iterator[None]:
-    """Keep the current folder and the standard streams, and let prints go to stderr meanwhile."""
+def _protect_process() -> Iterator[None]:
+    """Redirect prints to stderr, and restore the current folder and the standard streams afterwards."""
     output, errors = sys.stdout, sys.stderr
     try:
         folder = os.getcwd()
-    except OSError:  # deleted meanwhile
+    except OSError:  # the folder was deleted
         folder = None
     try:
         with redirect_stdout(errors):
@@ -83,11 +83,11 @@ def _surroundings_kept() -> Iterator[None]:
 
 
 @contextmanager
-def _interrupts() -> Iterator[list[int]]:
-    """List the SIGINTs that raise KeyboardInterrupt meanwhile; they are handled as before."""
+def _record_interrupts() -> Iterator[list[int]]:
+    """Yield a list of the SIGINTs that raise KeyboardInterrupt in the body; the previous handler is still called."""
     pressed: list[int] = []
     previous = signal.getsignal(signal.SIGINT)
-    # Signals reach the main thread only. A handler that is not Python's, or none, raises nothing.
+    # Only the main thread handles signals. Without a Python handler, no KeyboardInterrupt is raised.
     if threading.current_thread() is not threading.main_thread() or not callable(previous):
         yield pressed
         return
@@ -106,8 +106,8 @@ def _interrupts() -> Iterator[list[int]]:
         signal.signal(signal.SIGINT, previous)
 
 
-def _deed(error: BaseException) -> str:
-    """Describe in a few words what an engine did that would have ended the process."""
+def _describe_exit(error: BaseException) -> str:
+    """Describe how an engine tried to end the process."""
     if isinstance(error, SystemExit):
         code = "" if error.code is None else repr(error.code)[:_LONGEST]
         return f"it called sys.exit({code})"
@@ -115,46 +115,46 @@ def _deed(error: BaseException) -> str:
 
 
 def where_raised(error: BaseException) -> str | None:
-    """Name file and line of the innermost frame in the engine's own code; None if no frame is the engine's.
+    """Return the file and line of the innermost frame in the engine's own code, or None if there is no such frame.
 
-    Libraries that the engine calls do not count, nor does the suite: the line named is the one to look at first.
+    Frames of libraries that the engine calls, and of the suite, are ignored.
     """
     found = [(frame, line) for frame, line in walk_tb(error.__traceback__)]
     last = max((i for i, (frame, _) in enumerate(found) if frame.f_code is call_engine.__code__), default=len(found))
-    # The suite's code that an engine calls back is not its own either.
+    # Code of the suite that the engine calls is ignored too.
     inside = [(frame, line) for frame, line in found[last + 1 :] if not _is_between(frame)]
     if not inside:
         return None
-    package = _package(inside[0][0])
-    frame, line = [one for one in inside if _package(one[0]) == package][-1]
+    package = _find_package(inside[0][0])
+    frame, line = [entry for entry in inside if _find_package(entry[0]) == package][-1]
     path = Path(frame.f_code.co_filename)
-    # As the package has it, wherever it is installed: rows of a sweep are the same on every machine.
-    parts = _module(frame).count(".") + 1 + (path.name == "__init__.py")
+    # The path is relative to the package, so that rows of a sweep are the same on every machine.
+    parts = _module_name(frame).count(".") + 1 + (path.name == "__init__.py")
     return f"{'/'.join(path.parts[-parts:])}:{line}"
 
 
-def _module(frame: FrameType) -> str:
+def _module_name(frame: FrameType) -> str:
     return str(frame.f_globals.get("__name__", ""))
 
 
-def _package(frame: FrameType) -> str:
-    """Return the package that a frame's code belongs to; a floor of the suite counts as one of its own."""
-    names = _module(frame).split(".")
+def _find_package(frame: FrameType) -> str:
+    """Return the package of a frame's code; each top-level subpackage of the suite counts as a package."""
+    names = _module_name(frame).split(".")
     return ".".join(names[: 2 if names[0] == "velodrome" else 1])
 
 
 def _is_between(frame: FrameType) -> bool:
-    name = _module(frame)
+    name = _module_name(frame)
     return any(name == package or name.startswith(f"{package}.") for package in _BETWEEN)
 
 
 def simulate_guarded(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
-    """Run a problem in an engine; what the ``progress`` callback raises is not the engine's failure.
+    """Run a problem in an engine; exceptions of the ``progress`` callback are not treated as failures of the engine.
 
     Raises
     ------
     BaseException
-        Whatever ``progress`` raises, also where the engine swallows it; else as `call_engine`.
+        Any exception that ``progress`` raises, even if the engine catches it; otherwise as `call_engine`.
     """
     raised: list[BaseException] = []
 
@@ -178,20 +178,20 @@ def simulate_guarded(engine: Engine, problem: Problem, settings: Any, progress: 
 
 
 def _copy_problem(problem: Problem) -> Problem:
-    """Copy a problem's arrays: an engine may write into its own, and all engines must start from the same state."""
+    """Copy a problem's arrays, since an engine may change them and all engines must start from the same state."""
     return replace(problem, q=problem.q.copy(), qd=problem.qd.copy(), times=problem.times.copy())
 
 
 @dataclass(frozen=True)
 class GuardedEngine:
-    """An engine whose code is called through `call_engine` only; see `velodrome.engines.engine.Engine`.
+    """An engine whose code is called only through `call_engine`; see `velodrome.engines.engine.Engine`.
 
-    What it says of itself is asked once, when it is loaded.
+    Its name, version, fields and settings are read once, when it is loaded.
 
     Attributes
     ----------
     inner : Engine
-        As its package announces it.
+        The engine that the package announces.
     name, version : str
     gives : tuple of str
     settings : type of Settings
@@ -208,7 +208,7 @@ class GuardedEngine:
         call_engine(self.inner.check, _copy_problem(problem), settings)
 
     def step_noise(self, settings: Any) -> float:
-        """Relative error that one step may add."""
+        """Return the relative error that one step may add."""
         return call_engine(self.inner.step_noise, settings)
 
     def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:

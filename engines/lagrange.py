@@ -1,4 +1,4 @@
-"""The reference as an engine: the paper's equations, integrated precisely or as the paper does."""
+"""The reference as an engine: the paper's equations, integrated to round-off or with the paper's own method."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..reference.kinematics import body_positions, body_quaternions
 from ..reference.simulate import simulate, simulate_modified_euler, steps_per_output
 from .engine import REFERENCE, EngineError, Problem, Progress, Settings, Trajectory, package_version
 
-ORDER = 8  # of dop853: a step's error goes with this power of it
+ORDER = 8  # order of dop853: the tolerance is scaled by this power of the factor on the step
 
 
 class LagrangeSettings(Settings):
@@ -34,7 +34,7 @@ class LagrangeSettings(Settings):
     )
 
     def refined(self, factor: float) -> Self:
-        """These settings with another step; for dop853 the tolerance that such steps would leave."""
+        """Return these settings with another step; for dop853 with the tolerance that corresponds to it."""
         if self.integrator == "modified-euler":
             return super().refined(factor)
         return self.model_validate(self.model_dump() | {"tolerance": self.tolerance * factor**ORDER})
@@ -54,19 +54,19 @@ class LagrangeEngine:
         return package_version("velodrome")
 
     def check(self, problem: Problem, settings: LagrangeSettings) -> None:
-        """Refuse output times that the fixed step does not meet; see `velodrome.engines.engine.Engine`."""
+        """Refuse output times that are not multiples of the fixed step; see `velodrome.engines.engine.Engine`."""
         if settings.integrator == "modified-euler":
             steps_per_output(problem.times, settings.step)
 
     def step_noise(self, settings: LagrangeSettings) -> float:
-        """Relative error that a step may add beyond its method: the tolerance itself, or round-off."""
+        """Return the relative error that a step may add beyond its method: the tolerance, or round-off."""
         return settings.tolerance if settings.integrator == "dop853" else 2.0**-52
 
     def simulate(self, problem: Problem, settings: LagrangeSettings, progress: Progress) -> Trajectory:
         """Run a problem; see `velodrome.engines.engine.Engine`."""
         where = (problem.bicycle, problem.surface)
         state = (problem.q, problem.qd, problem.times)
-        # Compile, or load what is compiled, before the clock starts.
+        # Compile the kernels, or load them from the cache, before the clock starts.
         simulate(*where, problem.q, problem.qd, problem.times[:1])
         begin = time.process_time()
         if settings.integrator == "dop853":
@@ -79,7 +79,7 @@ class LagrangeEngine:
         cpu_time = time.process_time() - begin
         if len(motion.time) == 0:
             raise EngineError(motion.ended)
-        seen = observe(*where, motion.q, motion.qd, motion.contact)
+        contact = observe(*where, motion.q, motion.qd, motion.contact)
         return Trajectory(
             engine=self.name,
             version=self.version,
@@ -89,16 +89,16 @@ class LagrangeEngine:
             qd=motion.qd,
             body_position=body_positions(problem.bicycle, motion.q),
             body_quaternion=body_quaternions(problem.bicycle, motion.q),
-            contact_point=seen.point,
+            contact_point=contact.point,
             contact_force=motion.force,
-            gap=seen.gap,
-            slip=seen.slip,
-            kinetic_energy=seen.kinetic_energy,
-            potential_energy=seen.potential_energy,
+            gap=contact.gap,
+            slip=contact.slip,
+            kinetic_energy=contact.kinetic_energy,
+            potential_energy=contact.potential_energy,
             steps=motion.steps,
             cpu_time=cpu_time,
             ended=motion.ended,
-            # A step that cannot be brought back to contact ends the ride.
+            # A step that cannot be projected back onto the contact constraints ends the ride.
             unconverged_steps=0,
         )
 

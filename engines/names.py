@@ -1,21 +1,21 @@
-"""What to say of a name that is none of those that there are."""
+"""Suggestions for unknown names."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-_LONGEST = 64  # letters; comparing longer texts takes long, and none of ours is longer
+_LONGEST = 64  # characters; longer texts are slow to compare, and no known name is longer
 
 
 def closest_name(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name that a misspelt one is most like, or None if it is like none.
+    """Return the known name that is most similar to a misspelt one, or None if none is similar.
 
     Parameters
     ----------
     name : str
     known : iterable of str
-        Upper and lower case are not told apart.
+        The known names; case is ignored.
     """
     if len(name) > _LONGEST:
         return None
@@ -25,7 +25,7 @@ def closest_name(name: str, known: Iterable[str]) -> str | None:
 
 
 def suggest_name(name: str, known: Iterable[str]) -> str:
-    """Say which known name may be meant, or which there are if none is like it.
+    """Return a hint at the most similar known name, or a list of the known names if none is similar.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""Rolling on any ground: the contact of a knife-edge wheel, from its pose and twist.
+"""The contact of a knife-edge wheel that rolls on any ground, computed from its pose and twist.
 
-`observe_wheel` measures one wheel or arrays of them. What it computes with is compiled and may be called from compiled
-code as well, such as a constraint or a callback of an engine: `contact_state` for all of it, `contact_frame` for the
-gap and the axes alone. A ground goes into compiled code as three arguments, the second and the third from the surface::
+`observe_wheel` computes the contacts of one wheel or of arrays of wheels. The compiled functions that it uses may also
+be called from compiled code, such as a constraint or a callback of an engine: `contact_state` computes everything,
+`contact_frame` the gap and the axes alone. A ground is passed to compiled code as three arguments::
 
     ground = rim_search(surface, [radius])
     function, parameters = surface.function.real, surface.parameters
@@ -13,7 +13,7 @@ gap and the axes alone. A ground goes into compiled code as three arguments, the
         here = contact_state(centre, x, axle, z, radius, velocity, spin, ground, function, parameters)
         return dot(here.normal, here.acceleration)
 
-Vectors are tuples of three numbers there. The surface must live as long as the compiled code uses its function.
+There, vectors are tuples of three numbers. The surface must exist as long as the compiled code uses its function.
 
 With d the vector from the wheel's centre c to its contact and w its angular velocity, the material point of the rim
 at the contact has the velocity v = c' + w x d. Rolling without slip is v = 0, whose derivative
@@ -64,7 +64,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class WheelContact:
-    """Contacts of wheels with the ground, of any common shape (...); nan where there is none.
+    """Contacts of wheels with the ground, in arrays of any common shape (...); nan for wheels without contact.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class WheelContact:
     gap_rate : ndarray, shape (...)
         Its derivative [m/s].
     velocity : ndarray, shape (..., 3)
-        Of the wheel's material point at the contact [m/s].
+        Velocity of the wheel's material point at the contact [m/s].
     slip : ndarray, shape (..., 2)
         Its lateral and forward components [m/s].
     point_velocity : ndarray, shape (..., 3)
@@ -113,24 +113,25 @@ def observe_wheel(
     velocity: ArrayLike | None = None,
     spin: ArrayLike | None = None,
 ) -> WheelContact:
-    """Measure where knife-edge wheels touch a surface and how they move there.
+    """Compute where knife-edge wheels touch a surface and how they move there.
 
     All arguments broadcast: one wheel, one wheel at many times, or both wheels of a ride as (n, 2, 3) with two radii.
 
     Parameters
     ----------
     surface : Surface
-        Any ground of `velodrome.reference.surface` and its neighbours, or one's own.
+        Any surface of the suite, or one that the user has written.
     radius : array_like, shape (...)
-        Of the wheels' edges [m].
+        Radii of the wheels' edges [m].
     centre : array_like, shape (..., 3)
-        Of the wheels [m].
+        Centres of the wheels [m].
     axle : array_like, shape (..., 3)
-        Direction of their axles, of any length; to the left of a wheel that rolls forward.
+        Directions of the axles, of any length; they point to the left of a wheel that rolls forward.
     velocity : array_like, shape (..., 3), optional
-        Of the centres [m/s]; at rest if not given.
+        Velocities of the centres [m/s]; zero if not given.
     spin : array_like, shape (..., 3), optional
-        Angular velocities of the wheels in inertial axes, their turning about the axles included [rad/s].
+        Angular velocities of the wheels in inertial axes, including the rotation about the axles [rad/s]; zero if not
+        given.
 
     Returns
     -------
@@ -159,7 +160,7 @@ def observe_wheel(
     if not (np.all(size > 0) and np.all(np.isfinite(size))):
         raise ValueError("an axle is a vector of three finite numbers, not all zero")
     n = len(middle)
-    rotation = _triads(along / size)
+    rotation = _make_triads(along / size)
     point, frames, gap, slip = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty(n), np.empty((n, 2))
     material, run, own = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3))
     observe_wheels(
@@ -200,8 +201,8 @@ def observe_wheel(
     )
 
 
-def _triads(axle: np.ndarray) -> np.ndarray:
-    """Rotation matrices (n, 3, 3) with unit axles (n, 3) as their middle columns."""
+def _make_triads(axle: np.ndarray) -> np.ndarray:
+    """Return rotation matrices (n, 3, 3) whose middle columns are the unit axles (n, 3)."""
     found = np.empty((len(axle), 3, 3))
     for row, direction in zip(found, axle, strict=True):
         x, z = wheel_axes((direction[0], direction[1], direction[2]))

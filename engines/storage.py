@@ -1,7 +1,7 @@
-"""Trajectories as Parquet files: one column a quantity, units with the columns, the rest in the schema.
+"""Trajectories as Parquet files: one column per quantity, units in the columns' metadata, the rest in the schema's.
 
-A file carries a digest of everything in it. Parquet has checksums of its own, but of the data pages only: a bit
-that turns over in a column's name or in the metadata would pass them.
+A file contains a digest of everything in it. Parquet's own checksums cover the data pages only and do not detect a
+changed bit in a column's name or in the metadata.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from .files import write_whole
 from .format_version import VERSION_KEY, read_version
 
 METADATA_KEY, DIGEST_KEY = b"velodrome", b"velodrome-sha256"
-PARQUET_VERSION = 1  # of the metadata and the columns that they tell of
+PARQUET_VERSION = 1  # format version of the metadata and the columns
 
 
 class _Facts(BaseModel):
-    """What the schema says of a trajectory beside its columns."""
+    """Facts about a trajectory in the schema's metadata."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
@@ -39,7 +39,7 @@ class _Facts(BaseModel):
     cpu_time: Annotated[float, Field(ge=0)]
     ended: str | None
     friction: Annotated[float, Field(ge=0)] | None
-    # Files of earlier versions do not have them.
+    # Files of earlier versions do not have these fields.
     unconverged_steps: Annotated[int, Field(ge=0)] | None = None
     largest_residual: Annotated[float, Field(ge=0)] | None = None
 
@@ -54,7 +54,7 @@ def _coordinate_columns() -> tuple[list[tuple[str, str]], list[tuple[str, str]]]
 
 
 def trajectory_columns() -> Iterator[tuple[str, list[tuple[str, str]]]]:
-    """Fields of a trajectory with their columns: (field, [(column, unit), ...]), flattened in C order."""
+    """Yield the fields of a trajectory with their columns: (field, [(column, unit), ...]), flattened in C order."""
     positions, rates = _coordinate_columns()
     yield "time", [("time", "s")]
     yield "q", positions
@@ -69,7 +69,7 @@ def trajectory_columns() -> Iterator[tuple[str, list[tuple[str, str]]]]:
     yield "body_quaternion", [(f"{b}_q{a}", "1") for b in BODIES for a in "wxyz"]
 
 
-_LONGEST_REASON = 300  # letters of what a reader of damaged files says
+_LONGEST_REASON = 300  # characters that are quoted of a reader's error message
 
 
 def write_trajectory(trajectory: Trajectory, path: Path) -> None:
@@ -78,7 +78,7 @@ def write_trajectory(trajectory: Trajectory, path: Path) -> None:
 
 
 def trajectory_table(trajectory: Trajectory) -> pa.Table:
-    """Return a trajectory as a table: its columns with their units, the rest in the schema's metadata."""
+    """Return a trajectory as a table with units; everything that is not sampled is in the schema's metadata."""
     found = []
     for name, names in trajectory_columns():
         value = getattr(trajectory, name)
@@ -100,9 +100,9 @@ def write_columns(
         Name, values of shape (n,), unit.
     path : Path
     facts : mapping
-        JSON values for the schema's metadata, which get the format's version besides.
+        JSON values for the schema's metadata, to which the format version is added.
     **options
-        Of `pyarrow.parquet.write_table`.
+        Options of `pyarrow.parquet.write_table`.
     """
     _write_table(_make_table(columns, facts), path, **options)
 
@@ -123,16 +123,19 @@ def _write_table(table: pa.Table, path: Path, **options: Any) -> None:
 
 
 def versioned_metadata(facts: Mapping[str, Any]) -> dict[bytes, bytes]:
-    """Metadata of a Parquet schema: facts with the format's version."""
+    """Return the metadata of a Parquet schema: facts with the format version."""
     return {METADATA_KEY: json.dumps({VERSION_KEY: PARQUET_VERSION, **facts}).encode()}
 
 
 def digest(table: pa.Table) -> bytes:
-    """SHA-256 of a table of numbers without nulls, in hexadecimal digits: names, types, units, values and facts."""
+    """Return the SHA-256 of a table of numbers without nulls, in hexadecimal digits.
+
+    The digest covers names, types, units, values and facts.
+    """
     found = hashlib.sha256((table.schema.metadata or {}).get(METADATA_KEY, b""))
     for field, column in zip(table.schema, table.columns, strict=True):
         unit = (field.metadata or {}).get(b"unit", b"")
-        # Lengths first, so that nothing can move from one part into the next.
+        # Lengths come first, so that different divisions of the same bytes give different digests.
         heading = [field.name.encode(), str(field.type).encode(), unit]
         found.update(repr([len(table), *(len(part) for part in heading)]).encode() + b"".join(heading))
         for chunk in column.chunks:
@@ -141,17 +144,17 @@ def digest(table: pa.Table) -> bytes:
 
 
 def read_trajectory(path: Path) -> Trajectory:
-    """Read a trajectory back.
+    """Read a trajectory from a Parquet file.
 
     Raises
     ------
     ValueError
-        If the file is not a trajectory, not a whole one, of a newer format, or was altered since it was written. Only
-        files of earlier versions carry no digest.
+        If the file is not a trajectory, is incomplete, has a newer format, or was altered since it was written. Files
+        of earlier versions have no digest and are read without this check.
     """
-    table = _table(path)
-    facts = _facts(table, path)
-    values: dict[str, Any] = {name: _field(table, name, names, path) for name, names in trajectory_columns()}
+    table = _read_table(path)
+    facts = _read_facts(table, path)
+    values: dict[str, Any] = {name: _read_field(table, name, names, path) for name, names in trajectory_columns()}
     time = table.column("time").to_numpy()
     if not (len(time) and np.all(np.isfinite(time)) and np.all(np.diff(time) > 0)):
         raise ValueError(f"{path} is not a trajectory: its times must be finite and rising, one or more")
@@ -161,8 +164,8 @@ def read_trajectory(path: Path) -> Trajectory:
     return Trajectory(**facts.model_dump(), **values)
 
 
-def _table(path: Path) -> pa.Table:
-    """A Parquet file's table; of one file, whatever its folder is called."""
+def _read_table(path: Path) -> pa.Table:
+    """Read the table of one Parquet file, without taking names of folders for partitions."""
     try:
         with path.open("rb") as file:
             return pq.ParquetFile(file).read()
@@ -174,7 +177,7 @@ def _table(path: Path) -> pa.Table:
     raise ValueError(f"{path} cannot be read as a trajectory: {line[:_LONGEST_REASON]}")
 
 
-def _facts(table: pa.Table, path: Path) -> _Facts:
+def _read_facts(table: pa.Table, path: Path) -> _Facts:
     try:
         found = json.loads((table.schema.metadata or {})[METADATA_KEY])
         if isinstance(found, dict):
@@ -191,7 +194,7 @@ def _facts(table: pa.Table, path: Path) -> _Facts:
 
 
 class _NewerFormat(ValueError):
-    """A file of a format that this version does not know."""
+    """Raised for a file whose format is newer than this version can read."""
 
 
 def _refuse_newer(facts: Mapping[str, Any], path: Path) -> None:
@@ -201,8 +204,8 @@ def _refuse_newer(facts: Mapping[str, Any], path: Path) -> None:
         raise _NewerFormat(f"{path} cannot be read as a trajectory: {error}") from error
 
 
-def _field(table: pa.Table, name: str, names: list[tuple[str, str]], path: Path) -> np.ndarray | None:
-    """A field's array from its columns; None where all of them are absent and may be."""
+def _read_field(table: pa.Table, name: str, names: list[tuple[str, str]], path: Path) -> np.ndarray | None:
+    """Return a field's array from its columns, or None if the field is optional and all its columns are absent."""
     counts = [table.column_names.count(column) for column, _ in names]
     if not any(counts) and name not in REQUIRED:
         return None

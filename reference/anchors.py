@@ -56,6 +56,7 @@ from .circular import (
 )
 from .continuation import LARGEST_LEAN, crossings, follow_curve, tangent
 from .kernels import dynamics as kernel
+from .kernels.curve import CHOSEN
 from .kernels.steady import STANDING, UNKNOWNS
 from .kinematics import body_positions, constants
 from .surface import Plane, SurfaceOfRevolution, evaluate, is_level
@@ -70,6 +71,7 @@ _TOWARDS_C = 6.0
 # Guesses of static equilibria: as a bowl deepens, their pitch falls to -0.8.
 _STEERS, _PITCHES = np.pi * (np.arange(8) + 0.5) / 8, (0.0, -0.3, -0.6)
 _SMALLEST_CIRCLE = 1e-100  # [m]: the squares of smaller ones underflow
+_SHORTEST_STEP = 1e-6  # of carrying an anchor
 _LARGEST_MOVE = 0.05  # largest change of an unknown of order one in one step of carrying an anchor
 # Two solutions of one condition are the same below this. Round-off, 1e-14, splits a double root by its square root.
 _SAME = 1e-6
@@ -81,7 +83,8 @@ class Anchor:
 
     Attributes
     ----------
-    family : int
+    family : int or None
+        None for a solution that is not on the curve of a family.
     equations : Steady
     unknowns : ndarray, shape (22,)
     directions : tuple of ndarray, shape (22,)
@@ -91,7 +94,7 @@ class Anchor:
         `velodrome.reference.circular.Condition`.
     """
 
-    family: int
+    family: int | None
     equations: Steady
     unknowns: np.ndarray
     directions: tuple[np.ndarray, ...]
@@ -147,28 +150,44 @@ def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
 
 
 def _carry(
-    path: Callable[[float], Steady], u: np.ndarray, condition: Callable, what: str, step: float = 0.02
+    path: Callable[[float], Steady],
+    u: np.ndarray,
+    condition: Callable,
+    describe_place: Callable[[float], str],
+    step: float = 0.02,
 ) -> np.ndarray:
     """Carry a solution along a path of equations, from 0 to 1, at a fixed condition.
 
     Newton's method may well converge to another branch. A step that moves an angle or a speed too far is therefore
-    repeated with half its length; the step grows again while Newton's method converges fast.
+    repeated with half its length; the step grows again while Newton's method converges fast. ``describe_place`` names
+    the goal, and where on the way a fraction of it is, for the message of an error.
     """
     reached = 0.0
     u = as_solved(u)
+    regular = _least_singular_value(path(0.0), u, condition)
     while reached < 1:
         wanted = min(1.0, reached + step)
         carried = _take_step(path(wanted), u, condition)
         if carried is None:
             step /= 2
-            if step < 1e-6:
-                raise ValueError(f"its anchor is lost {100 * reached:.4g} % of the way to {what}")
+            if step < _SHORTEST_STEP:
+                # At a distance d before a fold the smallest singular value has fallen by the root of d.
+                fold = _least_singular_value(path(reached), u, condition) < 0.05 * regular
+                how = "ends in a fold" if fold else "is lost"
+                raise ValueError(f"its anchor {how} {100 * reached:.4g} % of the way to {describe_place(reached)}")
             continue
         (u, iterations), reached = carried, wanted
         step *= 1.5 if iterations <= 5 else 1.0
     if u[SIGMA] < 0:
-        raise ValueError(f"its anchor is no motion at {what}: the squared speed would be negative")
+        raise ValueError(f"its anchor is no motion at {describe_place(1.0)}: the squared speed would be negative")
     return u
+
+
+def _least_singular_value(equations: Steady, u: np.ndarray, condition: Callable[[np.ndarray], Condition]) -> float:
+    """Return the smallest singular value of the equations with a condition at a solution (22,)."""
+    here = equations.expand(u[CHOSEN])
+    matrix = np.vstack([here.jacobian, condition(here.full).gradient @ here.basis])
+    return float(np.linalg.svd(matrix, compute_uv=False)[-1])
 
 
 def _take_step(equations: Steady, u: np.ndarray, condition: Callable) -> tuple[np.ndarray, int] | None:
@@ -288,7 +307,7 @@ def next_anchor(path: Callable[[float], Steady], family: int, rear_rate: float |
         If the anchor is lost on the way.
     """
     there, condition = path(1.0), _anchor_condition(rear_rate)
-    u = _carry(path, unknowns, condition, str(there.surface), step=1.0)
+    u = _carry(path, unknowns, condition, lambda _: str(there.surface), step=1.0)
     return _anchor_at(family, there, u, _directions(family, rear_rate), condition)
 
 
@@ -375,7 +394,15 @@ def _to_bicycle(bicycle: Bicycle, u: np.ndarray, condition: Callable[[np.ndarray
     """Carry the benchmark's solution on the plane to a bicycle."""
     if bicycle == Bicycle():
         return u
-    return _carry(lambda s: Steady(_interpolate_bicycle(bicycle, s), Plane()), u, condition, "this bicycle")
+    benchmark, wanted = asdict(Bicycle()), asdict(bicycle)
+    changed = [name for name in wanted if wanted[name] != benchmark[name]]
+
+    def describe_place(reached: float) -> str:
+        between = asdict(_interpolate_bicycle(bicycle, reached))
+        values = ", ".join(f"{name} = {between[name]:.6g}" for name in changed[:3])
+        return f"this bicycle, at {values}{', ...' if len(changed) > 3 else ''}"
+
+    return _carry(lambda s: Steady(_interpolate_bicycle(bicycle, s), Plane()), u, condition, describe_place)
 
 
 def _to_surface(
@@ -384,7 +411,7 @@ def _to_surface(
     """Carry a bicycle's solution on the plane to a surface."""
     if is_level(surface):
         return u
-    return _carry(lambda s: Steady(bicycle, surface.flattened(s)), u, condition, str(surface))
+    return _carry(lambda s: Steady(bicycle, surface.flattened(s)), u, condition, lambda _: str(surface))
 
 
 def _to_surface_or_middle(

@@ -8,13 +8,13 @@ family that it was a part of.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import islice
 
 import numpy as np
 
-from .anchors import ANCHORS, Anchor, anchor, further_anchors
+from .anchors import ANCHORS, Anchor, above_ground, anchor, further_anchors
 from .bicycle import Bicycle
 from .circular import (
     FRONT_SPEED,
@@ -24,6 +24,9 @@ from .circular import (
     YAW_SPEED,
     CircularMotion,
     Steady,
+    as_solved,
+    newton,
+    plane_condition,
     rear_rate_condition,
     reverse_speeds,
 )
@@ -36,14 +39,18 @@ from .continuation import (
     at_edge,
     crossings,
     follow_curve,
+    metric,
     roots_along,
 )
+from .curve import sample_curve
 from .kernels.steady import STANDING, direction
-from .standing import require_standing
+from .search import Start, describe_search, guesses_at, is_on_curve, search_starts
+from .standing import require_standing, stands
 from .surface import SurfaceOfRevolution, has_tip
 
 FAMILIES = (1, 2, 3, 4)
 
+_MEANT = 1e-3  # rad: so near to what was asked for, no other motion is searched for
 _NEAR_ENOUGH = 0.2  # rad: a motion further from the requested angles is another one
 
 
@@ -68,16 +75,25 @@ class Family:
 
     Attributes
     ----------
-    number : int
+    number : int or None
+        1 to 4; None for a curve that does not hang together with one of the benchmark's families on the plane.
     equations : Steady
     points : list of Point
         In order along the curve; all tangents point in that direction. At a pivoting end the speeds have the sign
         with which the motion turns as its neighbours on the curve do.
+    joined : tuple of int
+        Numbers of further families that have joined this curve.
     """
 
-    number: int
+    number: int | None
     equations: Steady
     points: list[Point]
+    joined: tuple[int, ...] = ()
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Numbers of all families on the curve; empty if there is none."""
+        return () if self.number is None else (self.number, *self.joined)
 
     @property
     def ends(self) -> tuple[str, str]:
@@ -151,7 +167,7 @@ def trace_from(start: Anchor, longest: float = LONGEST_STEP) -> Family:
 def trace_all(
     bicycle: Bicycle, surface: SurfaceOfRevolution, longest: float = LONGEST_STEP
 ) -> tuple[list[Family], dict[int, str]]:
-    """Follow every curve that holds a part of a family.
+    """Follow every curve of circular motions that is found: those of the families, and those without a number.
 
     Parameters
     ----------
@@ -163,35 +179,65 @@ def trace_all(
     Returns
     -------
     curves : list of Family
-        First the curve of each family's last anchor, by number; families that have joined have the same curve.
-        Then further curves, each once, under the number of the family that it was a part of.
+        Each once: first the curves of the families' last anchors, by their smallest number, then curves of further
+        anchors, under the number of the family that each was a part of, then curves without a number on which
+        both wheels are pushed somewhere, see `velodrome.reference.search`.
     absent : dict
         Reasons why families have no curve, by the family's number.
     """
-    own, absent = [], {}
+    curves: list[Family] = []
+    absent = {}
     for number in FAMILIES:
         try:
-            own.append(trace(bicycle, surface, number, longest))
+            start = anchor(bicycle, surface, number, ANCHORS[number][-1])
         except ValueError as error:
             absent[number] = str(error)
-    curves = [*own, *_follow_further(bicycle, surface, own, longest)]
-    return curves, {number: why for number, why in absent.items() if all(number != curve.number for curve in curves)}
-
-
-def _follow_further(
-    bicycle: Bicycle, surface: SurfaceOfRevolution, followed: Sequence[Family], longest: float = LONGEST_STEP
-) -> list[Family]:
-    """Follow the curves of those further anchors that no curve passes through yet."""
-    found: list[Family] = []
+            continue
+        same = next((k for k, curve in enumerate(curves) if _passes_through(curve, start)), None)
+        if same is None:
+            curves.append(trace_from(start, longest))
+        else:
+            curves[same] = replace(curves[same], joined=(*curves[same].joined, number))
     for start in further_anchors(bicycle, surface):
-        if not any(_passes_through(curve, start) for curve in (*followed, *found)):
-            found.append(trace_from(start, longest))
-    return found
+        if not any(_passes_through(curve, start) for curve in curves):
+            curves.append(trace_from(start, longest))
+    for found in search_starts(bicycle, surface):
+        if not any(is_on_curve(curve.equations, curve.points, found) for curve in curves):
+            curve = trace_from(_searched_anchor(Steady(bicycle, surface), found), longest)
+            if _is_ridden_somewhere(curve):
+                curves.append(curve)
+    numbers = {number for curve in curves for number in curve.numbers}
+    return curves, {number: why for number, why in absent.items() if number not in numbers}
+
+
+def _searched_anchor(equations: Steady, found: Start) -> Anchor:
+    """Make an anchor, without a family, of a motion that the search has found."""
+    covector = metric(found.unknowns) * found.along
+    condition = plane_condition(found.unknowns, covector, 0.0)
+    return Anchor(None, equations, found.unknowns, (found.along, -found.along), condition)
+
+
+def _is_ridden_somewhere(curve: Family) -> bool:
+    """Return whether the ground pushes both wheels, and nothing else of their rims touches it, somewhere on a curve."""
+    seen = sample_curve(curve.equations, np.array([point.unknowns for point in curve.points]))
+    pushed = np.flatnonzero(np.all(seen.normal_force > 0, axis=1))
+    return any(stands(curve.equations, curve.points[k].unknowns) for k in pushed)
 
 
 def _passes_through(curve: Family, start: Anchor) -> bool:
-    """Return whether a followed curve passes through an anchor, as one of its solutions of the anchor's condition."""
-    return any(start.is_same_as(u) for u in crossings(curve.equations, curve.points, start.condition))
+    """Return whether a followed curve passes through an anchor, as one of its solutions of the anchor's condition.
+
+    Two curves may end in the same pivoting motion. A curve with a single direction from its anchor must leave it in
+    that direction.
+    """
+    if not any(start.is_same_as(u) for u in crossings(curve.equations, curve.points, start.condition)):
+        return False
+    direction, *others = start.directions
+    if others:
+        return True
+    ends = [(curve.points[k].unknowns, curve.points[n].unknowns) for k, n in ((0, 1), (-1, -2))]
+    inward = [as_solved(neighbour) - as_solved(end) for end, neighbour in ends if start.is_same_as(end)]
+    return any(float(change @ direction) > 0 for change in inward)
 
 
 def _is_zero(unknowns: np.ndarray, unknown: int) -> bool:
@@ -281,7 +327,7 @@ def _yield_motions(
             points = _up_to_end(follow_curve(start.equations, start.unknowns, towards))
             yield from _append_new_motions(found, start.equations, points, rear_rate)
     every = _follow_all_curves(bicycle, surface)  # type: ignore[arg-type]
-    others = [c for c in every if c.number == family and not any(_passes_through(c, start) for start in anchors)]
+    others = [c for c in every if family in c.numbers and not any(_passes_through(c, start) for start in anchors)]
     for curve in others:
         yield from _append_new_motions(found, curve.equations, curve.points, rear_rate)
     if not anchors and not others:
@@ -294,7 +340,7 @@ def _append_new_motions(
     """Yield motions of a rear rate along a curve that are not in ``found``, and append them to it."""
     for u in crossings(equations, points, rear_rate_condition(rear_rate)):
         motion = equations.motion(u)
-        if not any(np.hypot(motion.lean - m.lean, motion.steer - m.steer) < 1e-7 for m in found):
+        if not any(_same_angles(motion, other) for other in found):
             found.append(motion)
             yield motion
 
@@ -305,7 +351,7 @@ def find_motion(
     rear_rate: float,
     family: int | None = None,
     near: tuple[float, float] | None = None,
-) -> tuple[int, CircularMotion]:
+) -> tuple[int | None, CircularMotion]:
     """Find one circular motion by its family, by angles near to it, or by both.
 
     Parameters
@@ -317,11 +363,13 @@ def find_motion(
     family : int, optional
         1 to 4. Without ``near``, the solution nearest to the family's anchor along the curve is returned.
     near : tuple of float, optional
-        Lean and steer [rad]. The nearest of all solutions (of the family, if given) is returned.
+        Lean and steer [rad]. The nearest of all solutions (of the family, if given) is returned. Without ``family``
+        it may be on a curve that has no number.
 
     Returns
     -------
-    family : int
+    family : int or None
+        None on a curve without a number.
     motion : CircularMotion
 
     Raises
@@ -337,7 +385,8 @@ def find_motion(
         raise ValueError(f"family is {family!r}; it must be 1, 2, 3 or 4")
     if near is not None and not np.all(np.isfinite(near)):
         raise ValueError(f"near is {near!r}; it must be two finite angles, lean and steer in rad")
-    found, failures = [], []
+    found: list[tuple[int | None, CircularMotion]] = []
+    failures = []
     for number in FAMILIES if family is None else (family,):
         try:
             met = _yield_motions(bicycle, surface, number, rear_rate)
@@ -345,22 +394,63 @@ def find_motion(
         except ValueError as error:
             failures.append(f"family {number}: {error}")
     wanted = f"rear rate {rear_rate!r} rad/s on {surface}"
-    if not found:
-        reason = "; ".join(failures) or "their curves, as followed from their anchors, do not reach it"
-        where = f"family {family}" if family is not None else "any family"
-        raise ValueError(f"no circular motion found with {wanted} in {where}: {reason}")
     if near is None:
+        if not found:
+            reason = "; ".join(failures) or "its curves, as followed from their anchors, do not reach it"
+            raise ValueError(f"no circular motion found with {wanted} in family {family}: {reason}")
         require_standing(bicycle, surface, found[0][1])
         return found[0]
 
-    def distance(item: tuple[int, CircularMotion]) -> float:
+    def distance(item: tuple[int | None, CircularMotion]) -> float:
         return float(np.hypot(item[1].lean - near[0], item[1].steer - near[1]))
 
-    nearest = min(found, key=distance)
-    if distance(nearest) > _NEAR_ENOUGH:
-        place = f"{nearest[1].lean:.6g}, {nearest[1].steer:.6g}"
+    if family is None:
+        found += _motions_from(bicycle, surface, rear_rate, near, [motion for _, motion in found])
+        if all(distance(item) > _MEANT for item in found):
+            found += _motions_without_number(bicycle, surface, rear_rate)
+    nearest = min(found, key=distance, default=None)
+    if nearest is None or distance(nearest) > _NEAR_ENOUGH:
+        searched = "Newton's method from there, the curves of the families, and " + describe_search()
+        if family is not None:
+            searched = f"the curves of family {family}"
+        place = "" if nearest is None else f"; the nearest is at {nearest[1].lean:.6g}, {nearest[1].steer:.6g}"
+        lost = "".join(f"; {failure}" for failure in failures)
         raise ValueError(
-            f"no circular motion found with {wanted} within {_NEAR_ENOUGH} rad of near; the nearest is at {place}"
+            f"no circular motion found with {wanted} within {_NEAR_ENOUGH} rad of near = {near[0]:g}, {near[1]:g}"
+            f"{place}; searched were {searched}{lost}"
         )
     require_standing(bicycle, surface, nearest[1])
     return nearest
+
+
+def _motions_from(
+    bicycle: Bicycle,
+    surface: SurfaceOfRevolution,
+    rear_rate: float,
+    near: tuple[float, float],
+    known: Sequence[CircularMotion],
+) -> Iterator[tuple[None, CircularMotion]]:
+    """Yield motions of a rear rate that Newton's method finds from two angles, other than the known ones."""
+    equations, condition = Steady(bicycle, surface), rear_rate_condition(rear_rate)
+    for guess in guesses_at(bicycle, surface, *near):
+        try:
+            unknowns, _ = newton(equations, guess, condition, most=25)
+            motion = equations.motion(unknowns)
+        except ValueError:
+            continue
+        if above_ground(equations, unknowns) and not any(_same_angles(motion, other) for other in known):
+            yield None, motion
+
+
+def _motions_without_number(
+    bicycle: Bicycle, surface: SurfaceOfRevolution, rear_rate: float
+) -> Iterator[tuple[None, CircularMotion]]:
+    """Yield motions of a rear rate on the curves without a number."""
+    for curve in _follow_all_curves(bicycle, surface):  # type: ignore[arg-type]
+        if curve.number is None:
+            for motion in _append_new_motions([], curve.equations, curve.points, rear_rate):
+                yield None, motion
+
+
+def _same_angles(one: CircularMotion, other: CircularMotion) -> bool:
+    return bool(np.hypot(one.lean - other.lean, one.steer - other.steer) < 1e-7)

@@ -55,6 +55,8 @@ def follow_modes(family: Family) -> np.ndarray:
 
 def _identify_at_anchor(family: Family) -> tuple[int, np.ndarray] | None:
     """Return the index of the family's anchor among its points and the eigenvalues there by mode; None without one."""
+    if family.number is None:
+        return None
     equations, rate = family.equations, ANCHORS[family.number][0]
     bicycle, surface = equations.bicycle, equations.surface
     try:

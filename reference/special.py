@@ -129,7 +129,8 @@ def _name_points(family: Family, points: list[tuple[str, CircularMotion]]) -> It
     D is then the cusp with the smallest front rate of family 2, and I the cusp with the largest one of family 4, whose
     end is the wheel that runs backward.
     """
-    letters = {"static": "A", "pivot": "H" if family.number == 4 else "G"}
+    pivot = "H" if family.numbers == (4,) else "G (H)" if 4 in family.numbers else "G"
+    letters = {"static": "A", "pivot": pivot}
     cusps = [motion for kind, motion in points if kind == "cusp" and abs(motion.lean) > SMALL_LEAN]
     special, ends = None, family.ends
     if family.number == 2 and cusps and ("large circle" in ends or "edge" in ends):

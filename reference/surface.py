@@ -149,6 +149,55 @@ class Plane:
         return self
 
 
+@surface_function
+def _inclined_plane(x, y, parameters):
+    zero = 0 * x
+    fx, fy = parameters[0] + zero, parameters[1] + zero
+    return parameters[0] * x + parameters[1] * y, fx, fy, zero, zero, zero
+
+
+@dataclass(frozen=True)
+class InclinedPlane:
+    """A plane through the origin that rises in one direction.
+
+    Parameters
+    ----------
+    slope : float
+        Rise over run, not negative [-].
+    direction : float
+        Direction in which it rises, from the x axis towards y [rad].
+
+    Raises
+    ------
+    ValueError
+        If the slope is negative or a value is not finite.
+    """
+
+    slope: float
+    direction: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (is_number(self.slope) and self.slope >= 0):
+            raise ValueError(f"slope is {self.slope!r}; it must be a finite number >= 0")
+        if not is_number(self.direction):
+            raise ValueError(f"direction is {self.direction!r}; it must be a finite number of rad")
+
+    @property
+    def function(self) -> SurfaceFunction:
+        """The compiled height function."""
+        return _inclined_plane
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Gradient of the height, shape (2,)."""
+        return self.slope * np.array([math.cos(self.direction), math.sin(self.direction)])
+
+    @property
+    def bend(self) -> float:
+        """Largest eigenvalue of the Hessian, 0 [1/m]."""
+        return 0.0
+
+
 @dataclass(frozen=True)
 class Paraboloid:
     """The bowl z = alpha (x^2 + y^2) of Xiong et al. (2020), section 3.1.

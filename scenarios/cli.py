@@ -1,7 +1,6 @@
 """The command `velodrome`.
 
-Compiled kernels, engines and plots take seconds to import: each command imports what it needs, and none
-of them waits for the others'.
+Compiled kernels, engines and plots take seconds to import. Each command therefore imports its libraries when it runs.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ from .commands import (
 )
 from .error import ScenarioError
 
-# Set by the shell when it asks for completions.
+# Environment variable that the shell sets when it asks for completions.
 _COMPLETING = "_VELODROME_COMPLETE"
 app = typer.Typer(
     name="velodrome",
@@ -84,7 +83,7 @@ for _command, _short_help in {
 
 
 def supervised_main() -> NoReturn:
-    """Run the command as the console does: a process that ends before the command has is no success."""
+    """Run the command under supervision: if its process ends before the command has finished, the status is not 0."""
     run_supervised(main)
 
 
@@ -100,26 +99,26 @@ def main() -> NoReturn:
     except KeyboardInterrupt:
         sys.exit(130)
     except BrokenPipeError:
-        # The reader has gone before there was a result: nobody is there to be told.
+        # The reader has closed the pipe before there was a result.
         sys.stderr.close()
         sys.exit(1)
     except SystemExit as error:
         if _is_completion(sys.argv[1:]):
-            raise  # typer ends so, and no engine has been near
-        # The commands end with typer.Exit: this is somebody else's.
+            raise  # typer ends completion in this way, and no engine has run
+        # The commands end with typer.Exit, so that this exit comes from other code.
         _complain(f"something called sys.exit({error.code!r}) before the command was done", status=1)
-    except (OSError, UnicodeEncodeError) as error:  # the latter of a path that is no text
+    except (OSError, UnicodeEncodeError) as error:  # the latter for a path that is not valid text
         _complain(f"cannot write: {error}")
     sys.exit(status or 0)
 
 
 def _is_completion(arguments: list[str]) -> bool:
-    """Whether the shell asks for completions, or the user for the shell's script; neither runs a command."""
+    """Return whether the shell asks for completions or the user for the shell's script; neither runs a command."""
     return _COMPLETING in os.environ or arguments[:1] in (["--install-completion"], ["--show-completion"])
 
 
 def _complain(message: str, status: int = 2) -> NoReturn:
-    # What was typed may be repeated, but must not move the cursor.
+    # The message may quote what was typed, so control characters are escaped.
     line = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in " ".join(message.split()))
     print(f"velodrome: {line}", file=sys.stderr)
     sys.exit(status)

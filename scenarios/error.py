@@ -1,5 +1,5 @@
-"""What a user's input can be told."""
+"""The error that is raised for a user's input."""
 
 
 class ScenarioError(ValueError):
-    """Input that cannot be used: one line that says what, where and what would be right."""
+    """Raised for input that cannot be used; one line says what is wrong, where, and what would be right."""

@@ -1,4 +1,4 @@
-"""What the command writes: folders, texts, JSON documents."""
+"""Writing of folders, text files and JSON documents."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ DIGEST_KEY = "sha256"
 
 
 def make_folder(out: Path) -> None:
-    """Make the folder that ``--out`` names, if need be.
+    """Make the folder that ``--out`` names if it does not exist.
 
     Raises
     ------
     ScenarioError
-        If it cannot be made.
+        If the folder cannot be made.
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -30,12 +30,12 @@ def make_folder(out: Path) -> None:
 
 
 def versioned(document: Mapping[str, Any]) -> dict[str, Any]:
-    """A JSON document with the version of its format first; 1 if it says none itself."""
+    """Return a JSON document with its format version as the first key; the default version is 1."""
     return {VERSION_KEY: 1} | dict(document)
 
 
 def write_json(path: Path, document: Mapping[str, Any]) -> None:
-    """Write a JSON document with the version of its format, whole or not at all."""
+    """Write a JSON document with its format version, whole or not at all."""
     write_text(path, json.dumps(versioned(document), indent=1, allow_nan=False) + "\n")
 
 
@@ -46,9 +46,9 @@ def write_sealed(path: Path, document: Mapping[str, Any], version: int) -> None:
 
 
 def content_digest(document: Mapping[str, Any]) -> str:
-    """SHA-256 of everything in a JSON document but its digest, in hexadecimal digits.
+    """Return the SHA-256 of everything in a JSON document except its digest, in hexadecimal digits.
 
-    Order and white space do not matter, values do, to the last bit.
+    The digest does not depend on order and white space. It depends on every bit of the values.
     """
     contents = {key: value for key, value in document.items() if key != DIGEST_KEY}
     text = json.dumps(contents, sort_keys=True, separators=(",", ":"))

@@ -1,4 +1,4 @@
-"""One examination that every engine passes: what it must keep to, and a diagnosis of what it does not."""
+"""The conformance test that every engine must pass, with a diagnosis of each failed check."""
 
 from .examine import check_engine, examine_engine
 from .report import ConformanceCheck, ConformanceError, ConformanceReport, Outcome

@@ -1,4 +1,4 @@
-"""Ways to mistake coordinates: mirrored, swapped, in other units."""
+"""Wrong maps of coordinates: mirrored, swapped, or in other units."""
 
 from __future__ import annotations
 
@@ -25,15 +25,16 @@ _SWAPS = (
 
 @dataclass(frozen=True)
 class CoordinateMap:
-    """A way to mistake coordinates, and how it is undone: q is ``positions @ q`` and qd ``rates @ qd``.
+    """A wrong map of coordinates, which ``positions @ q`` and ``rates @ qd`` undo.
 
     Attributes
     ----------
     what : str
-        In words.
+        Description of the map.
     positions, rates : ndarray, shape (9, 9)
+        Matrices that undo the map, for coordinates and rates.
     simple : bool
-        False for two mistakes at once.
+        False for a combination of two mistakes.
     """
 
     what: str
@@ -44,17 +45,17 @@ class CoordinateMap:
 
 @cache
 def coordinate_maps() -> tuple[CoordinateMap, ...]:
-    """The maps that are told apart."""
-    return tuple(_maps())
+    """Return the wrong maps that the examination distinguishes."""
+    return tuple(_make_maps())
 
 
-def _maps() -> Iterator[CoordinateMap]:
+def _make_maps() -> Iterator[CoordinateMap]:
     for i, name in enumerate(COORDINATES):
-        yield CoordinateMap(f"{name} looks mirrored", _mirror(i), _mirror(i))
+        yield CoordinateMap(f"{name} looks mirrored", _make_mirror(i), _make_mirror(i))
     for i, name in enumerate(rate_names()):
-        yield CoordinateMap(f"{name} looks mirrored, the coordinate not", np.eye(9), _mirror(i))
+        yield CoordinateMap(f"{name} looks mirrored, the coordinate not", np.eye(9), _make_mirror(i))
     for i, name in enumerate(COORDINATES):
-        yield CoordinateMap(f"{name} looks mirrored, its rate not", _mirror(i), np.eye(9))
+        yield CoordinateMap(f"{name} looks mirrored, its rate not", _make_mirror(i), np.eye(9))
     for i, j in _SWAPS:
         swap = np.eye(9)
         swap[[i, j]] = swap[[j, i]]
@@ -65,11 +66,11 @@ def _maps() -> Iterator[CoordinateMap]:
         what = COORDINATES[angles[0]] if len(angles) == 1 else "every angle"
         yield CoordinateMap(f"{what} looks to be in degrees", radians, radians)
     for i, j in combinations(range(9), 2):
-        both = _mirror(i, j)
+        both = _make_mirror(i, j)
         yield CoordinateMap(f"{COORDINATES[i]} and {COORDINATES[j]} look mirrored", both, both, simple=False)
 
 
-def _mirror(*columns: int) -> np.ndarray:
+def _make_mirror(*columns: int) -> np.ndarray:
     mirror = np.eye(9)
     mirror[columns, columns] = -1
     return mirror

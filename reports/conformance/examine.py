@@ -1,4 +1,4 @@
-"""The examination of an engine: which rides are made of it, and which checks look at them."""
+"""The examination of an engine: its rides and the checks of each ride."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from .rides import Ride
 from .start import check_start
 from .timing import check_clock, check_rates
 
-_MAPPED = "a map of its coordinates is wrong: put that right first"
-_FEWEST = 5  # samples of a ride along which anything can be fitted
+_MAP_IS_WRONG = "a map of its coordinates is wrong: correct it first"
+_FEWEST = 5  # samples that a ride needs for fits along it
 _RIDE = "it rides to the end, and what it gives is a trajectory of the problem"
 
 
@@ -44,7 +44,7 @@ def check_engine(engine: Engine | str, settings: Mapping[str, Any] | None = None
     Returns
     -------
     ConformanceReport
-        In which no check failed.
+        The report; no check failed.
 
     Raises
     ------
@@ -60,19 +60,19 @@ def check_engine(engine: Engine | str, settings: Mapping[str, Any] | None = None
 
 
 def examine_engine(engine: Engine | str, settings: Mapping[str, Any] | None = None) -> ConformanceReport:
-    """Examine an engine: let it ride short transients, and hold it against what every engine must keep to.
+    """Simulate short transients with an engine and check the results against the rules for all engines.
 
     Parameters
     ----------
     engine : Engine or str
-        The object itself, installed or not, or the name of an installed one.
+        The engine object, installed or not, or the name of an installed engine.
     settings : mapping, optional
         Values of its settings that differ from the defaults.
 
     Returns
     -------
     ConformanceReport
-        Whatever the engine does: an engine that breaks, exits or prints fails checks.
+        A report is returned whatever the engine does: if it raises, exits or prints, checks fail.
 
     Raises
     ------
@@ -90,66 +90,75 @@ def examine_engine(engine: Engine | str, settings: Mapping[str, Any] | None = No
         if settings:
             raise ValueError(f"{guarded.name} refuses the settings: {error.errors()[0]['msg']}") from error
         return ConformanceReport(str(guarded.name), str(guarded.version), {}, tuple(checks))
-    before = _surroundings()
-    checks += _Examination(guarded, chosen).checks()
-    checks.append(_check_surroundings(before))
-    shown = chosen.model_dump(mode="json")
-    return ConformanceReport(guarded.name, guarded.version, shown, tuple(checks))
+    before = _read_process_state()
+    checks += _Examination(guarded, chosen).run_checks()
+    checks.append(_check_process_state(before))
+    values = chosen.model_dump(mode="json")
+    return ConformanceReport(guarded.name, guarded.version, values, tuple(checks))
 
 
 @dataclass(frozen=True)
 class _Examination:
-    """An engine with its settings, and the times at which it reported progress in its rides."""
+    """An engine with its settings, and the progress times that it reported in each ride."""
 
     engine: GuardedEngine
     settings: Settings
     reported: list[list[float]] = field(default_factory=list)
 
     def ride(self, motion: TransientMotion, settings: Settings | None = None) -> Ride:
-        """Ride a motion with the settings, or with others; errors as of `ride_engine`."""
+        """Simulate a motion, with the examined settings unless others are given; raises as `ride_engine` does."""
         chosen = self.settings if settings is None else settings
         self.reported.append([])
         trajectory = ride_engine(self.engine, motion.problem, chosen, self.reported[-1].append)
-        # Of the settings themselves: what a method leaves at longer steps is its error, not its noise.
+        # The noise is that of the examined settings: at longer steps the method's error grows, not its noise.
         return Ride(motion, trajectory, step_noise_of(self.engine, self.settings))
 
     def refine(self, motion: TransientMotion, factor: float) -> Settings:
-        """Settings with a factor on the step; ValueError where there are none or the engine refuses them."""
+        """Return settings with the step multiplied by a factor.
+
+        Raises
+        ------
+        ValueError
+            If the settings have no step, or the engine refuses the new one.
+        """
         settings = self.settings if factor == 1.0 else call_engine(self.settings.refined, factor)
         self.engine.check(motion.problem, settings)
         return settings
 
-    def checks(self) -> Iterator[ConformanceCheck]:
-        """All checks that take rides."""
-        wrong, suitable = self.grounds()
-        ridden = [name for name, good in suitable.items() if good]
-        if not ridden:
+    def run_checks(self) -> Iterator[ConformanceCheck]:
+        """Run all checks that need rides."""
+        wrong, suitable = self.find_grounds()
+        accepted = [name for name, good in suitable.items() if good]
+        if not accepted:
             refused = f"it refuses all: {', '.join(suitable)}"
             yield make_check("grounds", "it rides on one ground at least", [*wrong, refused])
             return
-        motion = make_motion(ridden[0], Bicycle(), self.interval)
+        motion = make_motion(accepted[0], Bicycle(), self.interval)
         try:
             first = self.ride(motion)
         except Exception as error:  # another package's code may break in any way
             yield make_check(f"ride on {motion.name}", _RIDE, [why_failed(error)])
             return
-        yield make_check(f"ride on {motion.name}", _RIDE, _wrong_facts(first, self.engine.gives, self.reported[-1]))
+        yield make_check(
+            f"ride on {motion.name}", _RIDE, _list_ride_faults(first, self.engine.gives, self.reported[-1])
+        )
         yield check_refusals(self.engine, self.settings, first, wrong, suitable)
-        judged = tuple(_judged(first))
-        yield from judged
-        # An engine that knows but the benchmark's bicycle, or but the plane, would pass on these.
-        yield from self.checks_of_another(make_motion(ridden[-1], OTHER_BICYCLE, self.interval))
-        yield from self.checks_of_repeats(first)
-        yield self.check_order(first, mapped=any(check.outcome == "failed" for check in judged if _is_of_maps(check)))
+        checks = tuple(_check_ride(first))
+        yield from checks
+        # An engine that has the benchmark bicycle or the plane hard-coded passes the checks so far.
+        yield from self.check_second_ride(make_motion(accepted[-1], OTHER_BICYCLE, self.interval))
+        yield from self.check_repeats(first)
+        map_is_wrong = any(check.outcome == "failed" for check in checks if _is_map_check(check))
+        yield self.check_order(first, map_is_wrong=map_is_wrong)
 
     @property
     def interval(self) -> float:
-        """Interval of the samples [s]."""
+        """Output interval of the rides [s]."""
         step = getattr(self.settings, "step", None)
         return output_interval(step if isinstance(step, float) and 0 < step < np.inf else None)
 
-    def grounds(self) -> tuple[list[str], dict[str, bool]]:
-        """What is wrong with the refusals of grounds, and which ones the engine is made for."""
+    def find_grounds(self) -> tuple[list[str], dict[str, bool]]:
+        """Return faults of the engine's refusals of grounds, and whether it accepts each ground."""
         wrong: list[str] = []
         suitable: dict[str, bool] = {}
         for name in GROUNDS:
@@ -158,18 +167,20 @@ class _Examination:
             wrong += more
         return wrong, suitable
 
-    def checks_of_another(self, motion: TransientMotion) -> Iterator[ConformanceCheck]:
-        """The checks of a ride of a second motion."""
+    def check_second_ride(self, motion: TransientMotion) -> Iterator[ConformanceCheck]:
+        """Check a ride of a second motion."""
         try:
             second = self.ride(motion)
         except Exception as error:  # another package's code may break in any way
             yield make_check(f"ride on {motion.name}", _RIDE, [why_failed(error)])
             return
-        yield make_check(f"ride on {motion.name}", _RIDE, _wrong_facts(second, self.engine.gives, self.reported[-1]))
-        yield from _judged(second)
+        yield make_check(
+            f"ride on {motion.name}", _RIDE, _list_ride_faults(second, self.engine.gives, self.reported[-1])
+        )
+        yield from _check_ride(second)
 
-    def checks_of_repeats(self, first: Ride) -> Iterator[ConformanceCheck]:
-        """The checks of a ride that is repeated after another one."""
+    def check_repeats(self, first: Ride) -> Iterator[ConformanceCheck]:
+        """Check that the first ride, repeated after another one, is the same and is the engine's own."""
         try:
             again = self.ride(first.motion)
         except Exception as error:  # another package's code may break in any way
@@ -178,12 +189,12 @@ class _Examination:
             yield check_bits(first, again.trajectory)
         yield check_own_work(first, self.engine.name)
 
-    def check_order(self, first: Ride, mapped: bool) -> ConformanceCheck:
-        """The check of rides with other steps."""
+    def check_order(self, first: Ride, map_is_wrong: bool) -> ConformanceCheck:
+        """Check the order of convergence on rides with other steps."""
         motion = first.motion
-        name, claim = f"order on {motion.name}", "it is judged along a ride in the right coordinates"
-        if mapped:
-            return skip_check(name, claim, _MAPPED)
+        name, claim = f"order on {motion.name}", "it is checked along a ride in the right coordinates"
+        if map_is_wrong:
+            return skip_check(name, claim, _MAP_IS_WRONG)
         if first.trajectory.ended is not None:
             return skip_check(name, claim, "it does not ride to the end")
         return check_order(
@@ -191,33 +202,33 @@ class _Examination:
         )
 
 
-def _is_of_maps(check: ConformanceCheck) -> bool:
+def _is_map_check(check: ConformanceCheck) -> bool:
     return check.name.startswith("maps on ")
 
 
-def _judged(ride: Ride) -> Iterator[ConformanceCheck]:
-    """The checks of one ride, of a short one those that a few samples can tell."""
+def _check_ride(ride: Ride) -> Iterator[ConformanceCheck]:
+    """Check one ride; skip the checks for which it has too few samples."""
     maps = check_maps(ride)
-    mapped = maps.outcome == "failed"
-    yield check_start(ride, mapped)
+    map_is_wrong = maps.outcome == "failed"
+    yield check_start(ride, map_is_wrong)
     yield maps
     yield check_bodies(ride)
-    if mapped:
+    if map_is_wrong:
         rest = f"reports, rates, clock and forces on {ride.motion.name}"
-        yield skip_check(rest, "they are judged in the right coordinates", _MAPPED)
+        yield skip_check(rest, "they are checked in the right coordinates", _MAP_IS_WRONG)
         return
     yield check_reports(ride)
     if len(ride.trajectory.time) < _FEWEST:
         rest = f"rates, clock and forces on {ride.motion.name}"
-        yield skip_check(rest, "they are judged along a ride", f"it has fewer than {_FEWEST} samples")
+        yield skip_check(rest, "they are checked along a ride", f"it has fewer than {_FEWEST} samples")
         return
     yield check_rates(ride)
     yield check_clock(ride)
     yield check_forces(ride)
 
 
-def _wrong_facts(ride: Ride, gives: Iterable[str], reported: list[float]) -> Iterator[str]:
-    """What is wrong with a ride before any number of it is looked at, in words."""
+def _list_ride_faults(ride: Ride, gives: Iterable[str], reported: list[float]) -> Iterator[str]:
+    """List the faults of a ride that show without comparing its numbers with anything."""
     trajectory, end = ride.trajectory, float(ride.motion.problem.times[-1])
     missing = [name for name in gives if getattr(trajectory, name) is None]
     if missing:
@@ -229,22 +240,22 @@ def _wrong_facts(ride: Ride, gives: Iterable[str], reported: list[float]) -> Ite
     if trajectory.unconverged_steps:
         yield f"its iterations did not converge in {trajectory.unconverged_steps} of {trajectory.steps} steps"
     if not trajectory.steps > 0:
-        yield "it says that it took no steps"
+        yield "it reports that it took no steps"
     if reported != sorted(reported) or not all(0 <= time <= end * (1 + 1e-9) for time in reported):
         yield f"the times of its progress must rise from 0 to {end:g} s; it reported {reported[:3]}"
 
 
-def _surroundings() -> dict[str, Any]:
-    """What an engine may not change in the process that it runs in."""
+def _read_process_state() -> dict[str, Any]:
+    """Return the state of the process that an engine must not change."""
     return {
         "numpy's handling of errors": np.geterr(),
         "numpy's random numbers": repr(np.random.get_state()),  # noqa: NPY002
         "Python's random numbers": random.getstate(),
-        "the environment's variables": dict(os.environ),
+        "the environment variables": dict(os.environ),
     }
 
 
-def _check_surroundings(before: Mapping[str, Any]) -> ConformanceCheck:
-    after = _surroundings()
+def _check_process_state(before: Mapping[str, Any]) -> ConformanceCheck:
+    after = _read_process_state()
     changed = [f"it changed {what}" for what, value in before.items() if after[what] != value]
     return make_check("surroundings", "it leaves the process as it found it", changed)

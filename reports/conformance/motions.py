@@ -1,4 +1,4 @@
-"""The motions that an engine is examined on: nothing in them is zero or at rest, so that no sign hides."""
+"""The motions that an engine is examined on: no coordinate or rate in them is zero, so that every wrong sign shows."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from ...reference.stability import growth_rate, linearise
 from ...reference.surface import Paraboloid, Plane, Surface
 from ..measure import Scale
 
-_INTERVAL = 0.01  # of the samples, about [s]
+_INTERVAL = 0.01  # approximate output interval [s]
 SAMPLES = 24
-STEPS_AN_INTERVAL = 4  # divide every output interval, so that steps up to four times as long fit too
-_REAR_RATE = 14.0  # some 4.5 m/s, where a benchmark bicycle upright is stable
+STEPS_AN_INTERVAL = 4  # steps per output interval, a multiple of which keeps steps up to four times as long possible
+_REAR_RATE = 14.0  # [rad/s], about 4.5 m/s, where the upright benchmark bicycle is stable
 _KNOTS = np.arange(-8.0, 8.1, 2.0)
-# One unit in the last place.
+# Factor that adds one unit in the last place.
 _ABOVE = 1 + 2.0**-52
 
 
 def waves() -> HeightField:
-    """Ground without any symmetry, waves of some 10 cm."""
+    """Make a ground without any symmetry, with waves of about 10 cm."""
     heights = 0.1 * np.sin(0.5 * _KNOTS[:, None] + 0.3) * np.cos(0.45 * _KNOTS - 0.4)
     return HeightField(heights.tolist(), 2.0, (-8.0, -8.0))
 
@@ -50,7 +50,7 @@ OTHER_BICYCLE = replace(
 
 @dataclass(frozen=True, eq=False)
 class TransientMotion:
-    """A problem and the reference's ride of it.
+    """A problem and the reference's ride for it.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class TransientMotion:
     round_off : Trajectory
         The reference's ride from a start in which every number is one unit in the last place larger.
     scale : Scale
-        Sizes of the motion, its growth rate included.
+        Characteristic sizes of the motion, including its growth rate.
     """
 
     ground: str
@@ -73,12 +73,12 @@ class TransientMotion:
 
     @property
     def name(self) -> str:
-        """Of the ground, and of the bicycle if it is not the benchmark's."""
+        """Name of the ground, with a note if the bicycle is not the benchmark's."""
         return self.ground if self.problem.bicycle == Bicycle() else f"{self.ground}, another bicycle"
 
     @property
     def size(self) -> float:
-        """Of the motion: the wheelbase [m]."""
+        """Size of the motion: the wheelbase [m]."""
         return self.problem.bicycle.wheelbase
 
     @property
@@ -88,7 +88,7 @@ class TransientMotion:
 
 
 def output_interval(step: float | None) -> float:
-    """Interval of the samples [s]: some 10 ms that a step divides, also a four times longer one."""
+    """Return an output interval of about 10 ms that the step, and a four times longer step, divides [s]."""
     if step is None:
         return _INTERVAL
     coarse = STEPS_AN_INTERVAL * step
@@ -96,34 +96,34 @@ def output_interval(step: float | None) -> float:
 
 
 def awkward_interval(interval: float) -> float:
-    """An interval that no step divides that divides another one [s]."""
+    """Return an output interval that no step which divides ``interval`` divides [s]."""
     return float(np.sqrt(2)) * interval
 
 
 @lru_cache(maxsize=16)
 def make_problem(ground: str, bicycle: Bicycle, interval: float, samples: int) -> Problem:
-    """The start of a transient on one of the `GROUNDS`: everything leans, steers, turns and changes.
+    """Make a problem of a transient on one of the `GROUNDS`, in which the bicycle leans, steers and turns.
 
     Parameters
     ----------
     ground : str
     bicycle : Bicycle
     interval : float
-        Between outputs [s].
+        Time between outputs [s].
     samples : int
-        Outputs after the start.
+        Number of outputs after the start.
     """
     surface = GROUNDS[ground]()
     rates = (0.4, -0.5, _REAR_RATE)
     q, qd = consistent_state(bicycle, surface, (1.3, -0.7), 0.15, -0.12, rates, yaw=2.2)
-    # A wheel is symmetric about its axle: it may stand at any angle.
+    # A wheel is symmetric about its axle, so that its angle is free.
     q[[REAR_ANGLE, FRONT_ANGLE]] = 0.7, -0.4
     return Problem(bicycle, surface, q, qd, interval * np.arange(samples + 1))
 
 
 @lru_cache(maxsize=16)
 def make_motion(ground: str, bicycle: Bicycle, interval: float, samples: int = SAMPLES) -> TransientMotion:
-    """Let the reference ride a problem of `make_problem`.
+    """Make a problem with `make_problem` and simulate it with the reference.
 
     Raises
     ------
@@ -131,20 +131,20 @@ def make_motion(ground: str, bicycle: Bicycle, interval: float, samples: int = S
         If the reference does not ride to the end.
     """
     problem = make_problem(ground, bicycle, interval, samples)
-    exact = _ride(problem)
-    shifted = _ride(replace(problem, q=_ABOVE * problem.q, qd=_ABOVE * problem.qd))
+    exact = _simulate_reference(problem)
+    shifted = _simulate_reference(replace(problem, q=_ABOVE * problem.q, qd=_ABOVE * problem.qd))
     upright = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.0, 0.0, (0.0, 0.0, _REAR_RATE))
     growth = growth_rate(Plane(), linearise(bicycle, Plane(), *upright).eigenvalues, 0.0)
     scale = Scale.of(bicycle, problem.qd, bicycle.wheelbase, growth, float(problem.times[-1]))
     return TransientMotion(ground, problem, exact, shifted, scale)
 
 
-def _ride(problem: Problem) -> Trajectory:
+def _simulate_reference(problem: Problem) -> Trajectory:
     bicycle, surface = problem.bicycle, problem.surface
     found = simulate(bicycle, surface, problem.q, problem.qd, problem.times)
     if found.ended is not None:
         raise RuntimeError(f"the reference ends at {found.time[-1]:.6g} s: {found.ended}")
-    seen = observe(bicycle, surface, found.q, found.qd, found.contact)
+    contact = observe(bicycle, surface, found.q, found.qd, found.contact)
     return Trajectory(
         engine=REFERENCE,
         version="",
@@ -154,12 +154,12 @@ def _ride(problem: Problem) -> Trajectory:
         qd=found.qd,
         body_position=body_positions(bicycle, found.q),
         body_quaternion=body_quaternions(bicycle, found.q),
-        contact_point=seen.point,
+        contact_point=contact.point,
         contact_force=found.force,
-        gap=seen.gap,
-        slip=seen.slip,
-        kinetic_energy=seen.kinetic_energy,
-        potential_energy=seen.potential_energy,
+        gap=contact.gap,
+        slip=contact.slip,
+        kinetic_energy=contact.kinetic_energy,
+        potential_energy=contact.potential_energy,
         steps=found.steps,
         cpu_time=0.0,
     )

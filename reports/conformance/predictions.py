@@ -1,8 +1,8 @@
-"""What rides look like whose maps are wrong, as the reference rides them.
+"""Rides with wrong maps of coordinates, predicted by the reference.
 
-A map may be wrong on the way in, on the way back, or both ways. A start that a wrong map has taken off the constraints
-is put back on them by some engines and kept off them by others, whose equations hold the constraints' derivatives
-alone; the reference does either.
+A map may be wrong on the way into the engine, on the way back, or both ways. A wrong map may violate the constraints at
+the start. Some engines then project the start onto the constraints; others, whose equations contain only the
+constraints' derivatives, simulate_as_it_is the violation. The reference predicts both.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from ..measure import ROUND_OFF
 from .coordinate_maps import CoordinateMap, coordinate_maps
 from .motions import TransientMotion
 
-_STEP = 1e-3  # of the rides that keep what is off the constraints [s]
-_TELLING = 100.0  # times the error of a method
-_LIFTS = 5  # Newton steps to the ground
+_STEP = 1e-3  # step of the rides that simulate_as_it_is a violation of the constraints [s]
+_DISTINCT = 100.0  # a prediction differs from the right ride by more than so many times the methods' error
+_LIFTS = 5  # Newton steps that put the rear wheel on the ground
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,11 @@ class Prediction:
     Attributes
     ----------
     what : str
-        In words.
+        Description of the map.
     simple : bool
-        False for two mistakes at once.
+        False for a combination of two mistakes.
     q, qd : ndarray, shape (n, 9)
-        As the engine would give them.
+        Coordinates and rates as the engine would return them.
     """
 
     what: str
@@ -50,18 +50,20 @@ class Prediction:
 
 @lru_cache(maxsize=16)
 def predictions(motion: TransientMotion) -> tuple[Prediction, ...]:
-    """Rides of a motion with every map of `coordinate_maps` wrong in every way.
+    """Predict the rides of a motion with each wrong map of `coordinate_maps`, in the input, the output or both.
 
-    Those are left out that differ from the right ride by no more than the errors of the methods by which they are
-    found: such a mistake does not show in this motion.
+    Predictions are left out that differ from the right ride by no more than the errors of the methods that compute
+    them: such a mistake does not show in this motion.
     """
     exact = motion.exact
-    error = max(measure_distance(motion, one.q, one.qd, exact.q, exact.qd) for one in _rides(motion.problem))
-    found = (one for map_ in coordinate_maps() for one in _predict(motion, map_))
+    error = max(
+        measure_distance(motion, ride.q, ride.qd, exact.q, exact.qd) for ride in _simulate_start(motion.problem)
+    )
+    found = (prediction for map_ in coordinate_maps() for prediction in _predict(motion, map_))
     return tuple(
-        one
-        for one in found
-        if measure_distance(motion, one.q, one.qd, exact.q, exact.qd) > _TELLING * max(error, ROUND_OFF)
+        prediction
+        for prediction in found
+        if measure_distance(motion, prediction.q, prediction.qd, exact.q, exact.qd) > _DISTINCT * max(error, ROUND_OFF)
     )
 
 
@@ -70,27 +72,31 @@ def _predict(motion: TransientMotion, map_: CoordinateMap) -> Iterator[Predictio
     exact, problem, simple = motion.exact, motion.problem, map_.simple
     yield Prediction(f"{map_.what} on the way back", simple, exact.q @ back, exact.qd @ rates_back)
     start = replace(problem, q=map_.positions @ problem.q, qd=map_.rates @ problem.qd)
-    for found in _rides(start):
+    for found in _simulate_start(start):
         yield Prediction(map_.what, simple, found.q @ back, found.qd @ rates_back)
         yield Prediction(f"{map_.what} on the way in", simple, found.q, found.qd)
 
 
-def _rides(start: Problem) -> Iterator[PreciseMotion]:
-    """The reference's rides from a start that may be off the constraints, those that come to the end.
+def _simulate_start(start: Problem) -> Iterator[PreciseMotion]:
+    """Yield the reference's rides from a start that may violate the constraints, if they reach the end.
 
-    The start is put back on the constraints; or is kept off them; or has its rear wheel put on the ground first, as
-    engines do whose height is no coordinate of their own.
+    Three ways are tried: the start is projected onto the constraints; the violation is kept; or the rear wheel is first
+    put on the ground, as engines do that have no coordinate of height.
     """
     step = float(start.times[1]) / round(float(start.times[1]) / _STEP)
 
-    def put_back() -> PreciseMotion:
+    def simulate_projected() -> PreciseMotion:
         return simulate(start.bicycle, start.surface, start.q, start.qd, start.times, tolerance=1e-9)
 
-    def keep(problem: Problem) -> PreciseMotion:
+    def simulate_as_it_is(problem: Problem) -> PreciseMotion:
         state = (problem.bicycle, problem.surface, problem.q, problem.qd, problem.times)
         return simulate_modified_euler(*state, step=step)
 
-    for ride in (put_back, lambda: keep(start), lambda: keep(_stand_rear_wheel(start))):
+    for ride in (
+        simulate_projected,
+        lambda: simulate_as_it_is(start),
+        lambda: simulate_as_it_is(_stand_rear_wheel(start)),
+    ):
         try:
             with np.errstate(all="ignore"):
                 found = ride()
@@ -101,17 +107,17 @@ def _rides(start: Problem) -> Iterator[PreciseMotion]:
 
 
 def _stand_rear_wheel(problem: Problem) -> Problem:
-    """Problem with the height and its rate such that the rear wheel stands on the ground."""
+    """Return the problem with the height and its rate changed so that the rear wheel stands on the ground."""
     bicycle, surface, q, qd = problem.bicycle, problem.surface, problem.q.copy(), problem.qd.copy()
     for _ in range(_LIFTS):
-        here = _rear_wheel(bicycle, surface, q, qd)
+        here = _observe_rear_wheel(bicycle, surface, q, qd)
         q[2] -= float(here.gap / here.normal[2])
-    here = _rear_wheel(bicycle, surface, q, qd)
+    here = _observe_rear_wheel(bicycle, surface, q, qd)
     qd[2] -= float(here.gap_rate / here.normal[2])
     return replace(problem, q=q, qd=qd)
 
 
-def _rear_wheel(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> WheelContact:
+def _observe_rear_wheel(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> WheelContact:
     centre, velocity = body_positions(bicycle, q[None])[0, 2], body_velocities(bicycle, q[None], qd[None])[0, 2]
     axle = rotations(bicycle, q[None])[0, 2, :, 1]
     spin = angular_velocities(bicycle, q[None], qd[None])[0, 2]
@@ -121,7 +127,7 @@ def _rear_wheel(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarra
 def measure_distance(
     motion: TransientMotion, q: np.ndarray, qd: np.ndarray, to_q: np.ndarray, to_qd: np.ndarray
 ) -> float:
-    """Root mean square of the differences of two rides from the second sample on, relative to the motion's sizes."""
+    """Return the root mean square difference of two rides after the first sample, relative to the motion's sizes."""
     n = min(len(q), len(to_q))
     apart = [(q[1:n] - to_q[1:n]) / motion.sizes, (qd[1:n] - to_qd[1:n]) / motion.scale.rates]
     with np.errstate(over="ignore", invalid="ignore"):

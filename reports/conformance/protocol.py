@@ -1,4 +1,4 @@
-"""Whether an object is an engine, and its settings are settings."""
+"""Checks that an object follows the protocol of engines, and that its settings follow the rules of settings."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _OPTIONAL = tuple(name for name in SHAPES if name not in REQUIRED)
 
 
 def guard_engine(engine: Engine | str) -> tuple[GuardedEngine | None, ConformanceCheck]:
-    """Put an engine behind the guard, and check that it has what the protocol asks for.
+    """Wrap an engine in the guard, and check that it has the members that the protocol requires.
 
     Returns
     -------
     engine : GuardedEngine or None
-        None where a member is missing or breaks.
+        None if a member is missing or cannot be used.
     check : ConformanceCheck
     """
-    claim = "it has what velodrome.engines.engine.Engine lists, of the types that it states"
+    claim = "it has the members that velodrome.engines.engine.Engine lists, of the stated types"
     if isinstance(engine, str):
         try:
             engine = load_engine(engine)
@@ -45,13 +45,13 @@ def guard_engine(engine: Engine | str) -> tuple[GuardedEngine | None, Conformanc
     if wrong:
         return None, make_check("protocol", claim, wrong)
     guarded = GuardedEngine(inner, **{fact: members[fact] for fact in _FACTS})
-    wrong = [*_wrong_facts(guarded), *_wrong_calls(members)]
+    wrong = [*_list_fact_faults(guarded), *_list_call_faults(members)]
     model = guarded.settings
     usable = isinstance(model, type) and issubclass(model, BaseModel) and isinstance(guarded.gives, tuple)
     return guarded if usable else None, make_check("protocol", claim, wrong)
 
 
-def _wrong_facts(engine: GuardedEngine) -> Iterator[str]:
+def _list_fact_faults(engine: GuardedEngine) -> Iterator[str]:
     if not isinstance(engine.name, str) or not _NAME.fullmatch(engine.name):
         yield f"its name is {engine.name!r}; files carry it: letters, digits, dots, dashes and underscores, 64 at most"
     if not isinstance(engine.version, str) or not engine.version.strip() or not engine.version.isprintable():
@@ -66,10 +66,10 @@ def _wrong_facts(engine: GuardedEngine) -> Iterator[str]:
         yield f"its settings is {engine.settings!r}; it must be a subclass of velodrome.engines.engine.Settings"
 
 
-def _wrong_calls(members: Mapping[str, Any]) -> Iterator[str]:
+def _list_call_faults(members: Mapping[str, Any]) -> Iterator[str]:
     for name, count in _CALLS.items():
         if not callable(members[name]):
-            yield f"its {name} is no function"
+            yield f"its {name} is not a function"
             continue
         try:
             inspect.signature(members[name]).bind(*range(count))
@@ -83,13 +83,14 @@ def check_settings(engine: GuardedEngine) -> ConformanceCheck:
     """Check the model of the settings: defaults, refusals, bounds, descriptions, units and step noise."""
     return make_check(
         "settings",
-        "every setting has a default, bounds and a description; what is unknown or no number is refused",
-        _wrong_settings(engine),
+        "every setting has a default, bounds and a description; unknown settings and values that are not numbers are "
+        "refused",
+        _list_settings_faults(engine),
         tolerance=f"step_noise from {ROUND_OFF / 2:.2g}, half a unit of round-off, to {LARGEST_NOISE:g}",
     )
 
 
-def _wrong_settings(engine: GuardedEngine) -> Iterator[str]:
+def _list_settings_faults(engine: GuardedEngine) -> Iterator[str]:
     model: Any = engine.settings
     try:
         settings = call_engine(model)
@@ -148,9 +149,9 @@ def _frozen(settings: Any, name: str) -> bool:
 
 
 def step_noise_of(engine: GuardedEngine, settings: Any) -> float:
-    """An engine's step noise, or round-off where it says nothing usable, which `check_settings` tells."""
+    """Return an engine's step noise, or round-off if that is not usable, which `check_settings` reports."""
     try:
         noise: object = engine.step_noise(settings)
-    except Exception:  # told by `check_settings`
+    except Exception:  # `check_settings` reports it
         return ROUND_OFF
     return float(noise) if isinstance(noise, float) and 0 <= noise <= LARGEST_NOISE else ROUND_OFF

@@ -1,4 +1,4 @@
-"""Whether a ride is the engine's own and the same every time."""
+"""Whether a ride can be repeated to the bit, and is computed by the engine itself."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from ..measure import state_error
 from .report import ConformanceCheck, make_check, skip_check
 from .rides import Ride
 
-_FEWEST = 5  # samples in which two rides cannot agree by chance
-_MANY = 0.5  # of the numbers: that many are not equal to the last bit by chance
+_FEWEST = 5  # samples in which two rides do not agree by chance
+_MANY = 0.5  # share of numbers that are not equal to the last bit by chance
 
 
 def check_bits(ride: Ride, again: Trajectory) -> ConformanceCheck:
@@ -23,9 +23,11 @@ def check_bits(ride: Ride, again: Trajectory) -> ConformanceCheck:
             wrong.append(f"it gives {name} in one ride and not in the other")
         elif one is not None and (one.shape != other.shape or not np.array_equal(one, other, equal_nan=True)):
             what = f"by {np.abs(one - other).max():.2g}" if one.shape == other.shape else "in the number of samples"
-            wrong.append(f"its {name} differs {what}: something is kept from one ride to the next, or not repeatable")
+            wrong.append(
+                f"its {name} differs {what}: state remains from the ride before, or the result is not repeatable"
+            )
     wrong += [
-        f"its {name} is {getattr(first, name)!r} once and {getattr(again, name)!r} another time"
+        f"its {name} is {getattr(first, name)!r} in one ride and {getattr(again, name)!r} in the other"
         for name in ("steps", "unconverged_steps", "largest_residual", "ended")
         if getattr(first, name) != getattr(again, name)
     ]
@@ -35,9 +37,9 @@ def check_bits(ride: Ride, again: Trajectory) -> ConformanceCheck:
 def check_own_work(ride: Ride, engine: str) -> ConformanceCheck:
     """Check that an engine has not taken coordinates or forces from the reference.
 
-    An engine that integrates by itself rounds its start to its own coordinates and every step after it. So its ride
-    differs from the reference's by more than what one unit in the last place of the start alone makes of the
-    reference's own ride. Forces that are the reference's at the engine's own states are equal to them to the last bit.
+    An engine with its own integration rounds the start in its own coordinates, and then every step. Its ride therefore
+    differs from the reference's by more than the reference's ride changes if every number of the start is changed by
+    one unit in the last place. Forces taken from the reference at the engine's states equal it to the last bit.
     """
     name, claim = "own work", "its coordinates and forces are computed by itself, not taken from the reference"
     if engine == REFERENCE:
@@ -49,17 +51,17 @@ def check_own_work(ride: Ride, engine: str) -> ConformanceCheck:
     apart = state_error(ride.followed, ride.motion.exact, ride.motion.scale)
     if apart <= least:
         wrong.append(
-            f"its ride is the reference's: they differ by {apart:.2g}, and by {least:.2g} if the start is rounded once "
-            "otherwise"
+            f"its ride is the reference's: they differ by {apart:.2g}, and by {least:.2g} if the start is changed by "
+            "one unit in the last place"
         )
     forces = ride.trajectory.contact_force
-    if forces is not None and any(np.mean(forces == taken) > _MANY for taken in _forces_of_the_reference(ride)):
-        wrong.append("its contact forces are the reference's to the last bit; an engine that has none gives None")
+    if forces is not None and any(np.mean(forces == taken) > _MANY for taken in _reference_forces(ride)):
+        wrong.append("its contact forces are the reference's to the last bit; an engine without forces gives None")
     return make_check(name, claim, wrong, [f"apart from the reference by {apart:.2g}, more than {least:.2g}"])
 
 
-def _forces_of_the_reference(ride: Ride) -> list[np.ndarray]:
-    """Forces (n, 2, 3) of the reference's ride, and its forces at the engine's own states."""
+def _reference_forces(ride: Ride) -> list[np.ndarray]:
+    """Return forces (n, 2, 3) of the reference: along its own ride, and at the engine's states."""
     problem, exact = ride.motion.problem, ride.exact.contact_force
     assert exact is not None
     states = zip(ride.trajectory.q, ride.trajectory.qd, strict=True)

@@ -1,4 +1,4 @@
-"""What became of an examination: its checks, and the error that a failed one is."""
+"""The report of an examination, its checks, and the error that is raised if checks fail."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class ConformanceCheck:
     name : str
     outcome : {"passed", "failed", "skipped"}
     claim : str
-        What must hold.
+        The statement that the check tests.
     found : tuple of str
-        Of a failed check what is wrong, with a diagnosis where there is one; of a skipped one why; of a passed one
-        what was seen, and what the check could not have told.
+        For a failed check the faults, with a diagnosis where there is one. For a skipped check the reason. For a passed
+        check what was observed, and which faults the check could not have detected.
     tolerance : str
-        What its limits follow from; empty where nothing may differ.
+        How the limits are derived; empty if nothing may differ.
     """
 
     name: str
@@ -45,13 +45,13 @@ class ConformanceCheck:
 
 @dataclass(frozen=True)
 class ConformanceReport:
-    """All checks of an engine; printed, it is a table of them.
+    """All checks of an engine; `str` gives them as a table.
 
     Attributes
     ----------
     engine, version : str
     settings : dict
-        With which it was examined, JSON values.
+        JSON values of the settings that the engine was examined with.
     checks : tuple of ConformanceCheck
     """
 
@@ -71,7 +71,7 @@ class ConformanceReport:
         return not self.failed
 
     def __getitem__(self, name: str) -> ConformanceCheck:
-        """Return the check of a name."""
+        """Return the check with a name; raises KeyError if there is none."""
         for check in self.checks:
             if check.name == name:
                 return check
@@ -84,7 +84,7 @@ class ConformanceReport:
 
 
 class ConformanceError(AssertionError):
-    """An engine does not conform: all checks that failed, with their diagnoses.
+    """Raised if an engine fails checks; the message lists them with their diagnoses.
 
     Attributes
     ----------
@@ -99,13 +99,13 @@ class ConformanceError(AssertionError):
 
 
 def make_check(
-    name: str, claim: str, wrong: Iterable[str], seen: Iterable[str] = (), tolerance: str = ""
+    name: str, claim: str, wrong: Iterable[str], observations: Iterable[str] = (), tolerance: str = ""
 ) -> ConformanceCheck:
-    """Make a check that fails if anything is ``wrong``, and else says what was ``seen``."""
+    """Make a check that fails if there are faults in ``wrong``; if there are none, it reports the observations."""
     faults = tuple(wrong)
-    return ConformanceCheck(name, "failed" if faults else "passed", claim, faults or tuple(seen), tolerance)
+    return ConformanceCheck(name, "failed" if faults else "passed", claim, faults or tuple(observations), tolerance)
 
 
 def skip_check(name: str, claim: str, why: str) -> ConformanceCheck:
-    """Make a check that was not done."""
+    """Make a check that was skipped, with the reason."""
     return ConformanceCheck(name, "skipped", claim, (why,))

@@ -1,6 +1,6 @@
-"""Whether what an engine says of its bodies, contacts and energies agrees with its coordinates, and what it looks like.
+"""Whether an engine's bodies, contacts and energies agree with its coordinates, with explanations if they do not.
 
-How closely is `velodrome.reports.measure.find_mismatches`' matter.
+The limits are those of `velodrome.reports.measure.find_mismatches`.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ _ORDERS = {"(x, y, z, w)": [3, 0, 1, 2], "(z, y, x, w)": [3, 2, 1, 0], "(w, z, y
 def check_bodies(ride: Ride) -> ConformanceCheck:
     """Check the poses of the four bodies."""
     wrong = []
-    for one in ride.mismatch(["body_position", "body_quaternion"]):
-        wrong.append(describe_mismatch(one.as_json()))
-        wrong += _explain_positions(ride) if one.quantity == "body_position" else _explain_quaternions(ride)
+    for mismatch in ride.mismatch(["body_position", "body_quaternion"]):
+        wrong.append(describe_mismatch(mismatch.as_json()))
+        wrong += _explain_positions(ride) if mismatch.quantity == "body_position" else _explain_quaternions(ride)
     return make_check(
         f"bodies on {ride.motion.name}", "its bodies are where its coordinates put them", wrong, tolerance=LIMIT
     )
@@ -41,16 +41,16 @@ def check_reports(ride: Ride) -> ConformanceCheck:
     given = [field for field in _REPORTS if getattr(ride.trajectory, field) is not None]
     if not given:
         return skip_check(name, claim, "it gives none")
-    wrong, seen = [], [f"it gives {', '.join(given)}"]
+    wrong, observations = [], [f"it gives {', '.join(given)}"]
     if ride.mismatch(["qd"]):
         given = [field for field in given if field not in _OF_RATES]
-        seen.append("slip and kinetic energy are not judged: they follow from rates that are wrong")
-    for one in ride.mismatch(given):
-        wrong.append(describe_mismatch(one.as_json()))
-        explanation = _explain_report(ride, one.quantity)
+        observations.append("slip and kinetic energy are not checked: they follow from rates that are wrong")
+    for mismatch in ride.mismatch(given):
+        wrong.append(describe_mismatch(mismatch.as_json()))
+        explanation = _explain_report(ride, mismatch.quantity)
         if explanation is not None:
             wrong.append(explanation)
-    return make_check(name, claim, wrong, seen, LIMIT)
+    return make_check(name, claim, wrong, observations, LIMIT)
 
 
 def _explain_positions(ride: Ride) -> Iterator[str]:
@@ -58,7 +58,7 @@ def _explain_positions(ride: Ride) -> Iterator[str]:
     off, noise = given - right, 1e-3 * np.abs(given - right).max()
     first = off[0, 0]
     if np.abs(off - first).max() <= noise:
-        yield f"all bodies look shifted by {_vector(first)} m: another height or origin than the suite's"
+        yield f"all bodies look shifted by {_format(first)} m: another height or origin than the suite's"
         return
     for axis, letter in enumerate("xyz"):
         mirror = np.ones(3)
@@ -66,12 +66,12 @@ def _explain_positions(ride: Ride) -> Iterator[str]:
         if explains(given, mirror * right, right):
             yield f"{letter} of the bodies looks mirrored"
             return
-    yield from _order_of_bodies(given, right)
+    yield from _explain_body_order(given, right)
     turned = rotation_matrices(ride.followed.body_quaternion)
     inside = np.einsum("nbji,nbj->nbi", turned, off)
     for body, arm in enumerate(inside.mean(axis=0)):
         if np.abs(arm).max() > noise and np.abs(inside[:, body] - arm).max() <= noise:
-            yield f"the {_words(BODIES[body])} looks given by a point that is {_vector(arm)} m from its centre of mass"
+            yield f"the {_spell(BODIES[body])} looks given by a point that is {_format(arm)} m from its centre of mass"
     lag = fit_lag(given, right, ride.trajectory.time)
     if lag is not None:
         yield f"positions of the bodies look {lag:.3g} s late"
@@ -100,22 +100,22 @@ def _explain_quaternions(ride: Ride) -> Iterator[str]:
     for body, name in enumerate(BODIES):
         length = np.linalg.norm(given[:, body], axis=-1)
         if np.abs(length - 1).max() > 1e-6:
-            yield f"quaternions of the {_words(name)} have lengths of {length.min():.3g} to {length.max():.3g}, not 1"
+            yield f"quaternions of the {_spell(name)} have lengths of {length.min():.3g} to {length.max():.3g}, not 1"
             return
     sign = np.sign(np.sum(given * right, axis=-1, keepdims=True))
-    yield from _order_of_bodies(sign * given, right)
+    yield from _explain_body_order(sign * given, right)
 
 
-def _order_of_bodies(given: np.ndarray, right: np.ndarray) -> Iterator[str]:
+def _explain_body_order(given: np.ndarray, right: np.ndarray) -> Iterator[str]:
     for order in permutations(range(4)):
         if list(order) != [0, 1, 2, 3] and explains(given, right[:, list(order)], right):
-            names = ", ".join(_words(BODIES[i]) for i in order)
-            yield f"bodies look to be in the order {names}; the suite's is {', '.join(map(_words, BODIES))}"
+            names = ", ".join(_spell(BODIES[i]) for i in order)
+            yield f"bodies look to be in the order {names}; the suite's is {', '.join(map(_spell, BODIES))}"
             return
 
 
 def _explain_report(ride: Ride, field: str) -> str | None:
-    """What a report looks like beside what follows from the coordinates."""
+    """Explain how a field differs from the one that follows from the coordinates; None if nothing explains it."""
     given, right = getattr(ride.trajectory, field), getattr(ride.followed, field)
     words = field.replace("_", " ")
     if field.endswith("energy"):
@@ -140,9 +140,9 @@ def _explain_report(ride: Ride, field: str) -> str | None:
     return None if lag is None else f"its {words} looks {lag:.3g} s late"
 
 
-def _vector(values: np.ndarray) -> str:
+def _format(values: np.ndarray) -> str:
     return "(" + ", ".join(f"{value:.3g}" for value in np.round(values, 12)) + ")"
 
 
-def _words(name: str) -> str:
+def _spell(name: str) -> str:
     return name.replace("_", " ")

@@ -1,4 +1,4 @@
-"""An engine's ride of a motion, with what follows from its coordinates."""
+"""An engine's ride of a motion, with the quantities that follow from its coordinates."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SINGLE = 2.0**-23
 
 @dataclass(frozen=True)
 class Ride:
-    """A ride.
+    """A ride of an engine and the motion that it should follow.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class Ride:
     trajectory : Trajectory
         As `velodrome.engines.admission.ride_engine` admits it.
     step_noise : float
-        Relative error that a step of the engine may add beyond its method, as it says itself.
+        Relative error that a step may add beyond its method, as stated by the engine.
     """
 
     motion: TransientMotion
@@ -36,18 +36,18 @@ class Ride:
 
     @cached_property
     def followed(self) -> Trajectory:
-        """The ride as it follows from its coordinates and rates."""
+        """The ride with all other quantities computed from its coordinates and rates."""
         return evaluate_ride(self.trajectory, self.motion.problem.bicycle, self.motion.problem.surface)
 
     @cached_property
     def mismatches(self) -> list[Mismatch]:
-        """Reports and rates held against the coordinates."""
+        """Comparisons of the reported quantities and rates with the coordinates."""
         motion = self.motion
         return find_mismatches(self.trajectory, self.followed, motion.exact, motion.size, self.step_noise)
 
     @cached_property
     def exact(self) -> Trajectory:
-        """The reference's ride, as long as this one."""
+        """The reference's ride, cut to the length of this one."""
         return self.motion.exact.first(len(self.trajectory.time))
 
     @property
@@ -57,35 +57,35 @@ class Ride:
 
     @property
     def noise(self) -> float:
-        """Relative error of the state at the end that round-off and iterations may leave."""
+        """Relative error of the final state that round-off and iterations may cause."""
         return noise(self.motion.scale, min(self.step_noise, LARGEST_NOISE), self.trajectory.steps)
 
     @property
     def round_off(self) -> float:
-        """Unit of round-off that the engine computes with: single precision if its steps leave as much."""
+        """Unit of round-off of the engine: that of single precision if its step noise is as large."""
         return _SINGLE if self.step_noise >= _SINGLE / 2 else ROUND_OFF
 
     @cached_property
     def q(self) -> np.ndarray:
-        """Coordinates with all angles on the reference's turns, shape (n, 9)."""
+        """Coordinates with angles shifted by whole turns to the nearest of the reference, shape (n, 9)."""
         return without_turns(self.trajectory.q, self.exact.q)
 
     @cached_property
     def error(self) -> float:
-        """Largest error of the coordinates against the reference, relative to the motion's sizes."""
+        """Largest difference of the coordinates from the reference, relative to the motion's sizes."""
         return float(np.abs((self.q - self.exact.q) / self.motion.sizes).max()) + START_ERROR
 
     def altered(self, **changes: Any) -> Ride:
-        """The ride with other samples of some fields."""
+        """Return the ride with some fields of its trajectory replaced."""
         return Ride(self.motion, replace(self.trajectory, **changes), self.step_noise)
 
     def mismatch(self, quantities: Sequence[str]) -> list[Mismatch]:
-        """What does not agree of some quantities."""
-        return [one for one in self.mismatches if one.quantity in quantities and not one.holds]
+        """Return the comparisons of some quantities that do not hold."""
+        return [found for found in self.mismatches if found.quantity in quantities and not found.holds]
 
 
 def without_turns(q: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """Coordinates (..., 9) with all angles shifted by whole turns to the nearest to others."""
+    """Return coordinates (..., 9) with all angles shifted by whole turns to the nearest to those of ``near``."""
     shifted = np.array(q, float)
     shifted[..., YAW:] -= 2 * np.pi * np.round((shifted - near)[..., YAW:] / (2 * np.pi))
     return shifted

@@ -1,4 +1,4 @@
-"""Whether a ride starts where its problem does."""
+"""Whether a ride starts from the start of its problem."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from .explain import explain_numbers, rate_names
 from .report import ConformanceCheck, make_check
 from .rides import Ride, without_turns
 
-# A state goes through rotations and back: some dozens of products and sums, each rounded, none of them cancelling.
+# A state is converted to rotations and back: several dozen rounded products and sums without cancellation.
 _ROUNDINGS = 64
-_MANY = 3  # a map mistakes so many at once; what is off in more is moved as a whole
+_MANY = 3  # a wrong map affects up to so many coordinates; if more are off, the engine has moved the whole start
 
 
-def check_start(ride: Ride, mapped: bool) -> ConformanceCheck:
-    """Check that the first sample is the problem's start, but for whole turns of the angles.
+def check_start(ride: Ride, map_is_wrong: bool) -> ConformanceCheck:
+    """Check that the first sample is the problem's start, up to whole turns of the angles.
 
     Parameters
     ----------
     ride : Ride
-    mapped : bool
-        Whether a map of its coordinates is wrong; an engine that puts its start back on the constraints then changes
-        all of it, and only what is mirrored or swapped is said.
+    map_is_wrong : bool
+        Whether a map of its coordinates is wrong. An engine that projects its start onto the constraints then changes
+        the whole start, and only mirrored or swapped coordinates are reported.
     """
     problem, given = ride.motion.problem, ride.trajectory
     wrong, worst = [], 0.0
@@ -37,11 +37,11 @@ def check_start(ride: Ride, mapped: bool) -> ConformanceCheck:
         if len(off) > _MANY:
             what = ", ".join(names[i] for i in off) if len(off) < len(names) else f"all, from {names[0]} on"
             wrong.append(f"its first sample is off in {what}, by {apart.max():.2g} at the most: it moves its start")
-            off = [] if mapped else [int(np.argmax(apart))]
-        wrong += explain_numbers(own[None], asked[None], off, names, factors=not mapped)
+            off = [] if map_is_wrong else [int(np.argmax(apart))]
+        wrong += explain_numbers(own[None], asked[None], off, names, factors=not map_is_wrong)
     return make_check(
         f"start on {ride.motion.name}",
-        "its first sample is the state that the problem starts from, but for whole turns",
+        "its first sample is the state that the problem starts from, up to whole turns",
         wrong,
         [f"off by {worst:.2g} at the most"],
         f"{_ROUNDINGS} roundings of {ride.round_off:.2g} of the largest coordinate and rate, on the way in and back",

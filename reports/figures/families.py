@@ -81,7 +81,7 @@ def solution_figure(
     _draw_legend(figure, drawn, points)
     for axes, angle in zip(panels, ANGLES, strict=True):
         badges = [
-            Badge("+".join(str(number) for number in curve.families), curve.line(angle), _curve_colour(curve))
+            Badge("+".join(str(number) for number in curve.families) or "–", curve.line(angle), _curve_colour(curve))
             for curve in drawn
         ]
         _magnify(axes, drawn, points, angle)
@@ -142,7 +142,7 @@ def _draw_frame(axes: Axes, angle: str, front_radius: float) -> None:
 
 
 def _curve_colour(curve: SolutionCurve) -> str:
-    return FAMILY_COLOURS[curve.families[0]]
+    return FAMILY_COLOURS[curve.families[0]] if curve.families else GREY
 
 
 def _draw_curve(axes: Axes, curve: SolutionCurve, angle: str) -> None:

@@ -41,7 +41,7 @@ class SolutionCurve:
     Attributes
     ----------
     families : tuple of int
-        Families that it belongs to; two where families have joined.
+        Families that it belongs to; two where families have joined, none for a curve without a number.
     speed, lean, steer : ndarray, shape (n,)
         Abscissa [1] and angles [rad].
     push : ndarray, shape (n,)
@@ -120,8 +120,10 @@ def _index_ends(family: Mapping[str, Any]) -> list[tuple[int, str]]:
 
 def _owning_families(family: Mapping[str, Any]) -> tuple[int, ...]:
     """Return the families of a curve by its ends: A belongs to family 1, E to 2, F and G to 3, H to 4."""
+    if family["family"] is None:
+        return ()
     lean, steer = family["points"]["lean"], family["points"]["steer"]
-    owners = {family["family"]}
+    owners = {family["family"], *family["joined_families"]}
     for index, end in _index_ends(family):
         if end == "static":
             owners.add(1)
@@ -166,11 +168,12 @@ def find_named_points(families: Sequence[Mapping[str, Any]], front_radius: float
     found: dict[tuple, NamedPoint] = {}
     for family in families:
         for name, point in family["special_points"].items():
-            if len(name) != 1:
+            letters = set(name) - set(" ()")
+            if not all(letter.isupper() for letter in letters):
                 continue
             speed = float(scaled_speed(point["front_rate"], front_radius))
             key = (point["kind"], round(point["lean"], 6), round(point["steer"], 6))
-            both = sorted({name, *(found[key].name if key in found else "")} - set(" ()"))
+            both = sorted(letters | set(found[key].name if key in found else "") - set(" ()"))
             label = both[0] + "".join(f" ({other})" for other in both[1:])
             found[key] = NamedPoint(label, point["kind"], speed, point["lean"], point["steer"], False)
     return list(found.values())

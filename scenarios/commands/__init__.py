@@ -1,4 +1,4 @@
-"""The commands of `velodrome`; each imports what it needs, and none of them waits for the others'."""
+"""The commands of `velodrome`. Each command imports its libraries when it runs, which keeps the others fast."""
 
 from .bicycle import bicycle_command
 from .check import check_command

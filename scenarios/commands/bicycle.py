@@ -1,4 +1,4 @@
-"""A bicycle by itself: `bicycle`."""
+"""The command `bicycle`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..error import ScenarioError
 from .completion import complete_scenario
 from .options import JsonOption, ending_with, print_json, show_written
 
-_FINEST = 10_000  # speeds of a list
+_MOST_SPEEDS = 10_000  # in a list of speeds
 
 
 def bicycle_command(
@@ -46,12 +46,12 @@ def bicycle_command(
 
 
 def parse_speeds(text: str) -> list[float]:
-    """Read ``FROM:TO``, in 200 steps, or a list of rising speeds [m/s].
+    """Parse a range ``FROM:TO``, which is divided into 200 steps, or a list of rising speeds [m/s].
 
     Raises
     ------
     ScenarioError
-        If it is neither, or a speed is negative.
+        If the text is neither, or a speed is negative.
     """
     wrong = ScenarioError(f"--speeds {text!r}: must be a range FROM:TO or rising speeds such as 1,3,5, in m/s from 0")
     separator = ":" if ":" in text else ","
@@ -59,7 +59,11 @@ def parse_speeds(text: str) -> list[float]:
         numbers = [float(part) for part in text.split(separator)]
     except ValueError:
         raise wrong from None
-    if not all(0 <= number <= 1e4 for number in numbers) or sorted(set(numbers)) != numbers or len(numbers) > _FINEST:
+    if (
+        not all(0 <= number <= 1e4 for number in numbers)
+        or sorted(set(numbers)) != numbers
+        or len(numbers) > _MOST_SPEEDS
+    ):
         raise wrong
     if separator == ",":
         return numbers

@@ -1,4 +1,4 @@
-"""The drift gate: `check_gate`."""
+"""The command `check`, which runs the drift gate."""
 
 from __future__ import annotations
 
@@ -66,12 +66,12 @@ def check_command(
 
     if reason is not None and not update:
         raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
-    # Before the work: minutes of it would be for nothing.
+    # Checked first, so that minutes of work are not lost.
     for option, path in (("--junit", junit), ("--markdown", markdown)):
         if path is not None:
             _check_path(option, path)
     files = [(junit, junit_xml), (markdown, markdown_page)]
-    unfinished = _unfinished({junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN})
+    unfinished = _mark_unfinished({junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN})
     with showing_traceback(traceback), unfinished, ProgressBars() as progress:
         trace = print_traceback if traceback else None
         verdicts, fresh = check_gate(progress.watch, scenario, engine, baselines, configure_engine, trace, hold_cpu)
@@ -80,12 +80,12 @@ def check_command(
             write_text(path, page(verdicts))
     written = []
     if update:
-        # An engine that is not installed any more leaves the baselines; one that broke must not.
-        there = installed_engines()
+        # Engines that are no longer installed are removed from the baselines; engines that failed must not be.
+        installed = installed_engines()
         absent = [
             verdict
             for _, verdict in verdicts
-            if verdict.engine in there and verdict.quantity == "run" and verdict.reason.startswith("did not")
+            if verdict.engine in installed and verdict.quantity == "run" and verdict.reason.startswith("did not")
         ]
         if absent:
             raise ScenarioError(f"no baseline written: {absent[0].engine} {absent[0].reason}")
@@ -107,10 +107,10 @@ def check_command(
 
 
 @contextmanager
-def _unfinished(pages: Mapping[Path | None, str]) -> Iterator[None]:
-    """Let files say that the check is not finished, until it is: one whose process ends leaves none that look whole.
+def _mark_unfinished(pages: Mapping[Path | None, str]) -> Iterator[None]:
+    """Write files that state that the check is not finished, so that a process that ends early leaves no stale ones.
 
-    Bad input leaves no file.
+    If the input is bad, the files are removed.
     """
     from ..files import write_text
 
@@ -126,7 +126,7 @@ def _unfinished(pages: Mapping[Path | None, str]) -> Iterator[None]:
 
 
 def _check_path(option: str, path: Path) -> None:
-    """Refuse a file that cannot be written where it is to be."""
+    """Raise a ScenarioError if a file cannot be written."""
     if path.is_dir():
         raise ScenarioError(f"{option} {path}: it is a folder; name a file")
     if not path.parent.is_dir():

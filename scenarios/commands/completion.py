@@ -1,6 +1,6 @@
-"""What the shell completes: names of scenarios and engines, and files.
+"""Shell completion of scenarios, engines and paths.
 
-It runs at every press of the tab key, so nothing here loads an engine, a kernel or a schema.
+This code runs at every press of the tab key, so it loads no engine, kernel or schema.
 """
 
 from __future__ import annotations
@@ -12,37 +12,40 @@ from ..names import announced_names, list_library
 
 
 def complete_scenario(incomplete: str) -> list[str]:
-    """Names of the library's scenarios, and paths to TOML files and folders on the way to them."""
-    return [*_beginning(list_library(), incomplete), *_paths(incomplete, ".toml")]
+    """Complete names of the library's scenarios, and paths to TOML files and folders."""
+    return [*_filter_names(list_library(), incomplete), *_list_paths(incomplete, ".toml")]
 
 
 def complete_engine(incomplete: str) -> list[str]:
-    """Names of engines that are announced."""
-    return _beginning(announced_names(), incomplete)
+    """Complete names of announced engines."""
+    return _filter_names(announced_names(), incomplete)
 
 
 def complete_shown(incomplete: str) -> list[str]:
-    """Whatever `velodrome show` knows."""
-    others = _beginning([*announced_names(), "bicycle", "scenario", "sweep"], incomplete)
+    """Complete the names that `velodrome show` accepts."""
+    others = _filter_names([*announced_names(), "bicycle", "scenario", "sweep"], incomplete)
     return [*complete_scenario(incomplete), *others]
 
 
 def complete_toml(incomplete: str) -> list[str]:
-    """Paths to TOML files."""
-    return _paths(incomplete, ".toml")
+    """Complete paths to TOML files."""
+    return _list_paths(incomplete, ".toml")
 
 
 def complete_folder(incomplete: str) -> list[str]:
-    """Paths to folders."""
-    return _paths(incomplete, None)
+    """Complete paths to folders."""
+    return _list_paths(incomplete, None)
 
 
-def _beginning(names: list[str], incomplete: str) -> list[str]:
+def _filter_names(names: list[str], incomplete: str) -> list[str]:
     return [name for name in names if name.startswith(incomplete)]
 
 
-def _paths(incomplete: str, ending: str | None) -> list[str]:
-    """Folders, with a slash at their end, and files of an ending that begin as typed; hidden ones if asked for."""
+def _list_paths(incomplete: str, ending: str | None) -> list[str]:
+    """List folders, with a final slash, and files with a suffix, that begin with the typed text.
+
+    Hidden entries are listed only if the typed name begins with a dot.
+    """
     head, slash, tail = incomplete.rpartition("/")
     folder = Path(os.path.expanduser(head + slash or "."))
     found = []

@@ -1,4 +1,4 @@
-"""Circular motions: `circular`, `families`, `critical`, `atlas`."""
+"""The commands about circular motions: `circular`, `families`, `critical` and `atlas`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Options that commands share, and what their texts mean."""
+"""Options that several commands share, their parsers, and the output of results."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on s
 
 
 def parse_changes(change: list[str] | None, duration: float | None) -> dict[str, Any]:
-    """Fields that --set and --duration override."""
+    """Return the fields that --set and --duration override, by dotted key."""
     changes, faults = {}, []
     for text in change or []:
         try:
-            key, value = _assignment(text)
+            key, value = _parse_assignment(text)
             changes[key] = value
         except ScenarioError as error:
             faults.append(str(error))
@@ -56,7 +56,7 @@ def parse_changes(change: list[str] | None, duration: float | None) -> dict[str,
     return changes
 
 
-def _assignment(text: str) -> tuple[str, Any]:
+def _parse_assignment(text: str) -> tuple[str, Any]:
     """Split KEY=VALUE; the value is TOML, or a plain word."""
     from ..scenario import read_toml, show_value
 
@@ -70,12 +70,12 @@ def _assignment(text: str) -> tuple[str, Any]:
         return key, value
     except ValueError as error:
         raise ScenarioError(f"--set {show_value(text)}: {error}") from None
-    # A second line would be a second statement.
+    # A line break would start a second TOML statement.
     return key, found["value"] if len(found) == 1 else value
 
 
 def parse_angles(text: str | None) -> tuple[float, float] | None:
-    """Lean and steer that ``--near`` gives [rad]."""
+    """Return the lean and the steer that ``--near`` gives [rad]."""
     if text is None:
         return None
     try:
@@ -90,7 +90,7 @@ def parse_angles(text: str | None) -> tuple[float, float] | None:
 
 
 def parse_ground(alpha: float | None, surface: str | None) -> Surface | float:
-    """What a motion rides on: one of --alpha and --surface."""
+    """Return the ground that exactly one of --alpha and --surface gives."""
     if (alpha is None) == (surface is None):
         raise ScenarioError("give the bowl by one of --alpha and --surface, e.g. --alpha 0.005")
     if surface is None:
@@ -102,7 +102,7 @@ def parse_ground(alpha: float | None, surface: str | None) -> Surface | float:
 
 
 def show_written(paths: Iterable[Path]) -> None:
-    """Say which files were written, a line each."""
+    """Print the paths of written files, one per line."""
     from rich.console import Console
 
     for path in paths:
@@ -110,7 +110,7 @@ def show_written(paths: Iterable[Path]) -> None:
 
 
 def print_json(document: Mapping[str, Any]) -> None:
-    """Print one JSON document with the version of its format, and nothing else."""
+    """Print one JSON document with its format version, and nothing else."""
     from ..files import versioned
 
     print(json.dumps(versioned(document), indent=1, allow_nan=False))
@@ -118,16 +118,16 @@ def print_json(document: Mapping[str, Any]) -> None:
 
 @contextmanager
 def ending_with(status: int) -> Iterator[None]:
-    """Show a command's result in the body, then end the command with its exit status.
+    """Run the body, which prints a command's result, and end the command with its exit status.
 
-    A reader of the output who has gone (``head``, ``less``) changes nothing about the status.
+    If the reader of the output (``head``, ``less``) has closed the pipe, the status is the same.
     """
     try:
         yield
-        if sys.stdout is not None:  # None where it was closed from the start
+        if sys.stdout is not None:  # None if it was closed when the process started
             sys.stdout.flush()
-    except (BrokenPipeError, SystemExit):  # the latter is what rich makes of the former
-        # Or the interpreter complains when it flushes at its end.
+    except (BrokenPipeError, SystemExit):  # rich turns the former into the latter
+        # Redirect stdout, since the interpreter reports an error if its final flush fails.
         if sys.stdout is not None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     if status:
@@ -135,17 +135,17 @@ def ending_with(status: int) -> Iterator[None]:
 
 
 def print_traceback(engine: str, error: Exception) -> None:
-    """Print the whole traceback of what an engine raised on stderr."""
+    """Print the traceback of an engine's exception on stderr."""
     print(f"{engine}:", file=sys.stderr)
     print_exception(error, file=sys.stderr)
 
 
 @contextmanager
-def showing_traceback(shown: bool) -> Iterator[None]:
-    """Let the cause of a `ScenarioError` be seen, such as an engine that cannot be loaded."""
+def showing_traceback(wanted: bool) -> Iterator[None]:
+    """Print the traceback of the cause of a `ScenarioError`, e.g. an engine that cannot be loaded, if requested."""
     try:
         yield
     except ScenarioError as error:
-        if shown and error.__cause__ is not None:
+        if wanted and error.__cause__ is not None:
             print_exception(error.__cause__, file=sys.stderr)
         raise

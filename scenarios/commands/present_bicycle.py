@@ -1,4 +1,4 @@
-"""What `velodrome bicycle` shows."""
+"""Terminal output of `velodrome bicycle`."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
     source = study.source
     console.print(f"{source.name} ({source.convention})", style="bold", markup=False, highlight=False)
     table = Table(box=None, show_header=False, pad_edge=False)
-    for one in fields(source.bicycle):
-        deviation = source.uncertainties.get(one.name)
-        value = f"{getattr(source.bicycle, one.name):.9g}"
+    for parameter in fields(source.bicycle):
+        deviation = source.uncertainties.get(parameter.name)
+        value = f"{getattr(source.bicycle, parameter.name):.9g}"
         # A file that states no deviation of a number has 0.
-        table.add_row(one.name, value, f"± {deviation:.2g}" if deviation else "")
+        table.add_row(parameter.name, value, f"± {deviation:.2g}" if deviation else "")
     console.print(table)
     for line in source.bicycle.warnings():
         console.print(line, style="yellow", markup=False, soft_wrap=True)
@@ -36,7 +36,7 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
             matrices.add_row(name if k == 0 else "", *(f"{value:.12g}" for value in row))
     console.print(matrices)
     console.print()
-    print_table(console, _eigenvalue_columns(study))
+    print_table(console, _make_eigenvalue_columns(study))
     console.print()
     for mode, speed in (("weave", study.weave_speed), ("capsize", study.capsize_speed)):
         deviation = study.deviations.get(mode)
@@ -48,8 +48,8 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
     console.print(f"stable speeds: {'; '.join(ranges) + ' m/s' if ranges else 'none'}", highlight=False)
 
 
-def _eigenvalue_columns(study: BicycleStudy) -> list[Column]:
-    """Return the speeds shown and a column for each mode with its eigenvalues there [1/s]."""
+def _make_eigenvalue_columns(study: BicycleStudy) -> list[Column]:
+    """Make a column of some of the speeds and one column per mode, with its eigenvalues there [1/s]."""
     last = len(study.speeds) - 1
     places = sorted({round(k * last / (_SHOWN_SPEEDS - 1)) for k in range(_SHOWN_SPEEDS)})
     columns = [Column("speed", [f"{study.speeds[k]:g}" for k in places])]
@@ -57,9 +57,21 @@ def _eigenvalue_columns(study: BicycleStudy) -> list[Column]:
         cells = []
         for k in places:
             values = [study.followed[k, c] for c, name in enumerate(study.modes) if name == mode]
-            oscillates = len(values) == 2 and abs(values[0].imag) > 1e-9 * abs(values[0])
-            shown = values[:1] if oscillates else values
-            sign = " ± " if oscillates else ""
-            cells.append(", ".join(f"{v.real:.4f}{f'{sign}{abs(v.imag):.4f} i' if oscillates else ''}" for v in shown))
+            if len(values) == 2 and _is_complex(values[0]):
+                cells.append(_format_eigenvalue(values[0], sign="±"))
+            else:
+                # Capsize and castering may be a pair as well: each then shows its half.
+                cells.append(", ".join(_format_eigenvalue(value) for value in values))
         columns.append(Column(mode, cells))
     return columns
+
+
+def _is_complex(value: complex) -> bool:
+    return abs(value.imag) > 1e-9 * abs(value)
+
+
+def _format_eigenvalue(value: complex, sign: str | None = None) -> str:
+    """Format an eigenvalue [1/s]; with a sign of its imaginary part if another than its own is to be shown."""
+    if not _is_complex(value):
+        return f"{value.real:.4f}"
+    return f"{value.real:.4f} {sign or ('+' if value.imag > 0 else '-')} {abs(value.imag):.4f} i"

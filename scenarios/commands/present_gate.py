@@ -1,4 +1,4 @@
-"""What `velodrome check` shows."""
+"""Terminal output of `velodrome check`."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ STATUS_STYLES = {
 
 
 def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed: bool = False) -> None:
-    """Print the gate's verdicts: a line an engine, then everything that does not hold in plain lines.
+    """Print the gate's verdicts: one row per engine, then a line for every verdict that needs attention.
 
-    Of baselines that are ``renewed`` at once there is nothing to pass or fail.
+    If the baselines are ``renewed`` by the same run, the gate neither holds nor fails, and no result is printed.
     """
     for name, group in groupby(verdicts, key=lambda item: item[0]):
         console.print(name, style="bold", markup=False)
         by_engine = groupby((verdict for _, verdict in group), key=lambda verdict: verdict.engine)
-        rows = [_engine_row(engine, list(judged)) for engine, judged in by_engine]
+        rows = [_format_engine_row(engine, list(judged)) for engine, judged in by_engine]
         engines, held, friction, cpu, moved = zip(*rows, strict=True)
         columns = [
             Column("engine", engines, right=False),
@@ -48,7 +48,7 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed
     console.print("the gate holds" if passes else "the gate fails", style="bold green" if passes else "bold red")
 
 
-def _engine_row(engine: str, verdicts: list[Verdict]) -> tuple[str, Text, str, str, str]:
+def _format_engine_row(engine: str, verdicts: list[Verdict]) -> tuple[str, Text, str, str, str]:
     held = sum(verdict.status == "holds" for verdict in verdicts)
     judged = sum(verdict.status != "shown" for verdict in verdicts)
     passes = all(verdict.passes for verdict in verdicts)

@@ -1,4 +1,4 @@
-"""What `velodrome circular`, `families`, `critical` and `atlas` show."""
+"""Terminal output of `velodrome circular`, `families`, `critical` and `atlas`."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ def show_circular(console: Console, found: dict[str, Any]) -> None:
     """Print a circular motion."""
     table = Table(box=None, show_header=False, pad_edge=False)
     if found["alpha"] is not None:
-        table.add_row("alpha", _shown(found["alpha"]), "1/m")
+        table.add_row("alpha", _format_value(found["alpha"]), "1/m")
     else:
         for name, value in found["surface"].items():
-            table.add_row("surface" if name == "kind" else name, _shown(value))
+            table.add_row("surface" if name == "kind" else name, _format_value(value))
+    table.add_row("family", "none of the benchmark's" if found["family"] is None else str(found["family"]))
     for name, unit in (
-        *(("family", ""), ("rear_rate", "rad/s"), ("front_rate", "rad/s"), ("yaw_rate", "rad/s")),
+        *(("rear_rate", "rad/s"), ("front_rate", "rad/s"), ("yaw_rate", "rad/s")),
         *(("lean", "rad"), ("steer", "rad"), ("pitch", "rad"), ("energy", "J"), ("residual", "")),
     ):
         table.add_row(name, f"{found[name]:.12g}", unit)
-    table.add_row("position", _numbers(found["position"]), "m, D in the heading frame")
+    table.add_row("position", _format_numbers(found["position"]), "m, D in the heading frame")
     for wheel in ("rear", "front"):
-        table.add_row(f"{wheel} contact", _numbers(found["contact_point"][wheel]), "m")
-        table.add_row(f"{wheel} force", _numbers(found["contact_force"][wheel]), "N, on the wheel")
+        table.add_row(f"{wheel} contact", _format_numbers(found["contact_point"][wheel]), "m")
+        table.add_row(f"{wheel} force", _format_numbers(found["contact_force"][wheel]), "N, on the wheel")
         table.add_row(f"{wheel} normal force", f"{found['normal_force'][wheel]:.9g}", "N")
     for i, (real, imaginary) in enumerate(found["eigenvalues"]):
         value = (
@@ -41,25 +42,25 @@ def show_circular(console: Console, found: dict[str, Any]) -> None:
     console.print(f"{stable}; {physical}")
 
 
-def _shown(value: Any) -> str:
+def _format_value(value: Any) -> str:
     return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
-def _numbers(values: list[float]) -> str:
+def _format_numbers(values: list[float]) -> str:
     return ", ".join(f"{value:.9g}" for value in values)
 
 
-def _number_columns(points: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> list[Column]:
+def _make_number_columns(points: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> list[Column]:
     """Return a column for each key, with nine decimals; a negative number that rounds to zero has no sign."""
     return [Column(key.replace("_", " "), [f"{point[key]:z.9f}" for point in points]) for key in keys]
 
 
 def show_families(console: Console, document: Mapping[str, Any]) -> None:
-    """Print the families: where each runs, its special points, its stable sections."""
+    """Print the families: the ends, special points and stable sections of each."""
     for family in document["families"]:
         points = family["points"]
         console.print(
-            f"family {family['family']}: {len(points['lean'])} points, from {family['ends'][0]} to {family['ends'][1]}",
+            f"{_curve_name(family)}: {len(points['lean'])} points, from {family['ends'][0]} to {family['ends'][1]}",
             style="bold",
             markup=False,
             highlight=False,
@@ -70,7 +71,7 @@ def show_families(console: Console, document: Mapping[str, Any]) -> None:
                 Column("", list(specials), right=False),
                 Column("kind", [point["kind"] for point in specials.values()], right=False),
             ]
-            columns += _number_columns(list(specials.values()), ("rear_rate", "front_rate", "lean", "steer"))
+            columns += _make_number_columns(list(specials.values()), ("rear_rate", "front_rate", "lean", "steer"))
             print_table(console, columns)
         for section in family["stable_sections"]:
             rates, causes = section["rear_rate"], section["cause"]
@@ -78,6 +79,14 @@ def show_families(console: Console, document: Mapping[str, Any]) -> None:
             console.print(f"Lyapunov stable: rear rate {line}", style="green", markup=False, highlight=False)
     for number, reason in document["absent"].items():
         console.print(f"family {number}: no curve: {reason}", style="yellow", markup=False, soft_wrap=True)
+
+
+def _curve_name(family: Mapping[str, Any]) -> str:
+    """Name a curve by the families on it."""
+    if family["family"] is None:
+        return "no family of the benchmark's"
+    numbers = [family["family"], *family["joined_families"]]
+    return f"famil{'ies' if len(numbers) > 1 else 'y'} {', '.join(map(str, numbers))}"
 
 
 def show_critical(console: Console, document: Mapping[str, Any]) -> None:
@@ -90,7 +99,7 @@ def show_critical(console: Console, document: Mapping[str, Any]) -> None:
         Column("families", families, right=False),
         Column("what happens", what, right=False),
         Column("alpha", [f"{point['alpha']:.11f}" for point in points]),
-        *_number_columns(points, ("rear_rate", "lean", "steer")),
+        *_make_number_columns(points, ("rear_rate", "lean", "steer")),
     ]
     print_table(console, columns, keys=2)
     for number, point in document["last_stable"].items():
@@ -99,7 +108,7 @@ def show_critical(console: Console, document: Mapping[str, Any]) -> None:
 
 
 def show_atlas(console: Console, document: Mapping[str, Any], out: Path) -> None:
-    """Print the stable regions of the atlas, and where it is."""
+    """Print the stable regions of the atlas and the path of its folder."""
     regions = document["stable"]
     ends = [region["vanishing"] for region in regions]
     columns = [

@@ -1,4 +1,4 @@
-"""What `velodrome precision` shows."""
+"""Terminal output of `velodrome precision`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _COLUMNS = (
 
 
 def show_precision(console: Console, document: Mapping[str, Any]) -> None:
-    """Print a work-precision study: a table an engine."""
+    """Print a work-precision study: one table per engine."""
     limit = "" if document["horizon"] is None else "; beyond, the motion's own instability leaves nothing to compare"
     title = f"{document['scenario']}: errors over {compared_time(document):.4g} s{limit}"
     console.print(title, style="bold", markup=False, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""What `velodrome run` shows."""
+"""Terminal output of `velodrome run`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def show_outcome(console: Console, plan: RunPlan, outcome: RunOutcome) -> None:
-    """Print the table of a run and where its folder is."""
+    """Print the table of a run and the path of its folder."""
     duration = plan.scenario.simulation.duration
     console.print()
     console.print(f"{plan.name}: {plan.scenario.title}, {duration:g} s", style="bold", markup=False)
@@ -45,7 +45,7 @@ def show_outcome(console: Console, plan: RunPlan, outcome: RunOutcome) -> None:
 
 
 def outcome_json(plan: RunPlan, outcome: RunOutcome) -> dict[str, Any]:
-    """JSON of one run."""
+    """Return the JSON document of one run."""
     return {
         "scenario": plan.name,
         "folder": str(outcome.folder),

@@ -1,4 +1,4 @@
-"""What `velodrome show` shows: a line a name, with what it means below; nothing depends on the terminal's width."""
+"""Terminal output of `velodrome show`: one line per name, with its description below."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from rich.console import Console
 from rich.text import Text
 
-_LONGEST = 6  # numbers of a list that are shown; --json has all
+_LONGEST = 6  # items of a list that are printed; --json has all
 
 
 def show_document(console: Console, document: Mapping[str, Any]) -> None:
@@ -27,38 +27,38 @@ def show_document(console: Console, document: Mapping[str, Any]) -> None:
 
 
 def _show_engine(console: Console, document: Mapping[str, Any]) -> None:
-    _line(console, f"{document['name']} {document['version']}", "bold")
-    _below(console, document["description"], indent=0)
+    _print_line(console, f"{document['name']} {document['version']}", "bold")
+    _print_below(console, document["description"], indent=0)
     if document["package"] is not None:
-        _below(console, f"announced by the package {document['package']}", indent=0)
+        _print_below(console, f"announced by the package {document['package']}", indent=0)
     gives = ", ".join(document["gives"]) or "nothing"
-    _below(console, f"gives, beside coordinates and poses: {gives}", indent=0)
+    _print_below(console, f"gives, beside coordinates and poses: {gives}", indent=0)
     console.print()
-    _line(console, f"[engines.{document['name']}]", "bold")
+    _print_line(console, f"[engines.{document['name']}]", "bold")
     _show_fields(console, document["settings"])
 
 
 def _show_bicycle(console: Console, document: Mapping[str, Any]) -> None:
-    _line(console, f"{document['name']} bicycle", "bold")
-    _below(console, document["description"], indent=0)
+    _print_line(console, f"{document['name']} bicycle", "bold")
+    _print_below(console, document["description"], indent=0)
     console.print()
-    _line(console, "[bicycle]", "bold")
+    _print_line(console, "[bicycle]", "bold")
     for name, value in document["parameters"].items():
-        _line(console, f"{name} = {_value(value)} {document['units'][name]}")
-        _below(console, document["descriptions"][name])
+        _print_line(console, f"{name} = {_format_value(value)} {document['units'][name]}")
+        _print_below(console, document["descriptions"][name])
 
 
 def _show_file(console: Console, document: Mapping[str, Any]) -> None:
-    _line(console, f"what a {document['name']} file may hold", "bold")
+    _print_line(console, f"what a {document['name']} file may hold", "bold")
     for table in document["tables"]:
         if not table["fields"] and table["table"]:
             continue
         console.print()
         if table["table"]:
-            _line(console, f"[{table['table']}]", "bold")
-        _below(console, table["description"], indent=0)
+            _print_line(console, f"[{table['table']}]", "bold")
+        _print_below(console, table["description"], indent=0)
         if table["kind"] is not None:
-            _line(console, f"kind = {_value(table['kind'])}")
+            _print_line(console, f"kind = {_format_value(table['kind'])}")
         others = {key: field for key, field in table["fields"].items() if key != "kind" or table["kind"] is None}
         _show_fields(console, others)
 
@@ -71,17 +71,17 @@ def _show_fields(console: Console, fields: Mapping[str, Mapping[str, Any]]) -> N
         elif field["default"] is None:
             first = f"{name}{unit and f' in{unit}'}, not set by default"
         else:
-            first = f"{name} = {_value(field['default'])}{unit}"
-        _line(console, first)
-        _below(console, field["range"])
-        _below(console, field["description"])
+            first = f"{name} = {_format_value(field['default'])}{unit}"
+        _print_line(console, first)
+        _print_below(console, field["range"])
+        _print_below(console, field["description"])
 
 
 def _show_scenario(console: Console, document: Mapping[str, Any]) -> None:
-    _line(console, document["name"], "bold")
-    _below(console, document["title"], indent=0)
+    _print_line(console, document["name"], "bold")
+    _print_below(console, document["title"], indent=0)
     if document["tags"]:
-        _below(console, f"tags: {', '.join(document['tags'])}", indent=0)
+        _print_below(console, f"tags: {', '.join(document['tags'])}", indent=0)
     for name, value in document.items():
         if isinstance(value, Mapping):
             _show_table(console, name, value, document.get("units", {}))
@@ -92,29 +92,29 @@ def _show_table(console: Console, name: str, table: Mapping[str, Any], units: Ma
     plain = {key: value for key, value in table.items() if not isinstance(value, Mapping)}
     if plain:
         console.print()
-        _line(console, f"[{name}]", "bold")
+        _print_line(console, f"[{name}]", "bold")
     for key, value in plain.items():
         unit = units.get(f"{name}.{key}", "")
-        _line(console, f"{key} = {_value(value)} {unit}".rstrip())
+        _print_line(console, f"{key} = {_format_value(value)} {unit}".rstrip())
     for key, value in table.items():
         if isinstance(value, Mapping):
             _show_table(console, f"{name}.{key}", value, units)
 
 
-def _value(value: Any) -> str:
-    """A JSON value as TOML has it; a long list by its beginning."""
+def _format_value(value: Any) -> str:
+    """Format a JSON value as in TOML; of a long list, only the beginning."""
     if isinstance(value, list):
-        shown = ", ".join(_value(item) for item in value[:_LONGEST])
+        shown = ", ".join(_format_value(item) for item in value[:_LONGEST])
         return f"[{shown}]" if len(value) <= _LONGEST else f"[{shown}, ... {len(value)} in all]"
     return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
 
 
-def _line(console: Console, line: str, style: str = "") -> None:
-    """Print a line that no width may tear."""
+def _print_line(console: Console, line: str, style: str = "") -> None:
+    """Print a line without wrapping."""
     console.print(Text(line, style), soft_wrap=True)
 
 
-def _below(console: Console, words: str, indent: int = 4) -> None:
-    """Print words below a name, as wide as the terminal is."""
+def _print_below(console: Console, words: str, indent: int = 4) -> None:
+    """Print text below a name, wrapped to the width of the terminal."""
     for line in wrap(words, max(console.width - indent, 20), break_long_words=False, break_on_hyphens=False):
         console.print(Text(" " * indent + line, "dim" if indent else ""), soft_wrap=True)

@@ -1,4 +1,4 @@
-"""Progress of a command, shown on stderr."""
+"""Progress of a command on stderr."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rich.console import Console
 
 
 class ProgressBars:
-    """A bar an engine, on stderr; quiet where stderr is no terminal."""
+    """Progress bars on stderr, one per engine; nothing is shown if stderr is not a terminal."""
 
     def __init__(self) -> None:
         columns = (
@@ -29,24 +29,24 @@ class ProgressBars:
         return self
 
     def __exit__(self, *_: object) -> None:
-        # Bars that never started would still print an empty line.
+        # Stopping bars that were not started prints an empty line.
         if self._console.is_terminal:
             self._bars.stop()
 
     def watch(self, engine: str, time: float, duration: float) -> None:
-        """Show that an engine has reached a simulated time."""
+        """Show the simulated time that an engine has reached."""
         if engine not in self._tasks:
             self._tasks[engine] = self._bars.add_task(engine, total=duration)
         self._bars.update(self._tasks[engine], completed=time, total=duration)
 
     def note(self, line: str) -> None:
-        """Say a line without disturbing the bars."""
+        """Print a line above the bars."""
         self._console.print(line, soft_wrap=True, highlight=False, markup=False)
 
 
 @contextmanager
 def show_working(line: str) -> Iterator[None]:
-    """Show on a terminal's stderr that something is under way."""
+    """Show a line on stderr while the body runs, if stderr is a terminal."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield

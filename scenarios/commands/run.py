@@ -1,4 +1,4 @@
-"""What there is, and the main job: `list` and `run_plan`."""
+"""The commands `list` and `run`."""
 
 from __future__ import annotations
 
@@ -94,37 +94,37 @@ def run_command(
     from .present_run import outcome_json, show_outcome
     from .progress import ProgressBars, show_working
 
-    sources = [*(scenario or []), *(_tagged(tag) if tag is not None else [])]
+    sources = [*(scenario or []), *(_find_tagged(tag) if tag is not None else [])]
     if not sources:
         raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
     changes = parse_changes(change, duration)
-    installed_engines()  # an engine that two packages announce is no scenario's fault
+    installed_engines()  # raises here if two packages announce one engine, which is not a fault of a scenario
     with showing_traceback(traceback), show_working(STARTING):
-        plans = [_plan(source, changes, engine) for source in dict.fromkeys(sources)]
+        plans = [_plan_source(source, changes, engine) for source in dict.fromkeys(sources)]
     console = Console(stderr=as_json)
     outcomes = []
     for plan in plans:
         with ProgressBars() as progress:
             outcome = run_plan(plan, out, progress.watch, progress.note, print_traceback if traceback else None)
         outcomes.append((plan, outcome))
-        with ending_with(0):  # the next run does not depend on a reader of this one's table
+        with ending_with(0):  # the next run goes on if the reader of this table has closed the pipe
             show_outcome(console, plan, outcome)
         if outcome.interrupted:
             break
-    with ending_with(_status_of([outcome for _, outcome in outcomes])):
+    with ending_with(_exit_status([outcome for _, outcome in outcomes])):
         if as_json:
             print_json({"runs": [outcome_json(plan, outcome) for plan, outcome in outcomes]})
 
 
-def _status_of(outcomes: Sequence[RunOutcome]) -> int:
-    """Exit status: 130 after Ctrl-C, 1 if an engine did not run or a verdict falls short."""
+def _exit_status(outcomes: Sequence[RunOutcome]) -> int:
+    """Return the exit status: 130 after Ctrl-C, 1 if an engine did not run or a verdict does not hold, else 0."""
     if any(outcome.interrupted for outcome in outcomes):
         return 130
     holds = (not outcome.failures and all(verdict["holds"] for verdict in outcome.verdicts) for outcome in outcomes)
     return 0 if all(holds) else 1
 
 
-def _plan(source: str, changes: dict[str, Any], wanted: list[str] | None) -> RunPlan:
+def _plan_source(source: str, changes: dict[str, Any], wanted: list[str] | None) -> RunPlan:
     from ..run import plan_run
     from ..scenario import load_scenario
 
@@ -135,7 +135,7 @@ def _plan(source: str, changes: dict[str, Any], wanted: list[str] | None) -> Run
         raise ScenarioError(f"{source}: {error}") from error
 
 
-def _tagged(tag: str) -> list[str]:
+def _find_tagged(tag: str) -> list[str]:
     from ...engines.names import suggest_name
     from ..scenario import library_names, load_scenario
 

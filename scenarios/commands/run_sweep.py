@@ -1,4 +1,4 @@
-"""What `velodrome sweep` does between its options and its exit status."""
+"""Run a sweep with the options of `velodrome sweep`."""
 
 from __future__ import annotations
 
@@ -38,34 +38,34 @@ def run_sweep_command(
     as_json: bool,
     retry: Sequence[str] = (),
 ) -> int:
-    """Run a sweep file, or what is missing of it, and say what came of it.
+    """Run a sweep file, or its missing runs, and print a summary.
 
     Parameters
     ----------
     path : Path
         The sweep file.
     scheduler : str or None
-        Address of a Dask scheduler; processes of this machine if not given.
+        Address of a Dask scheduler; if None, processes of this machine are used.
     workers : int or None
-        Number of processes; one a core if not given.
+        Number of processes; one per core if None.
     out : Path or None
-        The sweep's folder; one of the file's name in `FOLDER` if not given.
+        The sweep's folder; if None, a folder in `FOLDER` with the name of the file.
     resume : bool
-        Whether to go on with a sweep in that folder.
+        Whether to continue a sweep in that folder.
     as_json : bool
-        Print the summary as JSON on stdout, the table on stderr.
+        Whether to print the summary as JSON on stdout and the table on stderr.
     retry : sequence of str
-        Statuses of rows that are to be done again; they go with ``resume``.
+        Statuses of rows that are run again; requires ``resume``.
 
     Returns
     -------
     int
-        Exit status: 0 if every run has its result, 1 if some broke or are missing, 130 after Ctrl-C.
+        Exit status: 0 if every run has a result, 1 if some failed or are missing, 130 after Ctrl-C.
 
     Raises
     ------
     ScenarioError
-        With one line.
+        If the options contradict each other, or the sweep cannot be run. The message is one line.
     """
     if scheduler is not None and workers is not None:
         raise ScenarioError("--workers goes without --scheduler: a cluster's workers are started with it")
@@ -80,7 +80,7 @@ def run_sweep_command(
         "checking every run of the sweep (the first time on a machine, kernels are compiled: half a minute)"
     ):
         plan = plan_sweep(path)
-    work = _work(scheduler, workers)
+    work = _choose_work(scheduler, workers)
     with SweepView(len(plan.tasks)) as view:
         outcome = run_sweep(plan, FOLDER / plan.name if out is None else out, work, resume, view.watch, retry)
     document = summarise_sweep(plan, outcome)
@@ -91,10 +91,10 @@ def run_sweep_command(
     return status_of(outcome)
 
 
-def _work(scheduler: str | None, workers: int | None) -> Work:
+def _choose_work(scheduler: str | None, workers: int | None) -> Work:
     if scheduler is None:
         return locally(workers or len(os.sched_getaffinity(0)))
-    # Dask takes half a second to load.
+    # Imported here, since loading Dask takes half a second.
     from ..sweep import on_cluster
 
     return on_cluster(scheduler)

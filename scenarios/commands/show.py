@@ -1,4 +1,4 @@
-"""What things hold: `velodrome show`."""
+"""The command `show`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stored runs: `diff_runs` and `view`."""
+"""The commands about stored runs: `diff` and `view`."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def diff_command(
     from ..run import installed_engines
     from .present_diff import show_diff
 
-    installed_engines()  # an engine that two packages announce is no fault of either run
+    installed_engines()  # raises here if two packages announce one engine, which is not a fault of the runs
     pair = read_pair(before, after, engine)
     found = diff_runs(pair)
     written = [] if out is None else write_diff(pair, found, out)

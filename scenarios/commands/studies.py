@@ -1,4 +1,4 @@
-"""What takes its time: `paper` and `study_precision`."""
+"""The commands `paper` and `precision`."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def paper_command(
     from .progress import ProgressBars
 
     if out is not None:
-        make_folder(out)  # before the work: half a minute of it would be for nothing
+        make_folder(out)  # first, so that half a minute of work is not lost if it fails
     with ProgressBars() as progress:
         lines = make_ledger(lambda part, done, parts: progress.watch(part, done, parts))
         written = [] if out is None else write_paper(out, lines, progress.watch)
@@ -83,7 +83,7 @@ def precision_command(
     changes = parse_changes(change, duration)
     name, loaded = load_scenario(scenario, changes)
     if out is not None:
-        make_folder(out)  # before the work
+        make_folder(out)  # first, so that no work is lost if it fails
     with showing_traceback(traceback), ProgressBars() as progress:
         trace = print_traceback if traceback else None
         document = study_precision(name, loaded, engine, levels, eigenvalues, progress.watch, trace)

@@ -1,4 +1,4 @@
-"""Many runs: `run_sweep_command`."""
+"""The command `sweep`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `velodrome --version` prints."""
+"""The output of `velodrome --version`."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from .options import ending_with
 def print_versions() -> None:
     """Print the versions of the suite, of the installed engines' packages and of the libraries.
 
-    They are read from the packages' metadata: no engine is loaded, and one that is broken does no harm.
+    They are read from the packages' metadata. No engine is loaded, so that broken engines cause no error.
 
     Raises
     ------
     ScenarioError
-        If two packages announce an engine of one name.
+        If two packages announce engines with the same name.
     """
     from ...engines.engine import packages
     from ..run import installed_engines, library_versions

@@ -1,4 +1,4 @@
-"""Circular motions, their families and their atlas as documents and files."""
+"""Documents and files of circular motions, their families and their atlas."""
 
 from .atlas import make_atlas
 from .circular import CircularSolution, solve_circular

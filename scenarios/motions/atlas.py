@@ -1,4 +1,4 @@
-"""The atlas of the benchmark bicycle as files: what `velodrome atlas` writes."""
+"""The files of the atlas of the benchmark bicycle, which `velodrome atlas` writes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..error import ScenarioError
 from ..files import make_folder, write_json
 from .families import critical_entry
 
-SMALLEST, LARGEST = 1000, 20_000_000  # motions; the largest takes 3 GB
+SMALLEST, LARGEST = 1000, 20_000_000  # number of motions; the largest atlas takes 3 GB
 UNITS = {
     "alpha": "1/m",
     "rear_rate": "rad/s",
@@ -31,7 +31,7 @@ UNITS = {
     "normal_force_front": "N",
     "growth_rate": "1/s",
 }
-_SEEN = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "radius", "energy", "growth_rate")
+_SAMPLED = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "radius", "energy", "growth_rate")
 
 
 def make_atlas(
@@ -42,9 +42,9 @@ def make_atlas(
     Parameters
     ----------
     out : Path
-        Made if need be.
+        The folder, which is made if it does not exist.
     size : int
-        Number of motions, roughly.
+        Approximate number of motions.
     largest : float
         Largest alpha [1/m].
     progress : callable
@@ -79,19 +79,19 @@ def make_atlas(
 
 
 def atlas_columns(found: Atlas) -> dict[str, np.ndarray]:
-    """All motions as columns of one length, by rising alpha, then family, then along the curve."""
+    """Return all motions as columns of one length, sorted by alpha, family and position along the curve."""
     counts = [len(curve.samples.lean) for curve in found.curves]
     columns = {
         "alpha": np.repeat([curve.alpha for curve in found.curves], counts),
         "family": np.repeat(np.array([curve.family for curve in found.curves], np.int8), counts),
         "index": np.concatenate([np.arange(count, dtype=np.int32) for count in counts]),
     }
-    seen = [curve.samples for curve in found.curves]
-    columns |= {name: np.concatenate([getattr(one, name) for one in seen]) for name in _SEEN}
-    normal = np.concatenate([one.normal_force for one in seen])
+    samples = [curve.samples for curve in found.curves]
+    columns |= {name: np.concatenate([getattr(curve, name) for curve in samples]) for name in _SAMPLED}
+    normal = np.concatenate([curve.normal_force for curve in samples])
     columns |= {"normal_force_rear": normal[:, 0], "normal_force_front": normal[:, 1]}
-    columns |= {name: np.concatenate([getattr(one, name) for one in seen]) for name in ("stable", "physical")}
-    eigenvalues = np.concatenate([one.eigenvalues for one in seen])
+    columns |= {name: np.concatenate([getattr(curve, name) for curve in samples]) for name in ("stable", "physical")}
+    eigenvalues = np.concatenate([curve.eigenvalues for curve in samples])
     for k in range(len(VARIABLES)):
         columns[f"eigenvalue_{k + 1}_re"] = np.real(eigenvalues[:, k])
         columns[f"eigenvalue_{k + 1}_im"] = np.imag(eigenvalues[:, k])
@@ -100,11 +100,11 @@ def atlas_columns(found: Atlas) -> dict[str, np.ndarray]:
 
 def write_atlas(columns: dict[str, np.ndarray], path: Path, facts: dict[str, Any]) -> None:
     """Write columns with their units as Parquet, whole or not at all."""
-    # pyarrow, which a circular motion does not need.
+    # Imported here, since other functions about circular motions do not need pyarrow.
     from ...engines.storage import write_columns
 
     units = {name: "1/s" if name.startswith("eigenvalue") else UNITS.get(name) for name in columns}
-    # Neighbours differ in their last bytes only: split, they compress to three quarters.
+    # Neighbouring values differ in their last bytes only; split by bytes, the columns compress to three quarters.
     repeated = ["alpha", "family"]
     split = [name for name, values in columns.items() if values.dtype == float and name not in repeated]
     write_columns(
@@ -118,27 +118,27 @@ def write_atlas(columns: dict[str, np.ndarray], path: Path, facts: dict[str, Any
 
 
 def atlas_document(found: Atlas) -> dict[str, Any]:
-    """Boundaries of the stable sections, critical points and what is absent."""
+    """Return the document of the atlas: boundaries of the stable sections, critical points and absent families."""
     return {
         "alphas": found.alphas.tolist(),
         "motions": found.size,
-        "stable": [_boundary(boundary) for boundary in found.boundaries],
+        "stable": [_describe_boundary(boundary) for boundary in found.boundaries],
         "touching": [{"families": list(point.families)} | critical_entry(point) for point in found.reconnections],
         "absent": [asdict(absence) for absence in found.absent],
     }
 
 
-def _boundary(boundary: Boundary) -> dict[str, Any]:
+def _describe_boundary(boundary: Boundary) -> dict[str, Any]:
     sides = zip(("start", "end"), zip(*boundary.ends, strict=True), strict=True)
     return {
         "family": boundary.family,
         "alpha": boundary.alpha,
-        **{name: dict(_side(list(ends))) for name, ends in sides},
+        **{name: dict(_describe_side(list(ends))) for name, ends in sides},
         "vanishing": None if boundary.vanishing is None else critical_entry(boundary.vanishing),
     }
 
 
-def _side(ends: list[Any]) -> Iterator[tuple[str, list[Any]]]:
+def _describe_side(ends: list[Any]) -> Iterator[tuple[str, list[Any]]]:
     for name in ("rear_rate", "front_rate", "lean", "steer"):
         yield name, [getattr(end.motion, name) for end in ends]
     yield "cause", [end.cause for end in ends]

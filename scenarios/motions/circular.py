@@ -20,7 +20,7 @@ from ..scenario import name_surface
 
 @dataclass(frozen=True)
 class CircularSolution:
-    """A circular motion and what follows from it.
+    """A circular motion with its contacts, energy and stability.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class CircularSolution:
     surface : SurfaceOfRevolution
         The ground.
     family : int or None
-        1 to 4; None on a curve that has no number.
+        Number of the family, 1 to 4; None for a curve without a number.
     contact_point : numpy.ndarray, shape (2, 3)
         Contact points of the rear and the front wheel in the heading frame [m].
     normal_force : numpy.ndarray, shape (2,)
@@ -37,7 +37,7 @@ class CircularSolution:
     energy : float
         Kinetic and potential energy, with the datum z = 0 [J].
     eigenvalues : numpy.ndarray, shape (7,)
-        Of the reduced linear system, sorted by real part, then imaginary part [1/s].
+        Eigenvalues of the reduced linear system, sorted by real part, then imaginary part [1/s].
     jacobian : numpy.ndarray, shape (7, 7)
         Matrix of the reduced linear system (Eq. 17), variables in the order of `reference.stability.VARIABLES`.
     growth_rate : float
@@ -73,9 +73,9 @@ class CircularSolution:
             "family": self.family,
             **{name: getattr(motion, name) for name in names},
             "position": motion.position.tolist(),
-            "contact_point": _by_wheel(self.contact_point),
-            "contact_force": _by_wheel(motion.force),
-            "normal_force": _by_wheel(self.normal_force),
+            "contact_point": _split_by_wheel(self.contact_point),
+            "contact_force": _split_by_wheel(motion.force),
+            "normal_force": _split_by_wheel(self.normal_force),
             "energy": self.energy,
             "residual": motion.residual,
             "eigenvalues": [[value.real, value.imag] for value in self.eigenvalues.tolist()],
@@ -102,7 +102,8 @@ def solve_circular(
     rear_rate : float
         Rate of the rear wheel, positive [rad/s].
     family : int, optional
-        1 to 4. Either this or ``near`` is needed; both where a family has several motions at this rate.
+        Number of the family, 1 to 4. Either this or ``near`` is needed; both if the family has several motions at this
+        rate.
     near : tuple of float, optional
         Lean and steer that the motion is near to [rad].
 
@@ -121,19 +122,19 @@ def solve_circular(
         reduced = linearise(bicycle, surface, q, qd)
     except ValueError as error:
         raise ScenarioError(str(error)) from error
-    seen = observe(bicycle, surface, q[None], qd[None])
+    contact = observe(bicycle, surface, q[None], qd[None])
     return CircularSolution(
         motion=motion,
         surface=surface,
         family=number,
-        contact_point=seen.point[0],
-        normal_force=np.einsum("wi,wi->w", motion.force, seen.normal[0]),
-        energy=float(seen.kinetic_energy[0] + seen.potential_energy[0]),
+        contact_point=contact.point[0],
+        normal_force=np.einsum("wi,wi->w", motion.force, contact.normal[0]),
+        energy=float(contact.kinetic_energy[0] + contact.potential_energy[0]),
         eigenvalues=reduced.eigenvalues,
         jacobian=reduced.jacobian,
         growth_rate=growth_rate(surface, reduced.eigenvalues, float(qd[YAW])),
     )
 
 
-def _by_wheel(pair: np.ndarray) -> dict[str, Any]:
+def _split_by_wheel(pair: np.ndarray) -> dict[str, Any]:
     return dict(zip(("rear", "front"), pair.tolist(), strict=True))

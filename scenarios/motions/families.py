@@ -1,4 +1,4 @@
-"""Solution families of the benchmark bicycle as data: what `velodrome families` gives."""
+"""Solution families of circular motions and critical shapes of the bowl, with their documents."""
 
 from __future__ import annotations
 
@@ -21,32 +21,34 @@ from ...reference.surface import Surface, SurfaceOfRevolution
 from ..files import make_folder, write_json
 from ..scenario import make_bowl, name_surface
 
-LONGEST_DRAWN_STEP = 0.05  # of the arc: some 100 to 300 points a family, no stable section known is shorter than three
+# Longest step along the arc: 100 to 300 points per family. No known stable section is shorter than three steps.
+LONGEST_DRAWN_STEP = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
 class FamilyCurve:
-    """A curve of circular motions that holds a solution family or a part of one.
+    """A curve of circular motions that contains a solution family or a part of one.
 
     Attributes
     ----------
-    number : int
-        Of the family, 1 to 4.
+    numbers : tuple of int
+        Numbers of the families on the curve, 1 to 4: several if families have joined, none if the curve is not
+        connected with the benchmark bicycle's families.
     ends : tuple of str
-        What the curve ends in, see `velodrome.reference.families.Family`.
+        Kinds of the curve's two ends, see `velodrome.reference.families.Family`.
     samples : Samples
         Rates, angles, energy, normal forces and growth rates of the n motions along the curve.
     modes : ndarray, shape (n, 7), complex
         Eigenvalues along the curve, each column following one mode [1/s].
     rims_clear : ndarray of bool, shape (n,)
-        Whether the wheels touch the ground at their contact points alone.
+        Whether the wheels touch the ground only at their contact points.
     stable_sections : tuple of pairs of SectionEnd
-        Where the motions are Lyapunov stable.
+        Ends of the sections in which the motions are Lyapunov stable.
     special_points : tuple of SpecialPoint
-        Points that the paper gives letters, folds, cusps and extremes of the energy.
+        Points with a letter in the paper, folds, cusps and extremes of the energy.
     """
 
-    number: int
+    numbers: tuple[int, ...]
     ends: tuple[str, str]
     samples: Samples = field(repr=False)
     modes: np.ndarray = field(repr=False)
@@ -54,13 +56,19 @@ class FamilyCurve:
     stable_sections: tuple[tuple[SectionEnd, SectionEnd], ...] = field(repr=False)
     special_points: tuple[SpecialPoint, ...] = field(repr=False)
 
+    @property
+    def number(self) -> int | None:
+        """Smallest number of the families on the curve; None if it has no number."""
+        return self.numbers[0] if self.numbers else None
+
     def as_json(self) -> dict[str, Any]:
         """Return this curve's part of the document of `velodrome families`."""
         return {
             "family": self.number,
+            "joined_families": list(self.numbers[1:]),
             "ends": list(self.ends),
-            "points": self._points(),
-            "stable_sections": [_section(*ends) for ends in self.stable_sections],
+            "points": self._list_points(),
+            "stable_sections": [_describe_section(*ends) for ends in self.stable_sections],
             "special_points": {
                 point.name: {
                     "rear_rate": point.rear_rate,
@@ -73,17 +81,17 @@ class FamilyCurve:
             },
         }
 
-    def _points(self) -> dict[str, list[Any]]:
-        """Quantities along the curve, equal-length lists."""
-        seen = self.samples
+    def _list_points(self) -> dict[str, list[Any]]:
+        """Return the quantities along the curve as lists of equal length."""
+        samples = self.samples
         names = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "radius", "energy")
         return {
-            **{name: getattr(seen, name).tolist() for name in names},
-            "lyapunov_stable": seen.stable.tolist(),
+            **{name: getattr(samples, name).tolist() for name in names},
+            "lyapunov_stable": samples.stable.tolist(),
             "rims_clear": self.rims_clear.tolist(),
-            "growth_rate": seen.growth_rate.tolist(),
-            "normal_force_rear": seen.normal_force[:, 0].tolist(),
-            "normal_force_front": seen.normal_force[:, 1].tolist(),
+            "growth_rate": samples.growth_rate.tolist(),
+            "normal_force_rear": samples.normal_force[:, 0].tolist(),
+            "normal_force_front": samples.normal_force[:, 1].tolist(),
             "eigenvalues": np.stack([np.real(self.modes), np.imag(self.modes)], axis=-1).tolist(),
         }
 
@@ -96,9 +104,9 @@ class SolutionFamilies:
     ----------
     surface : SurfaceOfRevolution
     curves : tuple of FamilyCurve
-        The families by number, then further curves under the number of the family that each was a part of.
+        The families by number, then further curves, each with the number of the family that it was a part of.
     absent : dict
-        Number of a family that has no curve on this ground to the reason.
+        Reasons by number, for families that have no curve on this ground.
     """
 
     surface: SurfaceOfRevolution
@@ -109,7 +117,7 @@ class SolutionFamilies:
         """Return the JSON document of `velodrome families`."""
         return {
             **name_surface(self.surface),
-            "modes": list(MODES),  # what the columns of eigenvalues are
+            "modes": list(MODES),  # names of the columns of eigenvalues
             "families": [curve.as_json() for curve in self.curves],
             "absent": {str(number): reason for number, reason in self.absent.items()},
         }
@@ -122,12 +130,12 @@ class CriticalShapes:
     Attributes
     ----------
     cusp_collision : CriticalPoint or None
-        Where the cusps of families 2 and 4 meet; None if they do nowhere.
+        The point at which the cusps of families 2 and 4 meet; None if they do not meet.
     last_stable : dict
-        Number of a family to the `CriticalPoint` at which its last Lyapunov-stable section vanishes; None where there
-        is none.
+        By number of the family: the `CriticalPoint` at which its last Lyapunov-stable section vanishes, or None if it
+        has no stable section.
     merging : tuple of CriticalPoint
-        Where families exchange parts, with rising alpha.
+        The points at which families exchange parts, sorted by alpha.
     """
 
     cusp_collision: CriticalPoint | None
@@ -162,12 +170,12 @@ def follow_families(bicycle: Bicycle, surface: SurfaceOfRevolution) -> SolutionF
 def examine_curve(family: Family) -> FamilyCurve:
     """Sample a curve and find its stable sections and special points."""
     return FamilyCurve(
-        number=family.number,
+        numbers=family.numbers,
         ends=family.ends,
         samples=sample_family(family),
         modes=follow_modes(family),
         rims_clear=np.array([stands(family.equations, point.unknowns) for point in family.points]),
-        stable_sections=tuple(ends for ends in stable_sections(family) if _standing(family, ends)),
+        stable_sections=tuple(ends for ends in stable_sections(family) if _can_stand(family, ends)),
         special_points=tuple(special_points(family)),
     )
 
@@ -183,25 +191,25 @@ def families_document(ground: Surface | float) -> dict[str, Any]:
     Returns
     -------
     dict
-        The JSON document of `velodrome families`: the families by number, then further curves under the number
-        of the family that each was a part of; ``absent`` says why a family has no curve there.
+        The JSON document of `velodrome families`: the families by number, then further curves, each with the number of
+        the family that it was a part of; ``absent`` gives the reasons for families without a curve.
 
     Raises
     ------
     ScenarioError
-        If it is none.
+        If the ground is not a surface of revolution.
     """
     return follow_families(Bicycle(), make_bowl(ground)).as_json()
 
 
 def find_critical_shapes(bicycle: Bicycle, watch: Callable[[str, float, float], None]) -> CriticalShapes:
-    """Compute the critical alpha of a bicycle.
+    """Compute the critical values of alpha for a bicycle.
 
     Parameters
     ----------
     bicycle : Bicycle
     watch : callable
-        Called with what is looked for, the alpha reached and the largest.
+        Called with the name of the stage, the value reached and the largest value.
 
     Returns
     -------
@@ -217,7 +225,7 @@ def find_critical_shapes(bicycle: Bicycle, watch: Callable[[str, float, float], 
 
 
 def critical_entry(point: CriticalPoint) -> dict[str, Any]:
-    """A critical point as it stands in documents."""
+    """Return the entry of a critical point in documents."""
     motion = point.motion
     return {
         "alpha": point.alpha,
@@ -235,7 +243,7 @@ def _entry_or_null(point: CriticalPoint | None) -> dict[str, Any] | None:
 
 
 def write_families(document: Mapping[str, Any], out: Path) -> None:
-    """Write the document and its figure into a folder, which is made if need be.
+    """Write the document and its figure into a folder, which is made if it does not exist.
 
     Raises
     ------
@@ -249,16 +257,15 @@ def write_families(document: Mapping[str, Any], out: Path) -> None:
     family_figure(out / "families.png", document, Bicycle().front_wheel_radius)
 
 
-def _standing(family: Family, ends: tuple[SectionEnd, SectionEnd]) -> bool:
-    """Whether wheels can stand somewhere at the ends of a section."""
+def _can_stand(family: Family, ends: tuple[SectionEnd, SectionEnd]) -> bool:
+    """Return whether the wheels can stand on the ground at one of a section's ends at least."""
     where = family.equations.bicycle, family.equations.surface
     return any(motion_stands(*where, end.motion) for end in ends)
 
 
-def _section(start: SectionEnd, end: SectionEnd) -> dict[str, Any]:
-    both = (start, end)
+def _describe_section(*both: SectionEnd) -> dict[str, Any]:
     names = ("rear_rate", "lean", "steer")
-    return {name: [getattr(one.motion, name) for one in both] for name in names} | {
-        "cause": [one.cause for one in both],
-        "eigenvalue": [[one.eigenvalue.real, one.eigenvalue.imag] for one in both],
+    return {name: [getattr(end.motion, name) for end in both] for name in names} | {
+        "cause": [end.cause for end in both],
+        "eigenvalue": [[end.eigenvalue.real, end.eigenvalue.imag] for end in both],
     }

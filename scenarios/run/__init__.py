@@ -1,4 +1,4 @@
-"""A scenario in every engine: planned, run, measured, and stored as a run folder."""
+"""Runs of a scenario in every engine: planning, simulation, measurement and the run folder."""
 
 from ..scenario import configure_engine, installed_engines
 from .folder import RunPlan, library_versions, write_run_recording

@@ -1,4 +1,4 @@
-"""What a run leaves behind: a folder with its manifest, its recording and its page."""
+"""The run folder: its manifest, recording and report page."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ from .machine import describe_machine, find_commit
 LIBRARIES = ("velodrome", "numpy", "scipy", "numba", "exudyn", "mujoco", "rerun-sdk", "pyarrow", "jinja2")
 
 
-RUN_VERSION = 2  # of manifest.json and metrics.json; those of version 1 have no digest and no version
+# Format version of manifest.json and metrics.json; files of version 1 have neither a digest nor a version.
+RUN_VERSION = 2
 
 
 @dataclass(frozen=True)
 class RunPlan:
-    """A run that has been checked: everything bad input could break is behind it.
+    """A run whose scenario, engines and settings have been checked.
 
     Attributes
     ----------
@@ -33,9 +34,9 @@ class RunPlan:
     scenario : Scenario
     start : Start
     engines : dict
-        Name to (engine, its settings), the reference first.
+        Pairs of engine and settings by name, the reference first.
     left_out : dict
-        Engines that were not asked for by name and are not made for this problem, with the reason.
+        Reasons by engine, for engines that were not requested by name and do not support this problem.
     """
 
     name: str
@@ -46,7 +47,7 @@ class RunPlan:
 
 
 def new_folder(out: Path, name: str) -> Path:
-    """Make a fresh folder named after the scenario and the time; an older run is never touched."""
+    """Make a new folder named after the scenario and the time; existing folders are never changed."""
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S")
     for attempt in range(1, 1000):
         folder = out / (f"{name}-{stamp}" if attempt == 1 else f"{name}-{stamp}-{attempt}")
@@ -61,7 +62,7 @@ def new_folder(out: Path, name: str) -> Path:
 
 
 def resolve_plan(plan: RunPlan) -> Scenario:
-    """The scenario of a plan with nothing left open: all parameters, and all settings of engines that ride."""
+    """Return the scenario of a plan with all parameters and all settings of the engines that take part."""
     return resolve_scenario(plan.scenario, {name: settings for name, (_, settings) in plan.engines.items()})
 
 
@@ -73,19 +74,19 @@ def write_manifest(
     verdicts: Sequence[Mapping[str, Any]] = (),
     complete: bool = False,
 ) -> dict[str, Any]:
-    """Write what ran, with which versions, settings and start, and return it.
+    """Write the manifest of a run (engines, versions, settings, start) and return it.
 
     Parameters
     ----------
     folder : Path
-    plan : Plan
+    plan : RunPlan
     trajectories : mapping
-        Those that are done.
+        Finished trajectories by engine.
     failures : mapping
-        Reason by the name of an engine that gave no trajectory.
+        Reasons by engine, for engines that gave no trajectory.
     verdicts : sequence of mapping
     complete : bool
-        Whether every engine has had its turn.
+        Whether every engine has finished or failed.
     """
     start = plan.start
     engines: dict[str, Any] = {}
@@ -121,7 +122,7 @@ def write_manifest(
 
 
 def library_versions() -> dict[str, str]:
-    """Versions of the libraries that results depend on, of those installed, and of the engines' packages."""
+    """Return the versions of the installed libraries that results depend on, and of the engines' packages."""
     found = packages()
     for library in LIBRARIES:
         try:
@@ -139,10 +140,10 @@ def write_run_recording(
     failures: Mapping[str, str],
     verdicts: Sequence[Mapping[str, Any]],
 ) -> None:
-    """Write the recording of the rides as they are to be shown, where there are any."""
+    """Write the recording of the trajectories to show; without trajectories, write nothing."""
     if not shown:
         return
-    # rerun takes a second to load; only a run needs it.
+    # Imported here, since loading rerun takes a second and only runs need it.
     from ...reports.recording import write_recording
 
     problem = plan.start.problem
@@ -161,7 +162,7 @@ def write_page(
     measured: Mapping[str, Mapping[str, Any]],
     manifest: Mapping[str, Any],
 ) -> None:
-    """Write the report page of the rides as they are to be shown; see `velodrome.reports.page`."""
+    """Write the report page of the trajectories to show; see `velodrome.reports.page`."""
     from ...reports.page import make_page
 
     surface = plan.start.problem.surface

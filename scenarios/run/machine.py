@@ -1,4 +1,4 @@
-"""What a run ran on: the suite's commit, the processor, and the BLAS that numpy and scipy call."""
+"""Description of the machine and the software of a run: the suite's commit, the processor, and the BLAS libraries."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from typing import Any
 import numpy as np
 import scipy
 
-_PATIENCE = 10.0  # that git may take [s]
+_TIMEOUT = 10.0  # limit for a call of git [s]
 
 
 @cache
 def find_commit() -> dict[str, Any]:
-    """Return the git commit that the suite's code is of.
+    """Return the git commit of the suite's code.
 
     Returns
     -------
     dict
-        ``commit``: the full hash, or None where the code is not tracked by git, as that of an installed package.
+        ``commit``: the full hash, or None if git does not track the code, as in an installed package.
         ``modified``: whether tracked files differ from that commit; None without a commit.
     """
     own = Path(__file__).resolve()
-    # An installed package may lie in somebody else's repository, such as a virtual environment in a project.
-    if _git(own.parent, "ls-files", "--error-unmatch", own.name) is None:
+    # An installed package may lie within another repository, e.g. in a virtual environment of a project.
+    if _run_git(own.parent, "ls-files", "--error-unmatch", own.name) is None:
         return {"commit": None, "modified": None}
-    changes = _git(own.parent, "status", "--porcelain", "--untracked-files=no")
-    return {"commit": _git(own.parent, "rev-parse", "HEAD"), "modified": None if changes is None else bool(changes)}
+    changes = _run_git(own.parent, "status", "--porcelain", "--untracked-files=no")
+    return {"commit": _run_git(own.parent, "rev-parse", "HEAD"), "modified": None if changes is None else bool(changes)}
 
 
-def _git(folder: Path, *arguments: str) -> str | None:
-    """What git says in a folder; None where it fails or is not there."""
-    # A hook that calls us may name another repository.
+def _run_git(folder: Path, *arguments: str) -> str | None:
+    """Return the output of git in a folder, or None if git fails or is not installed."""
+    # A git hook that runs the suite may set these variables to another repository.
     elsewhere = ("GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE")
     environment = {key: value for key, value in os.environ.items() if key not in elsewhere}
     command = ["git", "-C", str(folder), "--no-optional-locks", *arguments]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, check=False, env=environment)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_TIMEOUT, check=False, env=environment)
     except (OSError, ValueError, subprocess.SubprocessError):
         return None
     return done.stdout.strip() if done.returncode == 0 else None
@@ -49,22 +49,22 @@ def _git(folder: Path, *arguments: str) -> str | None:
 
 @cache
 def describe_machine() -> dict[str, str]:
-    """Return the platform that results depend on, one text an entry; what is not known has none."""
+    """Return descriptions of the platform that results depend on; unknown entries are left out."""
     found = {
         "system": platform.platform(),
         "machine": platform.machine(),
-        "processor": _processor(),
+        "processor": _find_processor(),
         "python": platform.python_version(),
-        "blas_numpy": _built_with(np),
-        "blas_scipy": _built_with(scipy),
-        "blas_loaded": _loaded_blas(),
-        # Chooses OpenBLAS's kernels, and with them the last bits of results.
+        "blas_numpy": _describe_build_blas(np),
+        "blas_scipy": _describe_build_blas(scipy),
+        "blas_loaded": _describe_loaded_blas(),
+        # Selects OpenBLAS's kernels, which affect the last bits of results.
         "openblas_coretype": os.environ.get("OPENBLAS_CORETYPE"),
     }
     return {name: text for name, text in found.items() if text is not None}
 
 
-def _processor() -> str | None:
+def _find_processor() -> str | None:
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
@@ -73,8 +73,8 @@ def _processor() -> str | None:
     return next(iter(names), platform.processor()) or None
 
 
-def _built_with(library: ModuleType) -> str | None:
-    """Name, version and build of the BLAS that a library was built with."""
+def _describe_build_blas(library: ModuleType) -> str | None:
+    """Return the name, version and build of the BLAS that a library was built with, or None if unknown."""
     try:
         blas = library.show_config(mode="dicts")["Build Dependencies"]["blas"]
         parts = (blas.get("name"), blas.get("version"), blas.get("openblas configuration"))
@@ -83,8 +83,8 @@ def _built_with(library: ModuleType) -> str | None:
     return ", ".join(str(part) for part in parts if part) or None
 
 
-def _loaded_blas() -> str | None:
-    """BLAS libraries of this process with the kernels that they chose, where threadpoolctl is installed."""
+def _describe_loaded_blas() -> str | None:
+    """Return the BLAS libraries of this process with their kernels, or None if threadpoolctl is not installed."""
     try:
         from threadpoolctl import threadpool_info  # pyright: ignore[reportMissingImports]
     except ImportError:

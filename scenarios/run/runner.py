@@ -1,4 +1,4 @@
-"""Scenario to run folder: every engine from the same start, compared, recorded."""
+"""Runs of a scenario: every engine starts from the same state; results are compared and stored in a run folder."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ Trace = Callable[[str, Exception], None]
 
 @dataclass(frozen=True)
 class RunOutcome:
-    """What a run came to.
+    """Results of a run.
 
     Attributes
     ----------
     folder : Path
     metrics : dict
-        Per engine, as in ``metrics.json``.
+        Metrics by engine, as in ``metrics.json``.
     failures : dict
-        Engines that gave no trajectory, with the reason.
+        Reasons by engine, for engines that gave no trajectory.
     verdicts : list of dict
-        Per engine and criterion: ``engine, quantity, value, limit, holds``.
+        For each engine and criterion: ``engine, quantity, value, limit, holds``.
     interrupted : bool
     """
 
@@ -62,14 +62,14 @@ class RunOutcome:
 
 @dataclass(frozen=True)
 class Rides:
-    """What the engines of a plan gave.
+    """Trajectories and failures of the engines of a plan.
 
     Attributes
     ----------
     trajectories : dict
-        By engine, in the order in which they rode.
+        By engine, in the order in which the engines ran.
     failures : dict
-        Engines that gave no trajectory, with the reason.
+        Reasons by engine, for engines that gave no trajectory.
     interrupted : bool
     """
 
@@ -80,14 +80,15 @@ class Rides:
 
 @dataclass(frozen=True, kw_only=True)
 class RunResult:
-    """The rides of a plan, measured and judged.
+    """The trajectories of a plan with their metrics and verdicts.
 
     Attributes
     ----------
     trajectories : dict
-        By engine, as the engines gave them.
+        Trajectories by engine, as the engines gave them.
     shown : dict
-        The same as they are drawn: with poses and energies that follow from the coordinates, up to a fall.
+        Trajectories for plots and recordings: poses and energies follow from the coordinates, and samples after a fall
+        are left out.
     metrics, failures, verdicts, interrupted
         As in `RunOutcome`.
     """
@@ -108,16 +109,16 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
     name : str
     scenario : Scenario
     wanted : list of str, optional
-        Engines to run beside the reference; all that are installed and made for the problem if not given.
+        Engines to run in addition to the reference; by default all installed engines that support the problem.
 
     Raises
     ------
     ScenarioError
         If an engine is not installed, a setting is wrong, or the motion does not exist.
     """
-    there = installed_engines()
-    faults = [refuse_engine(engine, there) for engine in wanted or [] if engine not in there]
-    names = [engine for engine in there if engine == REFERENCE or not wanted or engine in wanted]
+    installed = installed_engines()
+    faults = [refuse_engine(engine, installed) for engine in wanted or [] if engine not in installed]
+    names = [engine for engine in installed if engine == REFERENCE or not wanted or engine in wanted]
     chosen: dict[str, tuple[Engine, Settings]] = {}
     cause: BaseException | None = None
     for engine in names:
@@ -131,14 +132,14 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
         raise ScenarioError(join_complaints(faults)) from cause
     start = make_start(scenario)
     left_out: dict[str, str] = {}
-    for engine, (library, settings) in chosen.items():
+    for engine, (loaded, settings) in chosen.items():
         try:
-            library.check(start.problem, settings)
+            loaded.check(start.problem, settings)
         except ValueError as error:
             if wanted or not isinstance(error, UnsuitableProblem):
                 raise ScenarioError(f"engines.{engine}: {error}") from error
             left_out[engine] = str(error)
-        except Exception as error:  # an engine may break here as well
+        except Exception as error:  # an engine's check may raise anything
             raise ScenarioError(f"engines.{engine}: its check failed: {why_failed(error)}") from error
     chosen = {engine: pair for engine, pair in chosen.items() if engine not in left_out}
     return RunPlan(name, scenario, start, chosen, left_out)
@@ -149,20 +150,20 @@ def run_plan(
 ) -> RunOutcome:
     """Run every engine of a plan and write the run folder.
 
-    Each engine's trajectory is written when it is done; Ctrl-C ends the engine at work and leaves the
-    finished ones compared and recorded.
+    Each engine's trajectory is written as soon as the engine has finished. Ctrl-C ends the running engine; the
+    finished engines are still compared and recorded.
 
     Parameters
     ----------
     plan : RunPlan
     out : Path
-        Folder that the run folder is made in.
+        Folder in which the run folder is made.
     watch : callable
-        Called with engine, time reached and duration.
+        Called with the engine, the simulated time reached and the duration [s].
     note : callable
-        Called with a line when something needs saying.
+        Called with a line of text for warnings and failures.
     trace : callable, optional
-        Called with an engine that broke and what it raised.
+        Called with the name of an engine that failed and its exception.
 
     Returns
     -------
@@ -175,7 +176,7 @@ def run_plan(
 def store_run(
     plan: RunPlan, out: Path, watch: RunWatch, note: Callable[[str], None], trace: Trace | None = None
 ) -> tuple[Path, RunResult]:
-    """Run every engine of a plan and write the run folder; return the folder and all that was computed.
+    """Run every engine of a plan and write the run folder; return the folder and all results.
 
     See `run_plan` for the parameters.
     """
@@ -189,13 +190,15 @@ def store_run(
         write_manifest(folder, plan, rides.trajectories, rides.failures)
 
     rides = ride_plan(plan, watch, note, trace, store)
-    with _deaf_to_interrupts():
+    with _block_interrupts():
         result = measure_run(plan, rides)
         write_sealed(folder / "metrics.json", result.metrics, RUN_VERSION)
         write_run_recording(folder, plan, result.shown, result.metrics, result.failures, result.verdicts)
         complete = not result.interrupted
-        found = write_manifest(folder, plan, result.trajectories, result.failures, result.verdicts, complete=complete)
-        write_page(folder, plan, result.shown, result.metrics, found)
+        manifest = write_manifest(
+            folder, plan, result.trajectories, result.failures, result.verdicts, complete=complete
+        )
+        write_page(folder, plan, result.shown, result.metrics, manifest)
     return folder, result
 
 
@@ -206,7 +209,7 @@ def ride_plan(
     trace: Trace | None = None,
     store: Callable[[str, Rides], None] | None = None,
 ) -> Rides:
-    """Ride every engine of a plan.
+    """Simulate the problem of a plan with every engine.
 
     Parameters
     ----------
@@ -214,12 +217,12 @@ def ride_plan(
     watch, note, trace : callable
         As `run_plan` takes them.
     store : callable, optional
-        Called with an engine's name and the rides so far when the engine is done or has failed.
+        Called after each engine with its name and the rides so far.
 
     Returns
     -------
     Rides
-        Of the engines that were done before Ctrl-C was pressed, if it was.
+        Rides of all engines, or of the engines that had finished when Ctrl-C was pressed.
     """
     rides = Rides({}, {})
     for line in plan.start.problem.bicycle.warnings():
@@ -229,7 +232,7 @@ def ride_plan(
         for name, (engine, settings) in plan.engines.items():
             try:
                 trajectory = ride_engine(engine, problem, settings, lambda t, name=name: watch(name, t, duration))
-            except Exception as error:  # whatever an engine raises must not cost the others' results
+            except Exception as error:  # an engine may raise anything; the other engines still run
                 rides.failures[name] = why_failed(error)
                 note(f"{name}: {rides.failures[name]}")
                 if trace is not None:
@@ -245,13 +248,13 @@ def ride_plan(
 
 
 def measure_run(plan: RunPlan, rides: Rides) -> RunResult:
-    """Measure and judge the rides of a plan."""
+    """Compute the metrics and verdicts of the rides of a plan."""
     where = (plan.start.problem.bicycle, plan.start.problem.surface)
-    followed = {name: evaluate_ride(one, *where) for name, one in rides.trajectories.items()}
+    followed = {name: evaluate_ride(trajectory, *where) for name, trajectory in rides.trajectories.items()}
     metrics = measure_rides(plan, rides.trajectories, followed)
     return RunResult(
         trajectories=rides.trajectories,
-        shown={name: cut_at_fall(one, *where) for name, one in followed.items()},
+        shown={name: cut_at_fall(trajectory, *where) for name, trajectory in followed.items()},
         metrics=metrics,
         failures=rides.failures,
         verdicts=judge_run(plan, metrics),
@@ -267,7 +270,7 @@ def measure_one(
     step_noise: float = ROUND_OFF,
     followed: Trajectory | None = None,
 ) -> dict[str, Any]:
-    """Metrics of a trajectory from a start, against a reference where there is one."""
+    """Compute the metrics of a trajectory; errors are relative to the reference trajectory if one is given."""
     return compute_metrics(
         trajectory,
         reference,
@@ -284,9 +287,9 @@ def measure_one(
 def measure_rides(
     plan: RunPlan, trajectories: Mapping[str, Trajectory], followed: Mapping[str, Trajectory]
 ) -> dict[str, dict[str, Any]]:
-    """Metrics of every trajectory against the reference's; without a reference, of each by itself.
+    """Compute the metrics of every trajectory, with errors relative to the reference's if it is among them.
 
-    ``followed`` are the trajectories as `velodrome.reports.measure.consistency.evaluate_ride` gives them.
+    ``followed`` holds the trajectories as `velodrome.reports.measure.consistency.evaluate_ride` returns them.
     """
     reference = followed.get(REFERENCE)
     return {
@@ -302,23 +305,26 @@ def measure_rides(
 
 
 def claimed_noise(engine: Engine, settings: Settings) -> float:
-    """Relative error that a step may add by an engine's own word; round-off where it has none that could be meant."""
+    """Return the step noise that an engine states, or round-off if the stated value is not usable."""
     try:
         value = float(engine.step_noise(settings))
-    except Exception:  # a plug-in may break in any way, and its ride is done
+    except Exception:  # an engine may raise anything; its finished ride is still measured
         return ROUND_OFF
     return value if np.isfinite(value) and value >= 0 else ROUND_OFF
 
 
 def judge_run(plan: RunPlan, measured: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Verdicts on the scenario's criterion, one an engine; an engine that cannot show it does not hold it."""
+    """Return the verdicts on the scenario's criterion, one per engine.
+
+    An engine whose value cannot be computed does not meet the criterion.
+    """
     if plan.scenario.criterion is None:
         return []
     limit = plan.scenario.criterion.energy_variation
     verdicts = []
     for name in plan.engines:
         value = measured.get(name, {}).get("energy_variation")
-        # A bicycle that fell, or a run that ended, has not done the manoeuvre.
+        # If the bicycle fell or the run ended early, the manoeuvre was not completed.
         done = name in measured and measured[name]["fell_at"] is None and measured[name]["ended"] is None
         holds = done and value is not None and value < limit
         verdicts.append(
@@ -328,8 +334,8 @@ def judge_run(plan: RunPlan, measured: Mapping[str, Mapping[str, Any]]) -> list[
 
 
 @contextmanager
-def _deaf_to_interrupts():
-    """Let no Ctrl-C tear the files of the finished engines; writing them takes a second."""
+def _block_interrupts():
+    """Ignore Ctrl-C in the body, so that the files of the finished engines are written completely (about a second)."""
     if threading.current_thread() is not threading.main_thread():
         yield  # signals reach the main thread only
         return

@@ -1,4 +1,4 @@
-"""What is read back of a run folder; a file that is missing or damaged makes one line."""
+"""Reading of run folders; a missing or damaged file raises an error with a one-line message."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from .folder import RUN_VERSION
 
 
 def find_part(folder: Path, name: str) -> Path:
-    """A file of a run folder, which must be there.
+    """Return the path of an existing file of a run folder.
 
     Raises
     ------
     ScenarioError
-        If it is not, or the name leads elsewhere.
+        If there is no such file, or the name is a path to another folder.
     """
     if Path(name).name != name:
         raise ScenarioError(f"{folder}: {show_value(repr(name))} is no name of a file in it")
@@ -36,14 +36,15 @@ def find_part(folder: Path, name: str) -> Path:
 
 
 def read_document(folder: Path, name: str) -> Mapping[str, Any]:
-    """A JSON object of a run folder, without its version and its digest.
+    """Read a JSON object of a run folder, without its version and its digest.
 
-    Folders of before there were versions have neither and are read as they stand.
+    Files of format version 1 have neither and are read without these checks.
 
     Raises
     ------
     ScenarioError
-        If it is missing, cannot be read, is something else, of a newer format, or was changed since it was written.
+        If the file is missing, cannot be read, is not a JSON object, has a newer format, or was changed since it was
+        written.
     """
     path = find_part(folder, name)
     try:
@@ -68,14 +69,14 @@ def read_document(folder: Path, name: str) -> Mapping[str, Any]:
 
 
 def read_json(path: Path) -> Any:
-    """A JSON document as `velodrome.scenarios.files.write_json` writes them.
+    """Read a JSON document as `velodrome.scenarios.files.write_json` writes it.
 
     Raises
     ------
     OSError
-        If it cannot be read.
+        If the file cannot be read.
     ValueError
-        If it is none: also where it has numbers or letters that JSON or UTF-8 have not.
+        If the file is not a JSON document; this includes NaN, infinity, and characters that UTF-8 cannot encode.
     """
 
     def refuse(constant: str) -> None:
@@ -83,7 +84,7 @@ def read_json(path: Path) -> Any:
 
     try:
         found = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
-        # Half of a pair of surrogates can be written in JSON, and nowhere else.
+        # JSON escapes can express unpaired surrogates, which UTF-8 cannot encode.
         json.dumps(found, ensure_ascii=False).encode("utf-8")
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
@@ -91,12 +92,12 @@ def read_json(path: Path) -> Any:
 
 
 def read_start_state(manifest: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates and rates at the start of a stored run, shapes (9,).
+    """Return the coordinates and rates at the start of a stored run, shapes (9,) each.
 
     Raises
     ------
     KeyError, TypeError, ValueError
-        If the manifest does not have them.
+        If the manifest does not contain them.
     """
     q, qd = (np.array(manifest["start"][key], float) for key in ("q", "qd"))
     if q.shape != (9,) or qd.shape != (9,):
@@ -105,14 +106,14 @@ def read_start_state(manifest: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarra
 
 
 def read_ride(folder: Path, manifest: Mapping[str, Any], metrics: Mapping[str, Any], engine: str) -> Trajectory:
-    """An engine's trajectory of a run folder, which must be the one that the other files tell of.
+    """Read an engine's trajectory of a run folder and check that it belongs to the manifest and the metrics.
 
     Raises
     ------
     ScenarioError
-        If it is missing, or of another engine or another run.
+        If the file is missing, or belongs to another engine or another run.
     ValueError
-        If it is no trajectory.
+        If the file is not a trajectory.
     """
     path = find_part(folder, f"{engine}.parquet")
     found = read_trajectory(path)
@@ -120,7 +121,7 @@ def read_ride(folder: Path, manifest: Mapping[str, Any], metrics: Mapping[str, A
     if found.engine != engine:
         raise ScenarioError(f"{path}: is a trajectory of {show_value(repr(found.engine))}")
     for name, entry in entries.items():
-        # No two runs take the same CPU time to the last digit.
+        # The CPU time differs between any two runs in its last digits.
         if (entry["cpu_time"], entry["steps"]) != (found.cpu_time, found.steps):
             raise ScenarioError(f"{path}: is of another run than {name}")
     return found

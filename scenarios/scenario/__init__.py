@@ -1,4 +1,4 @@
-"""Scenario files: their schema, the surfaces they can name, and the start they describe."""
+"""Scenario files: their schema, surfaces, engine settings and start."""
 
 from .bicycle_file import BicycleFile, read_bicycle_file
 from .engine_settings import configure_engine, installed_engines, list_engine_faults, refuse_engine

@@ -1,14 +1,14 @@
-"""Bicycle files: parameters of a bicycle in the field's own formats.
+"""Bicycle files: parameters of a bicycle in the formats that are common in the field.
 
-Three conventions are read, told apart by the names of the parameters:
+Three conventions are read and recognized by the names of the parameters:
 
 - Meijaard's symbols (``w``, ``c``, ``lam``, ``IBxz``, ...), axes x forward, y right and z down, as the package
   BicycleParameters writes them: text (``c = 0.0685+/-0.0017``) or YAML;
-- principal radii of gyration of frame, person and front frame (``kDaa``, ``alphaD``, ...), z down, Moore and Hubbard
-  (2019), also of BicycleParameters;
+- principal radii of gyration of frame, person and front frame (``kDaa``, ``alphaD``, ...), z down, as in Moore and
+  Hubbard (2019), also written by BicycleParameters;
 - the suite's names (``wheelbase``, ``rear_frame_Ixz``, ...), axes x forward, y left and z up: TOML, as in a scenario.
 
-The convention belongs to the file: heights and products of inertia are turned here and nowhere else.
+Heights and products of inertia are converted to the suite's axes here and nowhere else.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _SYMBOLS = {
     **{"rF": ("front_wheel_radius", 1), "mF": ("front_wheel_mass", 1)},
     **{"IFxx": ("front_wheel_Ixx", 1), "IFyy": ("front_wheel_Iyy", 1)},
 }
-# Symbols that follow from others in this model: files may hold them, with these values.
+# Symbols that follow from others in this model: files may contain them, with these values only.
 _IMPLIED = {
     **{name: lambda p: 0.0 for name in ("xR", "yR", "yB", "yH", "yF", "yD", "yP", "IRxz", "IFxz")},
     **{"xF": lambda p: p["w"], "zR": lambda p: -p["rR"], "zF": lambda p: -p["rF"]},
@@ -52,13 +52,13 @@ _PRINCIPAL = (
     *("alphaD", "alphaP", "alphaH", "kRaa", "kRyy", "kFaa", "kFyy"),
     *(f"k{body}{axis}" for body in "DPH" for axis in ("aa", "bb", "yy")),
 )
-# What such files hold beside the four bodies: a speed, the person's outline, and handlebar and fork, the parts of the
-# front frame.
+# Symbols in such files that are not used: a speed, the person's outline, and the handlebar and fork, the parts
+# of the front frame.
 _BESIDE = re.compile(r"v|[lw]P|[mxz][GS]|I[GS](xx|yy|zz|xz)")
 _GAIN = re.compile(r"kT(phi|del)_(phi|del)d?")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _VALUE = re.compile(rf"\(?\s*({_NUMBER})\s*(?:(?:\+/-|±)\s*({_NUMBER})\s*)?\)?(?:[eE]([-+]?\d+))?")
-# Printed digits: a value that must equal another may be rounded.
+# Relative difference allowed between values that must be equal: printed values may be rounded.
 _ROUNDED = 1e-4
 
 
@@ -69,12 +69,12 @@ class BicycleFile:
     Attributes
     ----------
     name : str
-        Of the file, without its ending.
+        Name of the file, without its suffix.
     bicycle : Bicycle
     uncertainties : dict
-        Name of a parameter, as in `Bicycle`, to its standard deviation, where the file has one.
+        Standard deviations by name of the parameter, as in `Bicycle`, if the file has them.
     convention : str
-        Which names and axes the file uses.
+        Names and axes that the file uses.
     ignored : tuple of str
         Names in the file that do not belong to the bicycle.
     """
@@ -92,7 +92,7 @@ def read_bicycle_file(path: Path) -> BicycleFile:
     Parameters
     ----------
     path : Path
-        ``.toml``, ``.yml`` or ``.yaml``; anything else is read as lines ``name = value``.
+        A ``.toml``, ``.yml`` or ``.yaml`` file; any other file is read as lines ``name = value``.
 
     Returns
     -------
@@ -101,33 +101,35 @@ def read_bicycle_file(path: Path) -> BicycleFile:
     Raises
     ------
     ScenarioError
-        If the file cannot be read, a parameter is missing, unknown or no number, or the numbers describe no bicycle.
+        If the file cannot be read, a parameter is missing, unknown or not a number, or the numbers describe no bicycle.
     """
-    shown = show_value(str(path))
+    shown_path = show_value(str(path))
     try:
         if not path.is_file():
-            raise ScenarioError(f"{shown}: there is no such file; give a bicycle file, e.g. one of BicycleParameters")
+            raise ScenarioError(
+                f"{shown_path}: there is no such file; give a bicycle file, e.g. one of BicycleParameters"
+            )
         text = path.read_text(encoding="utf-8-sig")
         entries, deviations = _read_entries(text, path.suffix.lower())
-        values, given = _split_deviations({name: _number(name, value) for name, value in entries.items()})
-        given |= {name: _number(name, value)[0] for name, value in deviations.items()}
+        values, given = _split_deviations({name: _parse_number(name, value) for name, value in entries.items()})
+        given |= {name: _parse_number(name, value)[0] for name, value in deviations.items()}
         convention, parameters, uncertainties, ignored = _interpret(values, given)
         return BicycleFile(path.stem, Bicycle(**parameters), uncertainties, convention, ignored)
     except ScenarioError:
         raise
     except (OSError, ValueError, RecursionError, YAMLError) as error:
-        raise ScenarioError(f"{shown}: {show_value(' '.join(str(error).split()))}") from error
+        raise ScenarioError(f"{shown_path}: {show_value(' '.join(str(error).split()))}") from error
 
 
 def _read_entries(text: str, suffix: str) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-    """Return the file's names with their values as written, and standard deviations given apart from them."""
+    """Return the values by name as written, and the standard deviations that have a table of their own."""
     if suffix == ".toml":
         document = read_toml(text)
         table = document.get("bicycle", {key: value for key, value in document.items() if key != "uncertainties"})
-        return _table("bicycle", table), _table("uncertainties", document.get("uncertainties", {}))
+        return _require_table("bicycle", table), _require_table("uncertainties", document.get("uncertainties", {}))
     if suffix in (".yml", ".yaml"):
-        content = _table("the file", safe_load(text))
-        return _table("values", content.get("values", content)), {}
+        content = _require_table("the file", safe_load(text))
+        return _require_table("values", content.get("values", content)), {}
     entries: dict[str, Any] = {}
     for number, line in enumerate(text.splitlines(), 1):
         written = line.partition("#")[0].strip()
@@ -142,13 +144,13 @@ def _read_entries(text: str, suffix: str) -> tuple[Mapping[str, Any], Mapping[st
     return entries, {}
 
 
-def _table(name: str, value: Any) -> Mapping[str, Any]:
+def _require_table(name: str, value: Any) -> Mapping[str, Any]:
     if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
         raise ValueError(f"{name} must be a table of names and numbers")
     return value
 
 
-def _number(name: str, value: Any) -> tuple[float, float | None]:
+def _parse_number(name: str, value: Any) -> tuple[float, float | None]:
     """Return a value and its standard deviation, if it has one."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         number, deviation = float(value), None
@@ -172,10 +174,13 @@ def _interpret(
     values: dict[str, float], deviations: dict[str, float]
 ) -> tuple[str, dict[str, float], dict[str, float], tuple[str, ...]]:
     """Return the convention, the suite's parameters, their deviations, and the names that were not used."""
-    own = {one.name for one in fields(Bicycle)}
+    own = {parameter.name for parameter in fields(Bicycle)}
     if own & set(values):
         _require_known(values, own, "the suite's names (wheelbase, trail, ...)")
         _require_known(deviations, own, "the suite's names (wheelbase, trail, ...)")
+        missing = [name for name in Bicycle.__dataclass_fields__ if name not in values and name != "gravity"]
+        if missing:
+            raise ValueError(f"{', '.join(missing)} missing; a bicycle file has every parameter")
         return "the suite's names, z up", values, deviations, ()
     for name in [name for name in values if _GAIN.fullmatch(name)]:
         if values.pop(name) != 0:
@@ -198,7 +203,7 @@ def _interpret(
     if principal:
         if deviations:
             raise ValueError("deviations of principal radii of gyration cannot be converted; give Meijaard's symbols")
-        values = _from_principal(values)
+        values = _convert_principal(values)
     parameters = {name: factor * values[symbol] for symbol, (name, factor) in _SYMBOLS.items()}
     uncertainties = {_SYMBOLS[name][0]: size for name, size in deviations.items() if name in _SYMBOLS}
     return convention, parameters, uncertainties, ignored
@@ -210,13 +215,13 @@ def _require_known(values: Mapping[str, float], known: set[str], convention: str
         raise ValueError(f"{unknown[0]!r} is no parameter of a bicycle in {convention}")
 
 
-def _from_principal(p: Mapping[str, float]) -> dict[str, float]:
+def _convert_principal(p: Mapping[str, float]) -> dict[str, float]:
     """Convert principal radii of gyration to Meijaard's symbols (Moore and Hubbard 2019).
 
     The rear frame D and the person P are one rigid body B.
     """
 
-    def tensor(body: str) -> tuple[float, float, float, float]:
+    def make_tensor(body: str) -> tuple[float, float, float, float]:
         """Return Ixx, Iyy, Izz and Ixz: the axis a of the radii is turned by alpha about y from the axis x."""
         ia, ib, iy = (p[f"m{body}"] * p[f"k{body}{axis}"] ** 2 for axis in ("aa", "bb", "yy"))
         cosine, sine = cos(p[f"alpha{body}"]), sin(p[f"alpha{body}"])
@@ -231,14 +236,14 @@ def _from_principal(p: Mapping[str, float]) -> dict[str, float]:
     x, z = ((p["mD"] * p[f"{axis}D"] + p["mP"] * p[f"{axis}P"]) / mass for axis in "xz")
     xx = yy = zz = xz = 0.0
     for body in "DP":
-        ixx, iyy, izz, ixz = tensor(body)
+        ixx, iyy, izz, ixz = make_tensor(body)
         dx, dz = p[f"x{body}"] - x, p[f"z{body}"] - z
         m = p[f"m{body}"]
         xx, yy, zz = xx + ixx + m * dz**2, yy + iyy + m * (dx**2 + dz**2), zz + izz + m * dx**2
         xz += ixz - m * dx * dz
     found = {name: p[name] for name in ("w", "c", "lam", "g", "rR", "rF", "mR", "mF", "mH", "xH", "zH")}
     found |= {"mB": mass, "xB": x, "zB": z, "IBxx": xx, "IByy": yy, "IBzz": zz, "IBxz": xz}
-    found |= dict(zip(("IHxx", "IHyy", "IHzz", "IHxz"), tensor("H"), strict=True))
+    found |= dict(zip(("IHxx", "IHyy", "IHzz", "IHxz"), make_tensor("H"), strict=True))
     for wheel in "RF":
         found |= {f"I{wheel}xx": p[f"m{wheel}"] * p[f"k{wheel}aa"] ** 2}
         found |= {f"I{wheel}yy": p[f"m{wheel}"] * p[f"k{wheel}yy"] ** 2}

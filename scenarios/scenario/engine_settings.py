@@ -1,4 +1,4 @@
-"""Settings of engines as a scenario file states them, each checked by its engine."""
+"""Validation of the engines' settings in a scenario file, each by its own engine."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .table import UnknownName, join_complaints, list_complaints, list_unknown, 
 
 
 def installed_engines() -> list[str]:
-    """Names of all installed engines, the reference first.
+    """Return the names of all installed engines, the reference first.
 
     Raises
     ------
     ScenarioError
-        If two packages announce an engine of one name.
+        If two packages announce engines with the same name.
     """
     try:
         return engine_names()
@@ -35,7 +35,7 @@ def configure_engine(name: str, values: Mapping[str, Any]) -> tuple[Engine, Sett
     Raises
     ------
     ScenarioError
-        If it is no engine, or settings are unknown or out of range: all of them in one line.
+        If there is no such engine, or settings are unknown or out of range. The message lists all faults in one line.
     """
     try:
         engine = load_engine(name)
@@ -46,7 +46,7 @@ def configure_engine(name: str, values: Mapping[str, Any]) -> tuple[Engine, Sett
     complaints = [f"{where}: {line}" for line in list_unknown(values, known)]
     cause: Exception | None = UnknownName(complaints[0]) if complaints else None
     try:
-        # As JSON: strictness would refuse a TOML array where a setting is a tuple.
+        # Validated as JSON, since strict validation of Python values refuses a list for a tuple.
         text = json.dumps({key: value for key, value in values.items() if key in known}, default=str)
         settings = call_engine(engine.settings.model_validate_json, text, strict=True)
     except ValidationError as error:
@@ -64,29 +64,29 @@ def configure_engine(name: str, values: Mapping[str, Any]) -> tuple[Engine, Sett
 
 
 def list_engine_faults(engines: Any, skipped: Collection[str] = ()) -> list[str]:
-    """Say everything wrong with the tables ``[engines.NAME]`` of a scenario, whether the engines ride or not.
+    """List all faults of the tables ``[engines.NAME]`` of a scenario, whether the engines take part in a run or not.
 
     Parameters
     ----------
     engines : Any
-        Settings by engine. What is no table is left to the schema, and an engine that is installed and cannot be
-        loaded to the run that needs it.
+        Settings by engine. Values that are not tables are left to the schema, and installed engines that cannot be
+        loaded are left to the run that needs them.
     skipped : collection of str
-        Engines that are not looked at.
+        Engines that are not checked.
     """
     if not isinstance(engines, Mapping):
         return []
     try:
-        there = installed_engines()
-    except ScenarioError:  # two packages announce one engine: no fault of the scenario
+        installed = installed_engines()
+    except ScenarioError:  # two packages announce one engine, which is not a fault of the scenario
         return []
     faults = []
     for name, values in engines.items():
         if name in skipped:
             continue
-        if name not in there:
-            faults.append(refuse_engine(name, there))
-        elif isinstance(values, Mapping) and _loads(name):
+        if name not in installed:
+            faults.append(refuse_engine(name, installed))
+        elif isinstance(values, Mapping) and _is_loadable(name):
             try:
                 configure_engine(name, values)
             except ScenarioError as error:
@@ -94,12 +94,12 @@ def list_engine_faults(engines: Any, skipped: Collection[str] = ()) -> list[str]
     return faults
 
 
-def refuse_engine(name: str, there: Collection[str]) -> str:
-    """Say that an engine is not installed, and which may be meant."""
-    return f"engine {show_value(repr(name))} is not installed ({suggest_name(name, there)})"
+def refuse_engine(name: str, installed: Collection[str]) -> str:
+    """Return the message for an engine that is not installed, with the closest installed name."""
+    return f"engine {show_value(repr(name))} is not installed ({suggest_name(name, installed)})"
 
 
-def _loads(name: str) -> bool:
+def _is_loadable(name: str) -> bool:
     try:
         load_engine(name)
     except ValueError:

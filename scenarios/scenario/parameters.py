@@ -1,4 +1,4 @@
-"""Units and meanings of the bicycle's parameters, as documents and tables tell them."""
+"""Units and meanings of the bicycle's parameters for documents and tables."""
 
 from __future__ import annotations
 

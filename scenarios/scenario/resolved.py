@@ -1,4 +1,4 @@
-"""A scenario with nothing left open."""
+"""Resolved scenarios, which state all parameters and settings."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from .schema import Scenario
 def resolve_scenario(scenario: Scenario, settings: Mapping[str, Settings]) -> Scenario:
     """Return a scenario that states all parameters of its bicycle and all settings of some engines.
 
-    It is the same scenario: read back from its file, it gives the same problem and the same settings to the bit.
+    Written to a file and read back, the result gives the same problem and the same settings to the bit.
 
     Parameters
     ----------
     scenario : Scenario
     settings : mapping
-        By engine. What the scenario says of other engines stays as it is.
+        Settings by engine. The scenario's tables of other engines are not changed.
     """
     engines = dict(scenario.engines)
     for name, chosen in settings.items():
@@ -30,7 +30,7 @@ def resolve_scenario(scenario: Scenario, settings: Mapping[str, Settings]) -> Sc
 
 
 def _has_none(value: Any) -> bool:
-    """Whether TOML cannot say a value: it has no word for nothing."""
+    """Return whether a value contains None, which TOML cannot express."""
     if isinstance(value, Mapping):
         return any(_has_none(item) for item in value.values())
     if isinstance(value, list):

@@ -1,4 +1,4 @@
-"""The schema of a scenario file: TOML in, validated data out."""
+"""The schema of scenario files, and functions that read and validate them."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from .parameters import PARAMETERS
 from .surfaces import SurfaceTable
 from .table import Table, join_complaints, list_complaints, read_toml, set_keys, show_value, validate_known
 
-# The tables that the motion depends on.
+# Tables of a scenario that determine its motion.
 OF_THE_MOTION = ("surface", "motion", "perturbation", "bicycle")
 
 
-# Far beyond any bicycle, and far from where products of such numbers overflow.
+# Larger than any value of a real bicycle, and small enough that products do not overflow.
 _Moderate = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
@@ -94,9 +94,9 @@ class Simulation(Table):
 class Gate(Simulation):
     """How the drift gate rides a scenario, and what it measures beside the ride."""
 
-    # Seconds of work in the slowest engine.
+    # The slowest engine needs some seconds for this duration.
     duration: float = Field(default=3.0, gt=0, le=1e5, description="simulated time", json_schema_extra={"unit": "s"})
-    # An interval that doubled steps divide as well: a coarser step is judged, not refused.
+    # Doubled steps divide this interval too, so that engines with a coarser step can be judged.
     output_rate: float = Field(
         default=50.0, gt=0, le=1e5, description="samples a second", json_schema_extra={"unit": "1/s"}
     )
@@ -113,7 +113,7 @@ class Criterion(Table):
 
 
 def _list_parameters(schema: dict[str, Any]) -> None:
-    """Put the names of a bicycle's parameters into the JSON schema of their table."""
+    """Add the parameters of a bicycle to the JSON schema of their table."""
     value = schema.pop("additionalProperties")
     benchmark = Bicycle()
     schema["properties"] = {
@@ -127,7 +127,7 @@ class Scenario(Table):
     """A scenario as its file declares it."""
 
     title: str = Field(description="one line of text")
-    # TOML has arrays only.
+    # TOML arrays are read as lists.
     tags: Annotated[tuple[str, ...], Field(strict=False)] = Field(default=(), description="for velodrome run --tag")
     surface: SurfaceTable = Field(description="the ground")
     motion: Annotated[CircularTable | UprightTable, Field(discriminator="kind")] = Field(
@@ -149,12 +149,12 @@ class Scenario(Table):
     @field_validator("title")
     @classmethod
     def _title_is_one_line(cls, title: str) -> str:
-        return _line_of_text(title)
+        return _require_line_of_text(title)
 
     @field_validator("tags")
     @classmethod
     def _tags_are_lines(cls, tags: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(_line_of_text(tag) for tag in tags)
+        return tuple(_require_line_of_text(tag) for tag in tags)
 
     @field_validator("motion", mode="before")
     @classmethod
@@ -166,7 +166,7 @@ class Scenario(Table):
     @field_validator("bicycle")
     @classmethod
     def _bicycle_exists(cls, bicycle: dict[str, float]) -> dict[str, float]:
-        faults = _bicycle_faults(bicycle)
+        faults = _list_bicycle_faults(bicycle)
         if faults:
             raise ValueError("; ".join(faults))
         return bicycle
@@ -182,12 +182,12 @@ class Scenario(Table):
         return Bicycle(**self.bicycle)
 
 
-def _bicycle_faults(values: Mapping[str, float]) -> list[str]:
-    """Say which parameters no bicycle has, or what is wrong with all of them together; nothing if nothing is."""
+def _list_bicycle_faults(values: Mapping[str, float]) -> list[str]:
+    """List the faults of single parameters, or the fault of all parameters together if no single one is wrong."""
     try:
         require_rigid_bodies(Bicycle(**values))
     except ValueError as error:
-        together = str(error)
+        joint_fault = str(error)
     else:
         return []
     faults = []
@@ -195,15 +195,16 @@ def _bicycle_faults(values: Mapping[str, float]) -> list[str]:
         try:
             Bicycle(**{name: value})
         except ValueError as error:
-            # Of inertias only all together can be judged.
+            # Inertias can be checked only together with the other parameters.
             if str(error).startswith(f"bicycle parameter {name} is"):
                 faults.append(str(error))
     return [
-        fault.removeprefix("bicycle parameter ").removeprefix("bicycle parameters ") for fault in faults or [together]
+        fault.removeprefix("bicycle parameter ").removeprefix("bicycle parameters ")
+        for fault in faults or [joint_fault]
     ]
 
 
-def _line_of_text(text: str) -> str:
+def _require_line_of_text(text: str) -> str:
     if not text.strip() or not text.isprintable():
         raise ValueError("must be one line of text")
     return text
@@ -215,7 +216,7 @@ def library_names() -> list[str]:
 
 
 def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tuple[str, Scenario]:
-    """Read a scenario by library name or by path, apply changes, validate.
+    """Read a scenario by library name or path, apply changes, and validate the result.
 
     Parameters
     ----------
@@ -233,7 +234,7 @@ def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tupl
     Raises
     ------
     ScenarioError
-        With one line.
+        If the scenario cannot be read or is not valid. The message is one line.
     """
     names = library_names()
     if source in names:
@@ -273,8 +274,9 @@ def validate_scenario(data: Mapping[str, Any], source: str) -> Scenario:
     Raises
     ------
     ScenarioError
-        With everything wrong in one line, the settings of all engines included. Of a scenario without another fault
-        they are left to `velodrome.scenarios.run.plan_run`: to load all engines takes a second.
+        If the data are not valid. The message lists all faults in one line, including those of the settings of all
+        engines. If the settings are the only possible fault, they are left to `velodrome.scenarios.run.plan_run`,
+        since loading all engines takes a second.
     """
     try:
         return Scenario.model_validate(data)
@@ -284,22 +286,21 @@ def validate_scenario(data: Mapping[str, Any], source: str) -> Scenario:
 
 
 def read_scenario_file(source: str) -> tuple[str, str]:
-    """Stem and text of a file that says what to run.
+    """Read a scenario or sweep file; return the stem of its name and its text.
 
     Raises
     ------
     ScenarioError
-        If it cannot be read.
+        If the file cannot be read.
     """
     path = Path(source)
-    # Folders and files of what is run bear the stem.
+    # Run folders and their files are named after the stem.
     if not path.stem.isprintable():
         raise ScenarioError(f"{show_value(source)}: cannot be read: a scenario's file name must be printable text")
     try:
         if path.exists() and not path.is_file():
-            raise ScenarioError(
-                f"{show_value(source)}: cannot be read: it is no file"
-            )  # and a pipe would keep us waiting
+            # Reading a pipe would block.
+            raise ScenarioError(f"{show_value(source)}: cannot be read: it is no file")
         return path.stem, path.read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:
         if isinstance(error, ScenarioError):

@@ -1,4 +1,4 @@
-"""From a scenario to a problem: the motion is computed, disturbed and put on the constraints."""
+"""Computation of a scenario's start: the motion is computed, disturbed and projected onto the constraints."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from ...reference.rim import require_clear_rims
 from ...reference.stability import growth_rate, linearise
 from ...reference.surface import Plane, Surface, SurfaceOfRevolution, evaluate
 from ..error import ScenarioError
-from .schema import CircularTable, Scenario, Simulation
+from .schema import CircularTable, Scenario, Simulation, UprightTable
 from .surfaces import make_bowl
 
-# Runs of one motion, disturbed in many ways, need it once.
-_found = lru_cache(maxsize=256)(find_motion)
+# Runs that disturb the same motion in different ways share its computation.
+_find_motion = lru_cache(maxsize=256)(find_motion)
 
 
 @dataclass(frozen=True)
 class Start:
-    """A problem with what is known of the motion that it starts from.
+    """A problem, and the motion that it starts from.
 
     Attributes
     ----------
@@ -37,8 +37,8 @@ class Start:
         Family of the circular motion; None for an upright start.
     motion : CircularMotion or None
     growth_rate : float
-        Largest real part of the motion's eigenvalues that symmetry does not fix [1/s]; on ground without
-        symmetry, where nothing is steady, that of the same start on the level plane.
+        Largest real part of the motion's eigenvalues that symmetry does not fix [1/s]. On ground without symmetry,
+        where no motion is steady, the value is that of the same start on the level plane.
     size : float
         Radius of the circle of D, or the wheelbase for a straight start [m].
     """
@@ -61,11 +61,11 @@ def make_start(scenario: Scenario) -> Start:
     """
     bicycle, surface = scenario.make_bicycle(), scenario.surface.make()
     try:
-        # Numbers that no bicycle has may overflow on the way; what comes of them is checked.
+        # Unrealistic parameters may overflow in between; the results are checked.
         with np.errstate(all="ignore"):
-            family, motion, q, qd = _undisturbed(scenario, bicycle, surface)
-            rate = _growth_rate(scenario, bicycle, surface, q, qd)
-            undisturbed, (q, qd) = (q, qd), _disturbed(scenario, bicycle, surface, q, qd)
+            family, motion, q, qd = _compute_undisturbed(scenario, bicycle, surface)
+            rate = _compute_growth_rate(scenario, bicycle, surface, q, qd)
+            undisturbed, (q, qd) = (q, qd), _disturb_state(scenario, bicycle, surface, q, qd)
             require_clear_rims(bicycle, surface, q)
     except (ValueError, ArithmeticError) as error:
         raise ScenarioError(f"motion: {error}") from error
@@ -81,44 +81,49 @@ def output_times(simulation: Simulation) -> np.ndarray:
     return np.arange(samples + 1) / simulation.output_rate
 
 
-def _growth_rate(scenario: Scenario, bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> float:
+def _compute_growth_rate(
+    scenario: Scenario, bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray
+) -> float:
     if not isinstance(surface, SurfaceOfRevolution):
         surface = Plane()
-        _, _, q, qd = _undisturbed(scenario, bicycle, surface)
+        _, _, q, qd = _compute_undisturbed(scenario, bicycle, surface)
     return growth_rate(surface, linearise(bicycle, surface, q, qd).eigenvalues, float(qd[YAW]))
 
 
-def _undisturbed(
+def _compute_undisturbed(
     scenario: Scenario, bicycle: Bicycle, surface: Surface
 ) -> tuple[int | None, CircularMotion | None, np.ndarray, np.ndarray]:
     table = scenario.motion
     if isinstance(table, CircularTable):
         near = (table.near.lean, table.near.steer) if table.near is not None else None
-        family, motion = _found(bicycle, make_bowl(surface), table.rear_rate, table.family, near)  # type: ignore[arg-type]
+        family, motion = _find_motion(bicycle, make_bowl(surface), table.rear_rate, table.family, near)  # type: ignore[arg-type]
         return family, motion, *motion.state()
     rates = (0.0, 0.0, table.speed / bicycle.rear_wheel_radius)
-    q, qd = consistent_state(bicycle, surface, (float(bicycle.reference_point[0]), 0.0), 0.0, 0.0, rates)
+    # Where the disturbed bicycle stands: there may be no ground at the origin.
+    place = (float(bicycle.reference_point[0]) + scenario.perturbation.x, scenario.perturbation.y)
+    q, qd = consistent_state(bicycle, surface, place, 0.0, 0.0, rates)
     return None, None, q, qd
 
 
-def _disturbed(
+def _disturb_state(
     scenario: Scenario, bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     change = scenario.perturbation
     if change == type(change)():
         return q, qd
     lean = float(q[LEAN]) + change.lean
+    moved = (0.0, 0.0) if isinstance(scenario.motion, UprightTable) else (change.x, change.y)
     q, qd = consistent_state(
         bicycle,
         surface,
-        (float(q[0]) + change.x, float(q[1]) + change.y),
+        (float(q[0]) + moved[0], float(q[1]) + moved[1]),
         lean,
         float(q[STEER]) + change.steer,
         (qd[LEAN] + change.lean_rate, qd[STEER] + change.steer_rate, qd[REAR_ANGLE] + change.rear_rate),
         guess=(float(q[2]), float(q[5])),
     )
     centre = body_positions(bicycle, q[None])[0, 0]
-    # The wheels touch the ground from below just as well.
+    # The constraints also hold for wheels that touch the ground from below.
     if centre[2] <= evaluate(surface, centre[0], centre[1])[0]:
         raise ValueError(f"at lean = {lean!r} the rear frame lies below the ground; a smaller perturbation would not")
     return q, qd

@@ -1,4 +1,4 @@
-"""The grounds a scenario can name, and how they are written on the command line and in documents."""
+"""The surfaces that a scenario can name, and their notation on the command line and in documents."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import Field, TypeAdapter, ValidationError, field_validator, model
 from ...reference.bowls import Cone, Sphere, Torus
 from ...reference.height_field import HeightField
 from ...reference.profile import PolynomialProfile, SplineProfile
-from ...reference.surface import Paraboloid, Plane, Surface, SurfaceOfRevolution
+from ...reference.surface import InclinedPlane, Paraboloid, Plane, Surface, SurfaceOfRevolution
 from ..error import ScenarioError
 from .table import Table, format_validation_error, read_toml, show_value
 
@@ -19,18 +19,18 @@ _Moderate = Annotated[float, Field(ge=-1e6, le=1e6)]
 _Numbers = Annotated[tuple[_Moderate, ...], Field(strict=False, max_length=1000)]  # TOML has arrays only
 
 
-# What a flatter bowl does to a disturbance is lost in the round-off of eigenvalues, some 1e-15 1/s: at 1e-12 1/m it is
-# known to a few thousandths, at 1e-15 not even by its sign.
+# The effect of a flatter bowl on a disturbance is lost in the round-off of eigenvalues, about 1e-15 1/s: at 1e-12 1/m
+# it is known to a few thousandths; at 1e-15 1/m not even its sign is known.
 FLATTEST = 1e-12
 
 
 def told_from_level(alpha: float) -> float:
-    """The shape of a paraboloid [1/m], which is the plane or can be told from it.
+    """Return the shape of a paraboloid [1/m] if it is 0, the plane, or can be distinguished from the plane.
 
     Raises
     ------
     ValueError
-        If it cannot be.
+        If the paraboloid is too flat.
     """
     if 0 < alpha < FLATTEST:
         raise ValueError(f"must be 0, which is the plane, or at least {FLATTEST!r}: less is lost in round-off")
@@ -45,6 +45,18 @@ class PlaneTable(Table):
     def make(self) -> Plane:
         """The surface."""
         return Plane()
+
+
+class InclinedPlaneTable(Table):
+    """A plane through the origin that rises in one direction."""
+
+    kind: Literal["inclined-plane"]
+    slope: float = Field(gt=0, le=1e3, description="rise over run [-]")
+    direction: float = Field(0.0, ge=-10.0, le=10.0, description="in which it rises, from the x axis towards y [rad]")
+
+    def make(self) -> InclinedPlane:
+        """The surface."""
+        return InclinedPlane(self.slope, self.direction)
 
 
 class ParaboloidTable(Table):
@@ -149,12 +161,20 @@ class HeightFieldTable(Table):
 
 
 SurfaceTable = Annotated[
-    PlaneTable | ParaboloidTable | SphereTable | ConeTable | TorusTable | ProfileTable | HeightFieldTable,
+    PlaneTable
+    | InclinedPlaneTable
+    | ParaboloidTable
+    | SphereTable
+    | ConeTable
+    | TorusTable
+    | ProfileTable
+    | HeightFieldTable,
     Field(discriminator="kind"),
 ]
 
 _KINDS: dict[type, str] = {
     Plane: "plane",
+    InclinedPlane: "inclined-plane",
     Paraboloid: "paraboloid",
     Sphere: "sphere",
     Cone: "cone",
@@ -173,13 +193,13 @@ def parse_surface(text: str) -> Surface:
     Raises
     ------
     ScenarioError
-        With one line.
+        If the text names no surface. The message is one line.
     """
     kind, _, fields = text.partition(":")
     where = f"--surface {show_value(text)}"
     try:
         table = read_toml(f"surface = {{ {fields} }}")["surface"]
-        # A second line would be a second statement.
+        # A line break would start a second TOML statement.
         if "\n" in fields or "kind" in table:
             raise ValueError
     except ValueError:
@@ -191,12 +211,12 @@ def parse_surface(text: str) -> Surface:
 
 
 def make_bowl(ground: Surface | float) -> SurfaceOfRevolution:
-    """The surface of revolution that a ground is; a number is the alpha of a paraboloid.
+    """Return a ground as a surface of revolution; a number is the alpha of a paraboloid.
 
     Raises
     ------
     ScenarioError
-        If it is none.
+        If the ground is not a surface of revolution, or too flat.
     """
     try:
         surface = Paraboloid(told_from_level(ground)) if isinstance(ground, int | float) else ground
@@ -211,20 +231,27 @@ def make_bowl(ground: Surface | float) -> SurfaceOfRevolution:
 
 
 def describe_surface(surface: Surface) -> dict[str, Any]:
-    """Kind and fields of a surface, JSON values; of one that no table makes, the class and the parameters."""
+    """Return the kind and the fields of a surface as JSON values.
+
+    For a surface that scenarios cannot name, return the name of its class and its parameters.
+    """
     kind: Any = _KINDS.get(type(surface))
     if kind is None:
         return {"kind": type(surface).__name__, "parameters": surface.parameters.tolist()}
     fields: Any = surface
-    return {"kind": kind} | {name: _listed(value) for name, value in asdict(fields).items()}
+    return {"kind": kind} | {name: _convert_tuples(value) for name, value in asdict(fields).items()}
 
 
-def _listed(value: Any) -> Any:
-    return [_listed(item) for item in value] if isinstance(value, tuple) else value
+def _convert_tuples(value: Any) -> Any:
+    return [_convert_tuples(item) for item in value] if isinstance(value, tuple) else value
 
 
 def name_surface(surface: Surface) -> dict[str, Any]:
-    """How a document names its surface: ``alpha`` of a paraboloid or the plane; of others null, and ``surface``."""
+    """Return the entries that name a surface in a document.
+
+    The entry ``alpha`` is a number for a paraboloid or the plane. For other surfaces it is None, and the entry
+    ``surface`` describes the surface.
+    """
     if isinstance(surface, Plane | Paraboloid):
         return {"alpha": surface.alpha if isinstance(surface, Paraboloid) else 0.0}
     return {"alpha": None, "surface": describe_surface(surface)}

@@ -1,4 +1,4 @@
-"""Tables of a scenario file: how they are read, and what is said of one that is wrong."""
+"""Tables of a scenario file: reading, validation and messages for wrong values."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ...engines.names import closest_name, suggest_name
 
 Validated = TypeVar("Validated")
 
-# Letters of somebody else's text in a line: enough to find it by.
+# Characters of foreign text that a message quotes at most.
 _LONGEST = 200
 
 
 def show_value(text: str) -> str:
-    """Text of somebody else's making as a part of one line: nothing that moves a cursor, not too long."""
+    """Return foreign text for use within one line: shortened, and with unprintable characters escaped."""
     if len(text) > _LONGEST:
-        # Both ends: that of a path is the file's name, that of a complaint says where.
+        # Both ends are kept: a path ends with the file's name, and a message with the place.
         text = f"{text[: _LONGEST // 2]}...{text[-_LONGEST // 2 :]}"
     return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
 
@@ -32,7 +32,7 @@ def read_toml(text: str) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If it is none, or nested or written at such a length that it cannot be read.
+        If the text is not TOML, or is nested too deeply or too long to be read.
     """
     try:
         return tomllib.loads(text)
@@ -41,19 +41,19 @@ def read_toml(text: str) -> dict[str, Any]:
 
 
 def set_keys(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """A copy of nested tables with dotted keys set.
+    """Return a copy of nested tables with dotted keys set.
 
     Parameters
     ----------
     data : mapping
-        Stays as it is.
+        The tables, which are not changed.
     changes : mapping
-        Dotted key to value.
+        Values by dotted key.
 
     Raises
     ------
     ValueError
-        If a key leads through something that is no table.
+        If a key leads through a value that is not a table.
     """
     result = dict(data)
     for key, value in changes.items():
@@ -70,13 +70,13 @@ def set_keys(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, A
 
 
 class Table(BaseModel):
-    """Base of all tables: unknown keys are refused, values are checked, nothing changes later.
+    """Base of all tables: unknown keys are refused, values are checked, and instances are frozen.
 
-    Everything wrong with a table is told at once: values are checked beside unknown keys too, those of a misspelt
-    key as if it were written as it is meant.
+    All faults of a table are reported at once: values are also checked if there are unknown keys, and the value of a
+    misspelt key is checked as that of the closest known key.
     """
 
-    # Strict: true is no number, and neither is "18".
+    # Strict: neither true nor "18" is accepted as a number.
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
     @model_validator(mode="wrap")
@@ -86,10 +86,10 @@ class Table(BaseModel):
 
 
 class UnknownName(ValueError):
-    """A name that is none of those that there are: a typing error, whatever its value."""
+    """Raised for a name that is not one of the known names."""
 
 
-UNKNOWN_NAME = "unknown_name"  # pydantic's type of error of such a name
+UNKNOWN_NAME = "unknown_name"  # pydantic's error type for such a name
 
 
 def validate_known(
@@ -99,24 +99,24 @@ def validate_known(
     validate: Callable[[Any], Validated],
     words: str = "unknown key {name} ({meant})",
 ) -> Validated:
-    """Validate a mapping and refuse names in it that are unknown, all complaints at once.
+    """Validate a mapping and refuse unknown names in it, with all faults in one error.
 
     Parameters
     ----------
     title : str
-        Of the error.
+        Title of the error.
     data : Any
-        What is no mapping is left to ``validate``.
+        Data to validate; ``validate`` refuses those that are not a mapping.
     known : collection of str
     validate : callable
-        Validates the mapping without unknown names. A misspelt one takes its right name.
+        Validates the mapping without its unknown names. A misspelt name is replaced by the closest known one.
     words : str
-        What is said of an unknown name, with ``{name}`` and ``{meant}``.
+        Message for an unknown name, with the fields ``{name}`` and ``{meant}``.
 
     Raises
     ------
     ValidationError
-        With an error of type `UNKNOWN_NAME` a name, and whatever ``validate`` finds.
+        With an error of type `UNKNOWN_NAME` for every unknown name, and the errors of ``validate``.
     """
     unknown = sorted(set(data) - set(known), key=str) if isinstance(data, Mapping) else []
     if not unknown:
@@ -125,7 +125,7 @@ def validate_known(
     right = {name: value for name, value in data.items() if name in known}
     for name in unknown:
         fields = {"name": show_value(repr(name)), "meant": suggest_name(str(name), known)}
-        # pydantic fills the template by itself; what is typed may have braces.
+        # pydantic fills the template: the user's text may contain braces.
         error = PydanticCustomError(UNKNOWN_NAME, words, fields)  # pyright: ignore[reportArgumentType]
         found.append({"type": error, "loc": (str(name),), "input": data[name]})
         meant = closest_name(str(name), known)
@@ -139,14 +139,14 @@ def validate_known(
 
 
 def _copy_error(entry: ErrorDetails) -> InitErrorDetails:
-    """An error as pydantic takes it back, with its message as it is."""
-    fields = {**entry.get("ctx", {}), "message": entry["msg"]}  # the message last, for nothing to be filled into it
+    """Return an error in the form that pydantic accepts, with its message unchanged."""
+    fields = {**entry.get("ctx", {}), "message": entry["msg"]}  # the message last, so that it is not overwritten
     kind = PydanticCustomError(entry["type"], "{message}", fields)  # pyright: ignore[reportArgumentType]
     return {"type": kind, "loc": entry["loc"], "input": entry["input"]}
 
 
 def list_unknown(data: Mapping[str, Any], known: Collection[str]) -> list[str]:
-    """Say of every key of a mapping that is unknown what is known."""
+    """Return a message for every unknown key of a mapping, with the closest known key."""
     return [
         f"unknown key {show_value(repr(name))} ({suggest_name(name, known)})" for name in sorted(set(data) - set(known))
     ]
@@ -162,65 +162,66 @@ _PLAIN_WORDS = {
 
 
 def list_kinds() -> set[str]:
-    """All values that the kind of a table may have."""
+    """Return all values that the key ``kind`` of a table may have."""
     tables = (table.model_fields["kind"] for table in Table.__subclasses__() if "kind" in table.model_fields)
     return {value for kind in tables for value in get_args(kind.annotation)}
 
 
-def _written(value: Any) -> str:
+def _format_value(value: Any) -> str:
     try:
         return repr(value)
-    except ValueError:  # an integer of more digits than Python writes
+    except ValueError:  # an integer with more digits than Python converts to text
         return "a number of thousands of digits"
     except RecursionError:
         return "nested too deeply"
 
 
-_MOST = 20  # complaints of one line; who reads more than that has another file than they think
+_MOST = 20  # messages in one line; a file with more faults is probably not the intended file
 
 
 def join_complaints(complaints: Iterable[str]) -> str:
-    """Put complaints into one line, separated by ``; ``, each once; of more than 20 the rest is counted."""
+    """Join messages into one line, separated by ``; ``, without duplicates; from the 21st on they are only counted."""
     found = list(dict.fromkeys(complaints))
     rest = [f"and {len(found) - _MOST} more"] if len(found) > _MOST else []
     return "; ".join(found[:_MOST] + rest)
 
 
 def format_validation_error(error: ValidationError) -> str:
-    """Say everything wrong in one line: where, what, what came."""
+    """Return all faults in one line, each with its place and the value found."""
     return join_complaints(list_complaints(error))
 
 
 def list_complaints(error: ValidationError) -> list[str]:
-    """Say everything wrong, each with its place: where, what, what came."""
-    return [_complaint(entry) for entry in error.errors()]
+    """Return all faults, each with its place and the value found."""
+    return [_format_complaint(entry) for entry in error.errors()]
 
 
 def error_place(entry: ErrorDetails) -> tuple[str, ...]:
-    """Keys that lead to what is wrong.
+    """Return the keys that lead to a fault.
 
-    Discriminator values appear in the location of a union's member: they are no keys of the file.
+    The location of a union's member also contains discriminator values; these are left out, as they are no keys of the
+    file.
     """
     return tuple(str(part) for part in entry["loc"] if part not in list_kinds())
 
 
-def _complaint(entry: ErrorDetails) -> str:
-    place, came, facts = error_place(entry), entry.get("input"), entry.get("ctx", {})
+def _format_complaint(entry: ErrorDetails) -> str:
+    place, found, facts = error_place(entry), entry.get("input"), entry.get("ctx", {})
     message = " ".join(_PLAIN_WORDS.get(entry["type"], entry["msg"].removeprefix("Value error, ")).split())
-    left_out = isinstance(came, Mapping | BaseModel) or entry["type"] == "missing"
+    left_out = isinstance(found, Mapping | BaseModel) or entry["type"] == "missing"
     if entry["type"] == UNKNOWN_NAME:
         place, left_out = place[:-1], True
     elif entry["type"] == "union_tag_invalid":
         tag, place = str(facts["tag"]), (*place, "kind")
-        message = f"unknown kind {show_value(repr(tag))} ({suggest_name(tag, _quoted(facts['expected_tags']))})"
-    elif entry["type"] == "literal_error" and isinstance(came, str):
-        closest = closest_name(came, _quoted(facts["expected"]))
+        message = f"unknown kind {show_value(repr(tag))} ({suggest_name(tag, _find_quoted(facts['expected_tags']))})"
+    elif entry["type"] == "literal_error" and isinstance(found, str):
+        closest = closest_name(found, _find_quoted(facts["expected"]))
         message += "" if closest is None else f", did you mean {closest!r}?"
     where = ".".join(show_value(part) for part in place)
-    value = "" if left_out else f" (it is {show_value(_written(came))})"
+    value = "" if left_out else f" (it is {show_value(_format_value(found))})"
     return f"{where}: {message}{value}".lstrip(": ")
 
 
-def _quoted(text: str) -> list[str]:
-    """Words that stand in quotes in a text of pydantic's."""
+def _find_quoted(text: str) -> list[str]:
+    """Return the quoted words in a message of pydantic."""
     return re.findall(r"'([^']*)'", text)

@@ -1,4 +1,4 @@
-"""Runs and motions from Python: what the package's public face calls."""
+"""The Python interface to runs and circular motions, which `velodrome` exports."""
 
 from .motions import circular, critical, families
 from .result import Run

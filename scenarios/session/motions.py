@@ -1,4 +1,4 @@
-"""Circular motions, their families and critical bowls from Python."""
+"""The Python interface to circular motions, their families and critical bowls."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def circular(
     surface : Surface, optional
         Another surface of revolution about z, such as ``Sphere(20.0)``.
     family : int, optional
-        Solution family, 1 to 4. Either this or ``near`` is needed; both where a family has several motions.
+        Solution family, 1 to 4. Either this or ``near`` is needed; both if the family has several motions.
     near : tuple of float, optional
         Lean and steer that the motion is near to [rad].
     bicycle : Bicycle, optional
@@ -51,7 +51,7 @@ def circular(
     Raises
     ------
     ScenarioError
-        If there is no such motion, or the ground is given twice, not at all or is no surface of revolution.
+        If there is no such motion, or the ground is given twice, not given, or not a surface of revolution.
 
     Examples
     --------
@@ -62,7 +62,7 @@ def circular(
     >>> round(found.motion.lean, 5), round(found.motion.steer, 5)
     (0.73744, 2.83701)
     """
-    ground = make_bowl(_ground(alpha, surface))
+    ground = make_bowl(_choose_ground(alpha, surface))
     return solve_circular(bicycle or Bicycle(), ground, rear_rate, family, near)
 
 
@@ -87,7 +87,7 @@ def families(
     Raises
     ------
     ScenarioError
-        If the ground is given twice, not at all or is no surface of revolution.
+        If the ground is given twice, not given, or not a surface of revolution.
 
     Examples
     --------
@@ -98,7 +98,7 @@ def families(
     >>> found.curves[1].samples.lean.shape == found.curves[1].samples.rear_rate.shape
     True
     """
-    return follow_families(bicycle or Bicycle(), make_bowl(_ground(alpha, surface)))
+    return follow_families(bicycle or Bicycle(), make_bowl(_choose_ground(alpha, surface)))
 
 
 def critical(
@@ -113,20 +113,20 @@ def critical(
     bicycle : Bicycle, optional
         The benchmark bicycle if not given.
     progress : callable, optional
-        Called with what is looked for, the value reached and the largest.
+        Called with the name of the stage, the value reached and the largest value.
 
     Returns
     -------
     CriticalShapes
     """
-    return find_critical_shapes(bicycle or Bicycle(), progress or _say_nothing)
+    return find_critical_shapes(bicycle or Bicycle(), progress or _ignore_progress)
 
 
-def _say_nothing(*_: object) -> None:
-    """Take the place of a progress bar."""
+def _ignore_progress(*_: object) -> None:
+    """Ignore the progress of a computation."""
 
 
-def _ground(alpha: float | None, surface: Surface | None) -> Surface | float:
+def _choose_ground(alpha: float | None, surface: Surface | None) -> Surface | float:
     if alpha is not None and surface is None:
         return alpha
     if surface is not None and alpha is None:

@@ -1,4 +1,4 @@
-"""A run as it is looked at from Python."""
+"""The result of a run for use in Python."""
 
 from __future__ import annotations
 
@@ -19,33 +19,33 @@ from .table import MetricsTable
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Run:
-    """The rides of one scenario, measured; `velodrome.run` and `velodrome.load` give it.
+    """The trajectories and metrics of one scenario, as returned by `velodrome.run` and `velodrome.load`.
 
     Attributes
     ----------
     name, title : str
-        Of the scenario.
+        Name and title of the scenario.
     start : Problem
-        What every engine was given: bicycle, ground, coordinates and rates at the start, output times.
+        The problem that every engine solves: bicycle, ground, coordinates and rates at the start, output times.
     growth_rate : float
-        Largest real part of the motion's eigenvalues that symmetry does not fix [1/s]; negative where the motion is
+        Largest real part of the motion's eigenvalues that symmetry does not fix [1/s]; negative if the motion is
         Lyapunov stable.
     family : int or None
         Family of the circular motion that the run starts from; None for an upright start.
     trajectories : dict
-        `Trajectory` by the name of an engine, the reference first.
+        `Trajectory` by engine, the reference first.
     metrics : MetricsTable
-        One row an engine.
+        Metrics, one row per engine.
     verdicts : tuple of mapping
-        On the scenario's criterion, where it has one: ``engine``, ``quantity``, ``value``, ``limit``, ``holds``.
+        Verdicts on the scenario's criterion, if it has one: ``engine``, ``quantity``, ``value``, ``limit``, ``holds``.
     failures : dict
-        Engines that gave no trajectory, with the reason.
+        Reasons by engine, for engines that gave no trajectory.
     left_out : dict
-        Engines that are not made for this problem and were not asked for by name, with the reason.
+        Reasons by engine, for engines that do not support this problem and were not requested by name.
     folder : Path or None
-        The run folder; None where nothing was written.
+        The run folder; None if nothing was written.
     complete : bool
-        Whether every engine had its turn.
+        Whether every engine has finished or failed.
     """
 
     name: str
@@ -66,8 +66,8 @@ class Run:
     def show(self) -> Any:
         """Show the recording of the rides.
 
-        In a notebook where rerun's widget is installed (``pip install 'velodrome[notebook]'``) the widget is returned
-        and shown by the notebook. Elsewhere the viewer's window is opened, and the call returns when it is closed.
+        In a notebook, the method returns rerun's widget if it is installed (``pip install 'velodrome[notebook]'``), and
+        the notebook shows it. Otherwise the viewer's window opens, and the call returns when it is closed.
 
         Raises
         ------
@@ -79,29 +79,29 @@ class Run:
         if not self.trajectories:
             raise ScenarioError("the run has no trajectory to show: no engine gave one")
         if self.folder is not None:
-            return self._shown(self.folder, make_widget)
+            return self._open_recording(self.folder, make_widget)
         with TemporaryDirectory(prefix="velodrome-") as name:
             self.recorder(Path(name))
-            return self._shown(Path(name), make_widget)
+            return self._open_recording(Path(name), make_widget)
 
-    def _shown(self, folder: Path, make_widget: Callable[[Path], Any]) -> Any:
+    def _open_recording(self, folder: Path, make_widget: Callable[[Path], Any]) -> Any:
         widget = make_widget(find_part(folder, RECORDING))
         return open_native(folder) if widget is None else widget
 
-    def _notes(self) -> list[str]:
+    def _list_notes(self) -> list[str]:
         lines = [f"{name} did not run: {reason}" for name, reason in self.failures.items()]
         lines += [f"{name} left out: {reason}" for name, reason in self.left_out.items()]
         return lines + [format_verdict(verdict) for verdict in self.verdicts]
 
-    def _heading(self) -> str:
+    def _format_heading(self) -> str:
         return f"{self.name}: {self.title}, {self.start.times[-1]:g} s"
 
     def __repr__(self) -> str:
         where = [] if self.folder is None else [f"run folder: {self.folder}"]
-        return "\n".join([self._heading(), repr(self.metrics), *self._notes(), *where])
+        return "\n".join([self._format_heading(), repr(self.metrics), *self._list_notes(), *where])
 
     def _repr_html_(self) -> str:
-        notes = "".join(f"<li>{escape(line)}</li>" for line in self._notes())
+        notes = "".join(f"<li>{escape(line)}</li>" for line in self._list_notes())
         where = "" if self.folder is None else f"<p>run folder: <code>{escape(str(self.folder))}</code></p>"
         table = self.metrics.to_html()
-        return f"<p><b>{escape(self._heading())}</b></p>{table}{f'<ul>{notes}</ul>' if notes else ''}{where}"
+        return f"<p><b>{escape(self._format_heading())}</b></p>{table}{f'<ul>{notes}</ul>' if notes else ''}{where}"

@@ -1,4 +1,4 @@
-"""Run a scenario from Python, by the code of the command `velodrome run`."""
+"""Run a scenario from Python, with the same code as the command `velodrome run`."""
 
 from __future__ import annotations
 
@@ -26,38 +26,37 @@ def run(
     changes: Mapping[str, Any] | None = None,
     progress: Callable[[str, float, float], None] | None = None,
 ) -> Run:
-    """Run a scenario in every engine from the same computed start, compared with the reference.
+    """Run a scenario in every engine from the same computed start and compare the results with the reference.
 
     Parameters
     ----------
     scenario : str or Path
         Name of a scenario of the library (`scenario_names`), or path to a TOML file.
     engines : str or iterable of str, optional
-        Engines to run beside the reference, which always runs; all that are installed and made for the problem if not
-        given.
+        Engines to run in addition to the reference, which always runs; by default all installed engines that support
+        the problem.
     duration : float, optional
         Simulated time [s]; the scenario's own if not given.
     out : str or Path, optional
-        Folder that a run folder is made in, as `velodrome run --out` does. Nothing is written if not given.
+        Folder in which a run folder is made, as with `velodrome run --out`. Nothing is written if not given.
     settings : mapping, optional
-        By the name of an engine: its settings, as a mapping or an instance of its `Settings`. They come on top of the
-        scenario's.
+        Settings by engine, as a mapping or an instance of its `Settings`. They override the scenario's.
     changes : mapping, optional
         Fields of the scenario to override, by dotted key, such as ``{"perturbation.lean_rate": 0.2}``.
     progress : callable, optional
-        Called with the engine at work, the simulated time that it has reached and the duration [s].
+        Called with the running engine, the simulated time that it has reached and the duration [s].
 
     Returns
     -------
     Run
-        An engine that broke is in its ``failures``.
+        The results; engines that failed are in its ``failures``.
 
     Raises
     ------
     ScenarioError
         If the scenario, an engine's name or a setting is wrong, or the motion does not exist.
     KeyboardInterrupt
-        If Ctrl-C was pressed; with ``out`` the engines that were done are in the run folder.
+        If Ctrl-C was pressed. With ``out``, the engines that had finished are in the run folder.
 
     Examples
     --------
@@ -68,44 +67,44 @@ def run(
     >>> run.trajectories["mujoco-multipliers"].q.shape
     (51, 9)
     """
-    fields = {key: _plain(value) for key, value in (changes or {}).items()}
+    fields = {key: _to_plain(value) for key, value in (changes or {}).items()}
     if duration is not None:
-        fields["simulation.duration"] = _plain(duration)
+        fields["simulation.duration"] = _to_plain(duration)
     name, resolved = load_scenario(str(scenario), fields)
-    plan = plan_run(name, _with_settings(resolved, settings or {}), _wanted(engines))
-    watch = progress if progress is not None else _silent
+    plan = plan_run(name, _override_settings(resolved, settings or {}), _list_wanted(engines))
+    watch = progress if progress is not None else _ignore_progress
     if out is None:
-        folder, result = None, measure_run(plan, ride_plan(plan, watch, _silent))
+        folder, result = None, measure_run(plan, ride_plan(plan, watch, _ignore_progress))
     else:
-        folder, result = store_run(plan, Path(out), watch, _silent)
+        folder, result = store_run(plan, Path(out), watch, _ignore_progress)
     if result.interrupted:
         raise KeyboardInterrupt
-    return _as_run(plan, result, folder)
+    return _make_run(plan, result, folder)
 
 
-def _silent(*_: Any) -> None:
-    """Say nothing of what goes on; the run tells of failures when it is done."""
+def _ignore_progress(*_: Any) -> None:
+    """Ignore progress and notes; failures are reported in the result."""
 
 
-def _wanted(engines: str | Iterable[str] | None) -> list[str] | None:
+def _list_wanted(engines: str | Iterable[str] | None) -> list[str] | None:
     if engines is None:
         return None
     return [engines] if isinstance(engines, str) else list(engines) or [REFERENCE]
 
 
-def _plain(value: Any) -> Any:
-    """Return a value of numpy as one that a TOML file could hold."""
+def _to_plain(value: Any) -> Any:
+    """Convert a numpy value to a Python value, which a TOML file can contain."""
     given: Any = value
     return given.tolist() if isinstance(value, np.generic | np.ndarray) else value
 
 
-def _with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
-    """Return the scenario with engine settings put on top of its own.
+def _override_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
+    """Return the scenario with some of its engine settings overridden.
 
     Raises
     ------
     ScenarioError
-        If what is given for an engine is no table of settings.
+        If the settings of an engine are neither a mapping nor an instance of `Settings`.
     """
     engines = dict(scenario.engines)
     for name, given in settings.items():
@@ -113,14 +112,14 @@ def _with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
             values = given.model_dump(mode="json", exclude_none=True)
         elif isinstance(given, Mapping):
             table = cast("Mapping[str, Any]", given)
-            values = {key: _plain(value) for key, value in table.items()}
+            values = {key: _to_plain(value) for key, value in table.items()}
         else:
             raise ScenarioError(f"settings of {name!r} are {given!r}; they must be a mapping such as {{'step': 0.001}}")
         engines[name] = {**engines.get(name, {}), **values}
     return scenario.model_copy(update={"engines": engines})
 
 
-def _as_run(plan: RunPlan, result: RunResult, folder: Path | None) -> Run:
+def _make_run(plan: RunPlan, result: RunResult, folder: Path | None) -> Run:
     def record(where: Path) -> None:
         write_run_recording(where, plan, result.shown, result.metrics, result.failures, result.verdicts)
 

@@ -1,4 +1,4 @@
-"""Read a run folder back into what `velodrome.run` gave."""
+"""Load a run folder as the result that `velodrome.run` returned."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .table import MetricsTable
 
 
 def load(folder: str | Path) -> Run:
-    """Read the run folder that `velodrome run` or ``velodrome.run(..., out=...)`` has written.
+    """Load a run folder that `velodrome run` or ``velodrome.run(..., out=...)`` has written.
 
     Parameters
     ----------
@@ -26,12 +26,12 @@ def load(folder: str | Path) -> Run:
     Returns
     -------
     Run
-        Trajectories, metrics and start are to the bit those that were written.
+        The run; trajectories, metrics and start equal the written ones to the bit.
 
     Raises
     ------
     ScenarioError
-        If it is no run folder, or a file of it is missing, damaged or of another run.
+        If the folder is not a run folder, or one of its files is missing, damaged or from another run.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def load(folder: str | Path) -> Run:
     manifest, metrics = read_document(folder, "manifest.json"), read_document(folder, "metrics.json")
     _, scenario = load_scenario(str(find_part(folder, "scenario.toml")))
     try:
-        return _read(folder, manifest, metrics, scenario)
+        return _read_run(folder, manifest, metrics, scenario)
     except ScenarioError:
         raise
     except (LookupError, TypeError, AttributeError, ValueError) as error:
@@ -54,7 +54,7 @@ def load(folder: str | Path) -> Run:
         raise ScenarioError(f"{folder}: not the files of one run: {show_value(f'{kind}{error}')}") from error
 
 
-def _read(folder: Path, manifest: Mapping[str, Any], metrics: Mapping[str, Any], scenario: Scenario) -> Run:
+def _read_run(folder: Path, manifest: Mapping[str, Any], metrics: Mapping[str, Any], scenario: Scenario) -> Run:
     def record(where: Path) -> None:
         shutil.copy(find_part(folder, RECORDING), where)
 

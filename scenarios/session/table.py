@@ -1,6 +1,6 @@
 """The metrics of a run as a table: engines by quantities."""
 
-# pandas carries no types.
+# pandas has no type annotations.
 # pyright: reportMissingTypeStubs=false
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from ...reports.measure import flatten_metrics
 if TYPE_CHECKING:
     import pandas as pd
 
-# Columns that hold text where they hold anything; all others are numbers.
+# Columns of text; all others are numbers.
 _TEXTS = ("ended", "not_finite", "inconsistent_reports")
 
 
 class MetricsTable(Mapping[str, Mapping[str, Any]]):
-    """Metrics of a run, one row an engine: a mapping of engine names to the quantities of ``metrics.json``.
+    """Metrics of a run: a mapping from engine names to the quantities of ``metrics.json``.
 
-    The printed table is that of `velodrome run`, with the same remarks below it; `columns` and `to_pandas` have all
+    The printed table is that of `velodrome run`, with the same remarks below it. `columns` and `to_pandas` contain all
     quantities.
 
     Parameters
     ----------
     rows : mapping
-        Metrics by the name of an engine, JSON values.
+        JSON values of the metrics by engine.
     duration : float
-        Simulated time that the run asked for [s].
+        Requested simulated time of the run [s].
 
     Examples
     --------
@@ -59,12 +59,12 @@ class MetricsTable(Mapping[str, Mapping[str, Any]]):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of all columns; a quantity with parts has one for each, such as ``position_error_max``."""
+        """Names of all columns; a quantity with parts has one column per part, such as ``position_error_max``."""
         flat = (flatten_metrics(row) for row in self._rows.values())
         return tuple(dict.fromkeys(name for row in flat for name in row))
 
     def column(self, name: str) -> dict[str, Any]:
-        """Return one column: the value for each engine, None where there is none.
+        """Return one column as a mapping from engines to values; None for engines without a value.
 
         Parameters
         ----------
@@ -82,13 +82,13 @@ class MetricsTable(Mapping[str, Mapping[str, Any]]):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a reader must know before trusting a row: falls, early ends, reports that contradict coordinates."""
+        """Warnings about rows: falls, early ends, and reports that contradict the coordinates."""
         return tuple(line for name, row in self._rows.items() for line in make_remarks(name, row, self._duration))
 
     def to_pandas(self) -> pd.DataFrame:
         """Return all columns as a data frame with the engines as index.
 
-        Numbers that an engine does not have are NaN. Lists of names are one text, joined by commas.
+        Missing numbers are NaN. Lists of names are joined to one text with commas.
 
         Raises
         ------
@@ -118,7 +118,7 @@ class MetricsTable(Mapping[str, Mapping[str, Any]]):
         return "\n".join([text.rstrip() for text in texts] + list(self.remarks))
 
     def to_html(self) -> str:
-        """Return the table with its remarks as HTML, as a notebook shows it."""
+        """Return the table with its remarks as HTML for notebooks."""
         heads = "".join(f"<th>{escape(title)}<br>[{escape(unit)}]</th>" for title, unit, _, _ in COLUMNS)
         rows = "".join(
             f"<tr><th>{escape(name)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in self._cells(name))}</tr>"

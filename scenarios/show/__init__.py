@@ -1,4 +1,4 @@
-"""What a scenario, an engine, a bicycle or a file's format holds, as documents and as JSON schemas."""
+"""Documents and JSON schemas of scenarios, engines, the bicycle and file formats."""
 
 from .documents import kind_of, make_document
 from .schemas import make_schema

@@ -32,12 +32,12 @@ FILES = ("scenario", "sweep")
 
 
 def kind_of(name: str) -> str:
-    """Tell what a name is of: ``scenario``, ``sweep``, ``bicycle`` or ``engine``; of files, ``scenario`` or ``sweep``.
+    """Return what a name refers to: ``scenario``, ``sweep``, ``bicycle`` or ``engine``.
 
     Raises
     ------
     ScenarioError
-        If it is of nothing.
+        If the name refers to nothing.
     """
     if name in (BICYCLE, *FILES):
         return name
@@ -66,28 +66,28 @@ def make_document(name: str, sweep: type[BaseModel]) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``kind`` and ``name``. Of a ``scenario`` its tables as resolved, with all parameters of the bicycle and all
-        settings of all installed engines, and ``units`` by dotted key. Of an ``engine``: ``version``, ``package``,
-        ``description``, ``gives``, ``settings`` by name (see `FieldFacts`). Of the ``bicycle``: ``parameters``,
-        ``units``, ``descriptions``. Of a ``file``: ``tables`` (see `TableFacts`).
+        ``kind`` and ``name``, and for a ``scenario``: its resolved tables, with all parameters of the bicycle and all
+        settings of all installed engines, and ``units`` by dotted key. For an ``engine``: ``version``, ``package``,
+        ``description``, ``gives``, ``settings`` by name (see `FieldFacts`). For the ``bicycle``: ``parameters``,
+        ``units``, ``descriptions``. For a ``file``: ``tables`` (see `TableFacts`).
 
     Raises
     ------
     ScenarioError
-        If there is no such thing, or it cannot be read or loaded.
+        If the name refers to nothing, or the scenario or engine cannot be read or loaded.
     """
     kind = kind_of(name)
     if kind == "engine":
-        return _engine(name)
+        return _describe_engine(name)
     if kind == BICYCLE:
-        return _bicycle()
+        return _describe_bicycle()
     if name in FILES:
         schema = scenario_schema() if name == "scenario" else sweep.model_json_schema()
         return {"kind": "file", "name": name, "tables": [table.as_json() for table in list_tables(schema)]}
-    return _scenario(name)
+    return _describe_scenario(name)
 
 
-def _engine(name: str) -> dict[str, Any]:
+def _describe_engine(name: str) -> dict[str, Any]:
     settings = settings_schema(name)
     engine = load_engine(name)
     return {
@@ -101,7 +101,7 @@ def _engine(name: str) -> dict[str, Any]:
     }
 
 
-def _bicycle() -> dict[str, Any]:
+def _describe_bicycle() -> dict[str, Any]:
     return {
         "kind": "bicycle",
         "name": "benchmark",
@@ -112,7 +112,7 @@ def _bicycle() -> dict[str, Any]:
     }
 
 
-def _scenario(source: str) -> dict[str, Any]:
+def _describe_scenario(source: str) -> dict[str, Any]:
     name, scenario = load_scenario(source)
     faults = list_engine_faults(scenario.engines)
     if faults:
@@ -122,19 +122,19 @@ def _scenario(source: str) -> dict[str, Any]:
         try:
             settings[engine] = configure_engine(engine, scenario.engines.get(engine, {}))[1]
         except ScenarioError:
-            continue  # one that cannot be loaded; velodrome list says why
+            continue  # the engine cannot be loaded; velodrome list gives the reason
     resolved = resolve_scenario(scenario, settings).model_dump(mode="json", exclude_none=True)
-    return {"kind": "scenario", "name": name} | resolved | {"units": _units(resolved)}
+    return {"kind": "scenario", "name": name} | resolved | {"units": _find_units(resolved)}
 
 
-def _units(resolved: Mapping[str, Any]) -> dict[str, str]:
-    """Units of a resolved scenario's numbers, by dotted key; pure numbers and words have none."""
+def _find_units(resolved: Mapping[str, Any]) -> dict[str, str]:
+    """Return the units of a resolved scenario's values by dotted key; dimensionless numbers and texts have none."""
     found = {}
     for table in list_tables(scenario_schema()):
         values: Any = resolved
         for key in table.name.split(".") if table.name else ():
             values = values.get(key, {})
-        # Of several kinds of a table the one that it is of.
+        # If a table has several kinds, only the scenario's own kind counts.
         if table.kind is None or values.get("kind") == table.kind:
             for key, field in table.fields.items():
                 if key in values and field.unit not in (None, "1"):

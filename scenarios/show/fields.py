@@ -1,4 +1,4 @@
-"""The fields of a settings model or of a file's table: unit, default and range, read from its JSON schema."""
+"""Fields of settings and of tables in files, with unit, default and range, read from JSON schemas."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ Schema = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class FieldFacts:
-    """What may be written for one key.
+    """Permitted values and meaning of one key.
 
     Attributes
     ----------
     type : str
-        As JSON Schema calls it; several are separated by ``or``.
+        Type as named by JSON Schema; several types are separated by ``or``.
     required : bool
     default : Any
-        JSON value; None for a required field, and for one that is not set by default.
+        JSON value; None for a required field, and for a field that is not set by default.
     unit : str or None
-        ``1`` of a pure number; None of what is no number, or where the model does not say.
+        Unit, ``1`` for a dimensionless number; None for other values, or if the model states no unit.
     minimum, maximum : float or None
     exclusive_minimum, exclusive_maximum : float or None
         Bounds that the value must not reach.
     choices : list or None
-        All values that there are; None where there are others.
+        All permitted values; None if they are not a list of choices.
     description : str
     """
 
@@ -42,21 +42,23 @@ class FieldFacts:
     description: str
 
     def as_json(self) -> dict[str, Any]:
-        """As a document has it, with the range in words besides."""
+        """Return the JSON document of the field, including the range as text."""
         return asdict(self) | {"range": self.range}
 
     @property
     def range(self) -> str:
-        """The range in words; empty where there is none."""
+        """The range as text; empty if there is none."""
         if self.choices is not None:
             return "one of " + ", ".join(str(choice) for choice in self.choices)
-        low = _bound("from", self.minimum, "above", self.exclusive_minimum)
-        high = _bound("to" if self.minimum is not None else "at most", self.maximum, "below", self.exclusive_maximum)
+        low = _format_bound("from", self.minimum, "above", self.exclusive_minimum)
+        high = _format_bound(
+            "to" if self.minimum is not None else "at most", self.maximum, "below", self.exclusive_maximum
+        )
         joint = " " if self.minimum is not None and self.maximum is not None else ", "
         return joint.join(part for part in (low, high) if part)
 
 
-def _bound(word: str, value: float | None, exclusive_word: str, exclusive: float | None) -> str:
+def _format_bound(word: str, value: float | None, exclusive_word: str, exclusive: float | None) -> str:
     if value is not None:
         return f"{word} {value!r}"
     return "" if exclusive is None else f"{exclusive_word} {exclusive!r}"
@@ -69,12 +71,12 @@ class TableFacts:
     Attributes
     ----------
     name : str
-        Dotted; empty for what stands above all tables.
+        Dotted name; empty for the top level of the file.
     kind : str or None
-        Value of its key ``kind``; None where there is no choice.
+        Value of its key ``kind``; None if there is only one kind.
     description : str
     fields : dict
-        By key.
+        Fields by key.
     """
 
     name: str
@@ -83,13 +85,13 @@ class TableFacts:
     fields: dict[str, FieldFacts]
 
     def as_json(self) -> dict[str, Any]:
-        """As a document has it."""
+        """Return the JSON document of the table."""
         fields = {key: field.as_json() for key, field in self.fields.items()}
         return {"table": self.name, "kind": self.kind, "description": self.description, "fields": fields}
 
 
 def list_fields(schema: Schema) -> dict[str, FieldFacts]:
-    """Fields of a JSON schema of an object that are no tables, by key."""
+    """Return the fields of an object's JSON schema that are not tables, by key."""
     required = schema.get("required", ())
     found = {}
     for key, entry in schema.get("properties", {}).items():
@@ -99,28 +101,34 @@ def list_fields(schema: Schema) -> dict[str, FieldFacts]:
 
 
 def list_tables(schema: Schema, name: str = "", kind: str | None = None) -> Iterator[TableFacts]:
-    """Tables of a file from its JSON schema, each before those inside it."""
-    yield from _walk(schema, schema.get("$defs", {}), name, kind, str(schema.get("description", "")))
+    """Yield the tables of a file from its JSON schema, each before its nested tables."""
+    yield from _walk_tables(schema, schema.get("$defs", {}), name, kind, str(schema.get("description", "")))
 
 
-def _walk(schema: Schema, definitions: Schema, name: str, kind: str | None, description: str) -> Iterator[TableFacts]:
+def _walk_tables(
+    schema: Schema, definitions: Schema, name: str, kind: str | None, description: str
+) -> Iterator[TableFacts]:
     yield TableFacts(name, kind, " ".join(description.split()), list_fields(schema))
     for key, entry in schema.get("properties", {}).items():
         inner = f"{name}.{key}" if name else key
-        said = str(entry.get("description", ""))
+        field_text = str(entry.get("description", ""))
         references = list(_find_tables(entry))
         for reference in references:
             table = definitions[reference.rpartition("/")[2]]
-            # One of several kinds is told by its own words.
-            words = table.get("description", said) if len(references) > 1 else said or table.get("description", "")
+            # If there are several kinds, each is described by its own model.
+            text = (
+                table.get("description", field_text)
+                if len(references) > 1
+                else field_text or table.get("description", "")
+            )
             own_kind = table.get("properties", {}).get("kind", {}).get("const")
-            yield from _walk(table, definitions, inner, own_kind, words)
+            yield from _walk_tables(table, definitions, inner, own_kind, text)
         if not references and _is_table(entry):
-            yield from _walk(entry, definitions, inner, None, said)
+            yield from _walk_tables(entry, definitions, inner, None, field_text)
 
 
 def _find_tables(entry: Schema) -> Iterator[str]:
-    """References to the tables that a field may be."""
+    """Yield the references to the tables that a field may hold."""
     if "$ref" in entry:
         yield entry["$ref"]
     for option in (*entry.get("anyOf", ()), *entry.get("oneOf", ())):
@@ -133,7 +141,7 @@ def _is_table(entry: Schema) -> bool:
 
 def _make_facts(entry: Schema, required: bool) -> FieldFacts:
     options = [option for option in entry.get("anyOf", [entry]) if option.get("type") != "null"]
-    # An optional number has its bounds inside.
+    # The bounds of an optional number are those of its only option.
     flat: dict[str, Any] = {**(options[0] if len(options) == 1 else {}), **entry}
     kinds = dict.fromkeys(str(option["type"]) for option in options if "type" in option)
     return FieldFacts(

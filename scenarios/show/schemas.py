@@ -1,4 +1,4 @@
-"""JSON schemas of what users write, for editors: scenario files, sweep files, engines' settings, a bicycle's table."""
+"""JSON schemas for editors: scenario files, sweep files, settings of engines, and the table of a bicycle."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def make_schema(kind: str, name: str, sweep: type[BaseModel]) -> dict[str, Any]:
     kind : str
         ``scenario``, ``sweep``, ``bicycle`` or ``engine``.
     name : str
-        Of the engine; not looked at otherwise.
+        Name of the engine; ignored for other kinds.
     sweep : type
-        Model of sweep files, which belong to a room that this one does not know.
+        Model of sweep files, passed in because this subpackage does not import `velodrome.scenarios.sweep`.
 
     Returns
     -------
     dict
-        In the dialect 2020-12.
+        A schema in the dialect 2020-12.
 
     Raises
     ------
@@ -38,36 +38,36 @@ def make_schema(kind: str, name: str, sweep: type[BaseModel]) -> dict[str, Any]:
         If the engine cannot be loaded.
     """
     if kind == "engine":
-        return _headed(settings_schema(name), f"Settings of {name}: the table [engines.{name}] of a scenario file")
+        return _add_heading(settings_schema(name), f"Settings of {name}: the table [engines.{name}] of a scenario file")
     if kind == "sweep":
-        return _headed(sweep.model_json_schema(), "A sweep file")
+        return _add_heading(sweep.model_json_schema(), "A sweep file")
     scenario = scenario_schema()
     if kind == "bicycle":
-        return _headed(scenario["properties"]["bicycle"], "The table [bicycle] of a scenario file")
-    return _headed(scenario, "A scenario file")
+        return _add_heading(scenario["properties"]["bicycle"], "The table [bicycle] of a scenario file")
+    return _add_heading(scenario, "A scenario file")
 
 
 def scenario_schema() -> dict[str, Any]:
-    """JSON schema of scenario files, with the settings of all installed engines that can be loaded."""
+    """Return the JSON schema of scenario files, with the settings of all installed engines that can be loaded."""
     schema = Scenario.model_json_schema()
     engines = {}
     for name in installed_engines():
         try:
-            engines[name] = _nested(name, settings_schema(name), schema.setdefault("$defs", {}))
+            engines[name] = _nest_schema(name, settings_schema(name), schema.setdefault("$defs", {}))
         except ScenarioError:
-            continue  # a scenario for the other engines can be written all the same
-    # A table for an engine that is not installed here is refused, so it is named as a mistake here too.
+            continue  # the schema is still useful for the other engines
+    # Scenarios with tables of engines that are not installed are refused, so the schema refuses them too.
     schema["properties"]["engines"] |= {"properties": engines, "additionalProperties": False}
     return schema
 
 
 def settings_schema(name: str) -> dict[str, Any]:
-    """JSON schema of an engine's settings.
+    """Return the JSON schema of an engine's settings.
 
     Raises
     ------
     ScenarioError
-        If the engine cannot be loaded, or its settings have none.
+        If the engine cannot be loaded, or its settings have no JSON schema.
     """
     try:
         engine = load_engine(name)
@@ -79,22 +79,22 @@ def settings_schema(name: str) -> dict[str, Any]:
         raise ScenarioError(f"engine {name!r}: its settings have no JSON schema: {why_failed(error)}") from error
 
 
-def _nested(name: str, schema: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
-    """A schema inside another: its own definitions move there, under names of their own."""
+def _nest_schema(name: str, schema: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
+    """Prepare a schema for use inside another one, whose ``definitions`` receive its own under unique names."""
     for key, definition in schema.pop("$defs", {}).items():
-        definitions[f"{name}.{key}"] = _moved(definition, name)
-    return _moved(schema, name)
+        definitions[f"{name}.{key}"] = _move_references(definition, name)
+    return _move_references(schema, name)
 
 
-def _moved(value: Any, name: str) -> Any:
+def _move_references(value: Any, name: str) -> Any:
     if isinstance(value, Mapping):
-        moved = {key: _moved(inner, name) for key, inner in value.items()}
+        moved = {key: _move_references(inner, name) for key, inner in value.items()}
         reference = moved.get("$ref")
         if isinstance(reference, str):
             moved["$ref"] = reference.replace("#/$defs/", f"#/$defs/{name}.", 1)
         return moved
-    return [_moved(inner, name) for inner in value] if isinstance(value, list) else value
+    return [_move_references(inner, name) for inner in value] if isinstance(value, list) else value
 
 
-def _headed(schema: Mapping[str, Any], title: str) -> dict[str, Any]:
+def _add_heading(schema: Mapping[str, Any], title: str) -> dict[str, Any]:
     return {"$schema": DIALECT} | dict(schema) | {"title": title}

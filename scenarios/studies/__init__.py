@@ -1,4 +1,4 @@
-"""Studies that run one scenario many times."""
+"""Studies of a bicycle and of the precision of engines."""
 
 from .bicycle import BicycleStudy, find_bicycle, study_bicycle, write_bicycle
 from .precision import all_ran, study_precision, write_precision

@@ -1,4 +1,4 @@
-"""A bicycle by itself: its parameters, canonical matrices, and eigenvalues of upright motion over speed."""
+"""Study of a bicycle: its parameters, canonical matrices, and eigenvalues of upright motion over speed."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ BENCHMARK = "benchmark"
 
 @dataclass(frozen=True)
 class BicycleStudy:
-    """What the linearised equations of upright straight motion say of a bicycle.
+    """Results of the linearised equations of upright straight motion for a bicycle.
 
     Attributes
     ----------
     source : BicycleFile
-        The bicycle, with the deviations of its parameters.
+        The bicycle, with the standard deviations of its parameters.
     matrices : CanonicalMatrices
     speeds : ndarray, shape (n,)
         Forward speeds [m/s].
     eigenvalues : ndarray, shape (n, 4), complex
-        Sorted by real part, then imaginary part [1/s].
+        Eigenvalues, sorted by real part, then imaginary part [1/s].
     followed : ndarray, shape (n, 4), complex
-        The same eigenvalues, a column for each mode that ``modes`` names [1/s].
+        The same eigenvalues, with one column for each mode in ``modes`` [1/s].
     modes : tuple of str
     weave_speed, capsize_speed : float or None
         [m/s].
@@ -67,7 +67,7 @@ class BicycleStudy:
     stable_speeds: list[tuple[float, float]]
 
     def as_json(self) -> dict[str, Any]:
-        """Return the JSON document of `velodrome bicycle`; a range without end has null there."""
+        """Return the JSON document of `velodrome bicycle`; the end of an unlimited range is null."""
         m = self.matrices
         return {
             "name": self.source.name,
@@ -78,8 +78,8 @@ class BicycleStudy:
             "warnings": list(self.source.bicycle.warnings()),
             "canonical": {name: getattr(m, name).tolist() for name in ("M", "C1", "K0", "K2")},
             "speeds": self.speeds.tolist(),
-            "eigenvalues": _pairs(self.eigenvalues),
-            "modes": {"names": list(self.modes), "eigenvalues": _pairs(self.followed)},
+            "eigenvalues": _split_complex(self.eigenvalues),
+            "modes": {"names": list(self.modes), "eigenvalues": _split_complex(self.followed)},
             "weave_speed": self.weave_speed,
             "capsize_speed": self.capsize_speed,
             "speed_deviations": self.deviations,
@@ -88,12 +88,12 @@ class BicycleStudy:
         }
 
 
-def _pairs(values: np.ndarray) -> list[list[list[float]]]:
+def _split_complex(values: np.ndarray) -> list[list[list[float]]]:
     return [[[value.real, value.imag] for value in row] for row in values.tolist()]
 
 
 def find_bicycle(source: str) -> BicycleFile:
-    """Read a bicycle from wherever it is described.
+    """Find a bicycle by name, or read it from a bicycle file or a scenario.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def find_bicycle(source: str) -> BicycleFile:
     Raises
     ------
     ScenarioError
-        If there is none.
+        If the source cannot be found or read.
     """
     if source == BENCHMARK:
         return BicycleFile(BENCHMARK, Bicycle(), convention="the suite's names, z up")
@@ -112,7 +112,7 @@ def find_bicycle(source: str) -> BicycleFile:
         try:
             is_scenario = bool({"motion", "simulation"} & set(read_toml(path.read_text(encoding="utf-8-sig"))))
         except (OSError, ValueError):
-            is_scenario = False  # the reader of bicycle files says what is wrong
+            is_scenario = False  # `read_bicycle_file` reports the fault
         if not is_scenario:
             return read_bicycle_file(path)
     elif path.suffix or path.exists():
@@ -162,7 +162,7 @@ def study_bicycle(source: BicycleFile, speeds: np.ndarray) -> BicycleStudy:
 
 def write_bicycle(study: BicycleStudy, out: Path) -> list[Path]:
     """Write the document and the figure of a study into a folder, and return their paths."""
-    # matplotlib, which the document does not need.
+    # Imported here, since the document does not need matplotlib.
     from ...reports.figures import eigenvalue_figure
 
     make_folder(out)

@@ -1,4 +1,4 @@
-"""`velodrome precision`: every engine at halved steps, and about the motion its own linear system."""
+"""Work-precision study: every engine with halved steps, and its own linear system about the motion."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from ..files import make_folder, write_json
 from ..run import RunPlan, RunWatch, Trace, claimed_noise, library_versions, measure_one, plan_run
 from ..scenario import Scenario, Start
 
-COARSEST = 4.0  # times the scenario's step
+COARSEST = 4.0  # factor on the scenario's step
 STEP_LEVELS = 5
-_LONGEST_INTERVAL = 200  # output intervals of the scenario merged so that the coarsest steps divide them
+_LONGEST_INTERVAL = 200  # number of output intervals that may be merged so that the coarsest steps divide them
 
 
 @dataclass(frozen=True)
@@ -33,13 +33,13 @@ class Study:
     Attributes
     ----------
     levels : list of Level
-        Those that ran to the end.
+        Levels that ran to the end.
     failures : list of dict
-        ``step`` and ``reason`` of those that did not.
+        ``step`` and ``reason`` of the other levels.
     ran : bool
-        Whether any level rode at all, or there was none to ride.
+        True if the engine ran on at least one level, or there were no levels to run.
     identified : Identified, str or None
-        Its own linear system, or why there is none.
+        The engine's own linear system, or the reason why there is none; None if it was not requested.
     """
 
     levels: list[Level]
@@ -64,15 +64,15 @@ def study_precision(
     name : str
     scenario : Scenario
     wanted : list of str or None
-        Engines beside the reference; all that are installed if None.
+        Engines in addition to the reference; all installed engines if None.
     levels : int
-        Steps, each half the one before, from `COARSEST` times the scenario's on.
+        Number of steps, each half of the previous one; the first is `COARSEST` times the scenario's step.
     eigenvalues : bool
         Whether to measure each engine's linear system too.
     watch : callable
-        Called with what is run, the simulated time reached and the duration.
+        Called with the name of the running part, the simulated time reached and the duration [s].
     trace : callable, optional
-        Called with an engine that broke and what it raised.
+        Called with the name of an engine that failed and its exception.
 
     Returns
     -------
@@ -82,22 +82,22 @@ def study_precision(
     Raises
     ------
     ScenarioError
-        If the scenario cannot be run, no output interval fits all steps, or the reference does not get through.
+        If the scenario cannot be run, no output interval fits all steps, or the reference does not reach the end.
     """
     plan = plan_run(name, scenario, wanted)
     factors = [COARSEST / 2**level for level in range(levels)]
-    # The reference is the yardstick: its own levels are coarser than itself.
+    # Errors are relative to the reference, so its own levels have coarser steps than the reference ride.
     coarser = [2.0 ** (levels - level) for level in range(levels)]
     ladders = {
-        engine: _ladder(settings, coarser if engine == REFERENCE else factors)
+        engine: _make_ladder(settings, coarser if engine == REFERENCE else factors)
         for engine, (_, settings) in plan.engines.items()
     }
-    problem = _sampled(plan, ladders)
+    problem = _sample_problem(plan, ladders)
     engine, settings = plan.engines[REFERENCE]
     watch(REFERENCE, 0.0, _duration(problem))
     try:
         reference = ride_engine(engine, problem, settings, lambda t: watch(REFERENCE, t, _duration(problem)))
-    except Exception as error:  # without it there is nothing to measure against
+    except Exception as error:  # errors cannot be measured without the reference
         raise ScenarioError(f"{name}: the reference did not run: {why_failed(error)}") from error
     if reference.ended is not None:
         raise ScenarioError(f"{name}: the reference ends at {reference.time[-1]:.6g} s: {reference.ended}")
@@ -105,23 +105,23 @@ def study_precision(
     q, qd = plan.start.undisturbed
     undisturbed = replace(plan.start.problem, q=q, qd=qd)
     for engine_name, (engine, settings) in plan.engines.items():
-        runs = list(_runs(engine, ladders[engine_name], plan.start, problem, reference, watch, trace))
+        runs = list(_run_levels(engine, ladders[engine_name], plan.start, problem, reference, watch, trace))
         found = [run for run in runs if isinstance(run, Level)]
         failures = [run.as_json() for run in runs if isinstance(run, _Failure)]
         ran = not runs or not all(isinstance(run, _Failure) and run.broke for run in runs)
-        identified = _identified(engine, settings, undisturbed, watch, trace) if eigenvalues else None
+        identified = _identify(engine, settings, undisturbed, watch, trace) if eigenvalues else None
         studies[engine_name] = Study(found, failures, ran, identified)
-    return _document(name, plan.start, problem, reference, undisturbed, studies)
+    return _make_document(name, plan.start, problem, reference, undisturbed, studies)
 
 
 def all_ran(document: Mapping[str, Any]) -> bool:
-    """Whether every engine of a document of `velodrome precision` rode at one step at least."""
+    """Return whether every engine of a document of `velodrome precision` ran with at least one step."""
     return all(entry["ran"] for entry in document["engines"].values())
 
 
 @dataclass(frozen=True)
 class _Failure:
-    """A level without a result: its step, why, and whether the engine broke instead of riding."""
+    """A level without a result: its step, the reason, and whether the engine raised an exception."""
 
     step: float | None
     reason: str
@@ -135,19 +135,19 @@ def _duration(problem: Problem) -> float:
     return float(problem.times[-1])
 
 
-def _ladder(settings: Settings, factors: list[float]) -> list[Settings]:
-    """Settings of all levels that are in range."""
+def _make_ladder(settings: Settings, factors: list[float]) -> list[Settings]:
+    """Return the settings of all levels whose steps are in range."""
     found = []
     for factor in factors:
         try:
             found.append(call_engine(settings.refined, factor))
         except ValueError:
-            continue  # beyond what the engine allows: fewer levels
+            continue  # the engine does not allow this step
     return found
 
 
-def _refinable(settings: Settings) -> Settings:
-    """These settings, or as much coarser as it takes for them to be halved as often as eigenvalues need."""
+def _make_refinable(settings: Settings) -> Settings:
+    """Return the settings, with a coarser step if necessary for the number of halvings that eigenvalues need."""
     for factor in (2.0**coarser for coarser in range(IDENTIFY_LEVELS)):
         try:
             settings.refined(factor * 0.5 ** (IDENTIFY_LEVELS - 1))
@@ -157,8 +157,8 @@ def _refinable(settings: Settings) -> Settings:
     return settings
 
 
-def _sampled(plan: RunPlan, ladders: Mapping[str, list[Settings]]) -> Problem:
-    """The scenario's problem, sampled at the shortest interval that all steps divide."""
+def _sample_problem(plan: RunPlan, ladders: Mapping[str, list[Settings]]) -> Problem:
+    """Return the scenario's problem, sampled at the shortest interval that all steps divide."""
     simulation = plan.scenario.simulation
     samples = round(simulation.duration * simulation.output_rate)
     for merged in range(1, min(samples, _LONGEST_INTERVAL) + 1):
@@ -175,18 +175,18 @@ def _sampled(plan: RunPlan, ladders: Mapping[str, list[Settings]]) -> Problem:
 
 
 def _fits(name: str, engine: Engine, ladder: list[Settings], problem: Problem) -> bool:
-    """Whether an engine takes a problem with the settings of all levels."""
+    """Return whether an engine accepts a problem with the settings of all levels."""
     try:
         for settings in ladder:
             engine.check(problem, settings)
     except ValueError:
         return False
-    except Exception as error:  # an engine may break here as well
+    except Exception as error:  # an engine's check may raise anything
         raise ScenarioError(f"engines.{name}: its check failed: {why_failed(error)}") from error
     return True
 
 
-def _runs(
+def _run_levels(
     engine: Engine,
     ladder: list[Settings],
     start: Start,
@@ -199,7 +199,7 @@ def _runs(
         step = getattr(settings, "step", None)
         try:
             trajectory = ride_engine(engine, problem, settings, lambda t: watch(engine.name, t, _duration(problem)))
-        except Exception as error:  # whatever an engine raises must not cost the others' results
+        except Exception as error:  # an engine may raise anything; the other engines still run
             yield _Failure(step, why_failed(error), broke=True)
             if trace is not None:
                 trace(engine.name, error)
@@ -213,15 +213,17 @@ def _runs(
             yield Level(_duration(problem) / trajectory.steps, trajectory, measured)
 
 
-def _identified(
+def _identify(
     engine: Engine, settings: Settings, undisturbed: Problem, watch: RunWatch, trace: Trace | None
 ) -> Identified | str:
     if not isinstance(undisturbed.surface, SurfaceOfRevolution):
         return "the ground is no surface of revolution, so that the motion is not steady"
     label = f"{engine.name} modes"
     try:
-        return call_engine(identify, engine, _refinable(settings), undisturbed, lambda done: watch(label, done, 1.0))
-    except (ArithmeticError, ValueError) as error:  # numpy's LinAlgError among them: there may be no such system
+        return call_engine(
+            identify, engine, _make_refinable(settings), undisturbed, lambda done: watch(label, done, 1.0)
+        )
+    except (ArithmeticError, ValueError) as error:  # includes numpy's LinAlgError: the system may not exist
         return " ".join(str(error).split())
     except Exception as error:
         if trace is not None:
@@ -229,7 +231,7 @@ def _identified(
         return why_failed(error)
 
 
-def _document(
+def _make_document(
     name: str,
     start: Start,
     problem: Problem,
@@ -263,7 +265,7 @@ def _document(
 
 
 def write_precision(document: Mapping[str, Any], out: Path) -> list[Path]:
-    """Write the document and its figure into a folder, which is made if need be.
+    """Write the document and its figure into a folder, which is made if it does not exist.
 
     Raises
     ------

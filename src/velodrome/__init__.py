@@ -1,7 +1,7 @@
 """Cross-validation of multibody engines on a bicycle that rides hands-free in circles inside a bowl.
 
-What `__all__` lists is public, with the modules that the reference pages list; everything else may change in any
-release. A name is imported when it is first asked for: ``import velodrome`` by itself loads no library.
+The names in `__all__` and the modules on the reference pages are public; everything else may change in any release.
+Names are imported when they are first used: ``import velodrome`` by itself loads no library.
 
 Examples
 --------
@@ -94,7 +94,7 @@ __all__ = [
     "surface_function",
 ]
 
-# Where a public name comes from.
+# Modules of the public names.
 _HOMES = {
     ".engines.engine": (
         "Engine",
@@ -119,10 +119,10 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 
-if not TYPE_CHECKING:  # or type checkers would take any name for a public one
+if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
 
     def __getattr__(name: str) -> object:
-        """Import a public name when it is first asked for."""
+        """Import a public name when it is first used."""
         if name == "__version__":
             from importlib.metadata import version
 

@@ -1,13 +1,13 @@
-"""Tests for engines: whether one keeps to what the suite asks of it, and a diagnosis where it does not.
+"""The conformance test for engines, with a diagnosis of each failed check.
 
-In a test of the engine's package::
+Use in a test of the engine's package::
 
     from velodrome.testing import check_engine
 
     def test_the_engine_conforms() -> None:
-        check_engine("own")  # or the engine itself; an AssertionError lists what fails
+        check_engine("own")  # or the engine object; an AssertionError lists the failed checks
 
-Or by hand, which prints every check::
+Use in a script that prints every check::
 
     from velodrome.testing import examine_engine
 

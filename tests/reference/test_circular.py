@@ -107,7 +107,7 @@ def test_another_bicycle_is_reached_from_the_benchmark(change: dict[str, float])
 
 
 def test_near_is_refused_where_nothing_is_near() -> None:
-    with pytest.raises(ValueError, match=r"within 0\.2 rad of near; the nearest is at 0\.7"):
+    with pytest.raises(ValueError, match=r"within 0\.2 rad of near = 0\.2, 2; the nearest is at 0\.7"):
         find_motion(BICYCLE, Paraboloid(0.005), 18.0, 2, near=(0.2, 2.0))
 
 

@@ -87,7 +87,6 @@ CURVES = {
         (1, "large circle", "flat"),  # from B to F: family 3 has no other forward part
         (2, "pivot", "flat"),
         (3, "pivot", "fast front wheel"),
-        (4, "pivot", "flat"),  # the same as family 2's
         (4, "large circle", "large circle"),  # C, and slow circles
         (1, "static", "large circle"),  # A, and slow circles
     ],
@@ -95,7 +94,6 @@ CURVES = {
         (1, "large circle", "large circle"),  # B, and slow circles
         (2, "pivot", "flat"),
         (3, "pivot", "flat"),
-        (4, "pivot", "flat"),
         (3, "flat", "static"),  # from F to A
         (4, "large circle", "large circle"),
     ],

@@ -228,7 +228,7 @@ def test_what_an_engine_of_low_order_hides_is_said() -> None:
         check = examine_engine(engine)["rates on plane"]
         assert check.outcome == "passed"
         assert check.found == (
-            "rates half a step late, by 0.001 s, could not have been told: its own error is not smaller",
+            "rates half a step late, by 0.001 s, could not have been detected: its own error is not smaller",
         )
     # Signs it tells all the same.
     assert "steer looks mirrored" in said(examine_engine(plant("mujoco-default", mirrored_back("steer"))))
@@ -236,7 +236,7 @@ def test_what_an_engine_of_low_order_hides_is_said() -> None:
 
 
 def test_the_check_says_what_it_would_have_told() -> None:
-    assert "would have been told" in examine_engine("exudyn")["rates on plane"].found[0]
+    assert "would have been detected" in examine_engine("exudyn")["rates on plane"].found[0]
 
 
 # What is not the engine's own.

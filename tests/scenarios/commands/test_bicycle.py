@@ -8,6 +8,35 @@ import numpy as np
 import pytest
 
 CASES = Path(__file__).parents[2] / "cases"
+# A measured city bicycle, "Browser" of Moore (2012), z up.
+PAIRED = """
+wheelbase = 1.121
+trail = 0.0686
+steer_axis_tilt = 0.399680398707
+gravity = 9.81
+rear_wheel_radius = 0.341
+rear_wheel_mass = 3.1
+rear_wheel_Ixx = 0.0904
+rear_wheel_Iyy = 0.1524
+rear_frame_x = 0.274
+rear_frame_z = 0.538
+rear_frame_mass = 9.9
+rear_frame_Ixx = 0.5296
+rear_frame_Iyy = 1.3164
+rear_frame_Izz = 0.7568
+rear_frame_Ixz = 0.1163
+front_frame_x = 0.867
+front_frame_z = 0.748
+front_frame_mass = 3.2
+front_frame_Ixx = 0.2534
+front_frame_Iyy = 0.2458
+front_frame_Izz = 0.0956
+front_frame_Ixz = 0.072
+front_wheel_radius = 0.344
+front_wheel_mass = 2.0
+front_wheel_Ixx = 0.0884
+front_wheel_Iyy = 0.1492
+"""
 
 
 def test_the_document_is_complete(velodrome) -> None:
@@ -36,6 +65,18 @@ def test_the_table_and_files_are_written(velodrome, tmp_path: Path) -> None:
     result = velodrome("bicycle", "--out", str(tmp_path / "found"))
     assert "weave speed: 4.29238253634 m/s" in result.stdout
     assert {path.name for path in (tmp_path / "found").iterdir()} == {"bicycle.json", "eigenvalues.png"}
+
+
+def test_the_table_shows_a_pair_of_two_modes_as_complex(velodrome, tmp_path: Path) -> None:
+    """Capsize and castering of this bicycle are a pair at low speeds."""
+    path = tmp_path / "paired.toml"
+    path.write_text(PAIRED)
+    document = velodrome("bicycle", str(path), "--speeds", "1", "--json").json()
+    (real, imaginary), other = document["modes"]["eigenvalues"][0][2:]
+    assert abs(imaginary) > 0.1
+    assert other == [real, -imaginary]
+    table = velodrome("bicycle", str(path), "--speeds", "1").stdout
+    assert f"{real:.4f} {'+' if imaginary > 0 else '-'} {abs(imaginary):.4f} i" in table
 
 
 @pytest.mark.parametrize(

@@ -322,7 +322,7 @@ def test_two_engines_of_one_name_get_one_line(velodrome, monkeypatch: pytest.Mon
     def refuse() -> None:
         raise ValueError(words)
 
-    monkeypatch.setattr(registry, "_announced", refuse)
+    monkeypatch.setattr(registry, "_find_entry_points", refuse)
     for command in (("list",), ("run", "q2"), ("check",), ("precision", "q2"), ("diff", "a", "b")):
         result = velodrome(*command)
         assert (result.status, result.stderr) == (2, f"velodrome: {words}\n"), command

@@ -108,6 +108,13 @@ def test_toml_of_ours_is_read_with_its_uncertainties(tmp_path: Path) -> None:
     assert found.uncertainties == {"trail": 0.001}
 
 
+def test_a_toml_file_has_every_parameter(tmp_path: Path) -> None:
+    path = tmp_path / "partial.toml"
+    path.write_text("wheelbase = 1.1\ntrail = 0.07\n")
+    with pytest.raises(ScenarioError, match=r"steer_axis_tilt, rear_wheel_radius, .* missing; a bicycle"):
+        read_bicycle_file(path)
+
+
 def test_benchmark_in_meijaards_symbols_is_the_benchmark() -> None:
     found = read_bicycle_file(FOLDER / "tests/parameter_sets/benchmark-benchmark.yml").bicycle
     for one in fields(Bicycle):

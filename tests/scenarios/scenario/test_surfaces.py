@@ -16,8 +16,9 @@ from velodrome.reference.bowls import Cone, Sphere, Torus
 from velodrome.reference.circular import SIGMA, Steady
 from velodrome.reference.families import trace_all
 from velodrome.reference.height_field import HeightField
+from velodrome.reference.kinematics import REAR_ANGLE
 from velodrome.reference.profile import PolynomialProfile, SplineProfile
-from velodrome.reference.surface import Paraboloid, Plane, Surface
+from velodrome.reference.surface import InclinedPlane, Paraboloid, Plane, Surface
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.motions import solve_circular
 from velodrome.scenarios.motions.families import families_document
@@ -29,6 +30,7 @@ from velodrome.scenarios.scenario.surfaces import describe_surface, make_bowl, n
 GRID = [[0.1 * i * j for j in range(6)] for i in range(7)]
 SURFACES: list[tuple[str, Surface]] = [
     ("plane", Plane()),
+    ("inclined-plane:slope=0.06,direction=1", InclinedPlane(0.06, 1.0)),
     ("paraboloid:alpha=0.005", Paraboloid(0.005)),
     ("sphere:radius=20", Sphere(20.0)),
     ("cone:slope=0.1, rounding=5", Cone(0.1, 5.0)),
@@ -128,8 +130,10 @@ def test_a_steep_bowls_document_has_further_curves_after_the_families() -> None:
     document = families_document(0.5)
     json.dumps(document, allow_nan=False)
     assert document["absent"] == {}
-    assert [family["family"] for family in document["families"]] == [1, 2, 3, 4, 4, 1]
-    reversed_circles, slow = document["families"][4:]
+    assert [family["family"] for family in document["families"]] == [1, 2, 3, 4, 1]
+    # Families 2 and 4 have joined: their curve is listed once.
+    assert [family["joined_families"] for family in document["families"]] == [[], [4], [], [], []]
+    reversed_circles, slow = document["families"][3:]
     assert reversed_circles["ends"] == ["large circle", "large circle"]
     assert min(reversed_circles["points"]["steer"]) > np.pi / 2
     assert slow["ends"] == ["static", "large circle"]
@@ -178,3 +182,40 @@ def _ride(name: str, problem: Any, **settings: float) -> np.ndarray:
     trajectory = engine.simulate(problem, engine.settings(**settings), lambda _: None)
     assert trajectory.ended is None
     return trajectory.q[:, :3]
+
+
+def test_an_inclined_plane_speeds_a_straight_ride_up_by_its_slope() -> None:
+    """The bicycle's weight along the slope drives its mass and the spin of its wheels: closed form."""
+    slope = 0.06
+    data = {
+        "title": "Straight down",
+        "surface": {"kind": "inclined-plane", "slope": slope, "direction": float(np.pi)},
+        "motion": {"kind": "upright", "speed": 5.0},
+        "simulation": {"duration": 4.0, "output_rate": 10.0},
+    }
+    start = make_start(validate_scenario(data, "incline"))
+    bicycle = start.problem.bicycle
+    spin = sum(
+        getattr(bicycle, f"{wheel}_Iyy") / getattr(bicycle, f"{wheel}_radius") ** 2
+        for wheel in ("rear_wheel", "front_wheel")
+    )
+    acceleration = bicycle.gravity * np.sin(np.arctan(slope)) * bicycle.mass / (bicycle.mass + spin)
+    trajectory = load_engine("reference").simulate(start.problem, load_engine("reference").settings(), lambda _: None)
+    speeds = trajectory.qd[:, REAR_ANGLE] * bicycle.rear_wheel_radius
+    # The integrator's tolerance is 1e-12, relative to the state.
+    np.testing.assert_allclose(speeds, 5.0 + acceleration * trajectory.time, rtol=1e-9)
+    assert describe_surface(start.problem.surface) == data["surface"]
+
+
+def test_an_upright_start_may_be_anywhere_on_the_ground() -> None:
+    """A trough around the axis, with no ground at the origin."""
+    data = {
+        "title": "In a trough",
+        "surface": {"kind": "torus", "ring": 6.0, "tube": 5.0},
+        "motion": {"kind": "upright", "speed": 4.0},
+        "perturbation": {"y": -5.0},
+        "simulation": {"duration": 1.0, "output_rate": 10.0},
+    }
+    start = make_start(validate_scenario(data, "trough"))
+    assert start.problem.q[1] == -5.0
+    assert start.problem.q[0] == start.problem.bicycle.reference_point[0]

@@ -22,7 +22,7 @@ THREE = UPRIGHT + "perturbation.lean_rate = [0.0, 0.1, 0.2]\n"
 @pytest.fixture
 def in_process(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(command, "_work", lambda *_: here)
+    monkeypatch.setattr(command, "_choose_work", lambda *_: here)
     return tmp_path
 
 
@@ -75,7 +75,7 @@ def test_a_stopped_retry_says_how_to_go_on(
 
     path = written(in_process, THREE)
     assert command.run_sweep_command(path, None, None, None, resume=False, as_json=False) == 0
-    monkeypatch.setattr(command, "_work", lambda *_: interrupted)
+    monkeypatch.setattr(command, "_choose_work", lambda *_: interrupted)
     assert command.run_sweep_command(path, None, None, None, resume=True, as_json=False, retry=["done", "fell"]) == 130
     said = " ".join(capsys.readouterr().out.split())
     assert "--resume --retry done --retry fell" in said
