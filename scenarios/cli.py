@@ -62,24 +62,24 @@ def _take_options(
     pass
 
 
-# In the order of the help.
-for _command in (
-    list_command,
-    show_command,
-    run_command,
-    circular_command,
-    families_command,
-    critical_command,
-    atlas_command,
-    bicycle_command,
-    paper_command,
-    precision_command,
-    diff_command,
-    view_command,
-    sweep_command,
-    check_command,
-):
-    app.command(_command.__name__.removesuffix("_command"))(_command)
+# In the order of the help. The short helps fit beside the names in 60 columns, where longer ones would be cut.
+for _command, _short_help in {
+    list_command: "Scenarios and engines",
+    show_command: "A scenario, engine, bicycle or file format",
+    run_command: "Run scenarios and compare the engines",
+    circular_command: "One circular motion and its stability",
+    families_command: "The four families of circular motions",
+    critical_command: "The critical shapes of the bowl",
+    atlas_command: "Stability over alpha and rear rate",
+    bicycle_command: "A bicycle by itself: eigenvalues, speeds",
+    paper_command: "The paper's figures and numbers, computed",
+    precision_command: "Error and CPU time over step sizes",
+    diff_command: "Compare two stored runs",
+    view_command: "View a run's recording or report",
+    sweep_command: "Run a grid or a sample of scenarios",
+    check_command: "Hold the gated scenarios to baselines",
+}.items():
+    app.command(_command.__name__.removesuffix("_command"), short_help=_short_help)(_command)
 
 
 def supervised_main() -> NoReturn:

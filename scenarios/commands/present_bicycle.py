@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..studies import BicycleStudy
+from .tables import Column, print_table
 
 _SHOWN_SPEEDS = 11
 
@@ -21,7 +22,8 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
     for parameter in fields(source.bicycle):
         deviation = source.uncertainties.get(parameter.name)
         value = f"{getattr(source.bicycle, parameter.name):.9g}"
-        table.add_row(parameter.name, value, "" if deviation is None else f"± {deviation:.2g}")
+        # A file that states no deviation of a number has 0.
+        table.add_row(parameter.name, value, f"± {deviation:.2g}" if deviation else "")
     console.print(table)
     for line in source.bicycle.warnings():
         console.print(line, style="yellow", markup=False, soft_wrap=True)
@@ -34,11 +36,11 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
             matrices.add_row(name if k == 0 else "", *(f"{value:.12g}" for value in row))
     console.print(matrices)
     console.print()
-    console.print(_make_eigenvalue_table(study))
+    print_table(console, _make_eigenvalue_columns(study))
     console.print()
     for mode, speed in (("weave", study.weave_speed), ("capsize", study.capsize_speed)):
         deviation = study.deviations.get(mode)
-        spread = "" if deviation is None else f" ± {deviation:.2g}"
+        spread = f" ± {deviation:.2g}" if deviation else ""
         console.print(f"{mode} speed: {'none' if speed is None else f'{speed:.12g}{spread} m/s'}", highlight=False)
     ranges = [
         f"{start:.9g} to {end:.9g}" if end < inf else f"{start:.9g} and above" for start, end in study.stable_speeds
@@ -46,24 +48,22 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
     console.print(f"stable speeds: {'; '.join(ranges) + ' m/s' if ranges else 'none'}", highlight=False)
 
 
-def _make_eigenvalue_table(study: BicycleStudy) -> Table:
-    """Make the table of eigenvalues at some of the speeds, with one column per mode [1/s]."""
-    table = Table(box=None, pad_edge=False)
-    for title in ("speed", *dict.fromkeys(study.modes)):
-        table.add_column(title, justify="right", no_wrap=True)
+def _make_eigenvalue_columns(study: BicycleStudy) -> list[Column]:
+    """Make a column of some of the speeds and one column per mode, with its eigenvalues there [1/s]."""
     last = len(study.speeds) - 1
     places = sorted({round(k * last / (_SHOWN_SPEEDS - 1)) for k in range(_SHOWN_SPEEDS)})
-    for k in places:
+    columns = [Column("speed", [f"{study.speeds[k]:g}" for k in places])]
+    for mode in dict.fromkeys(study.modes):
         cells = []
-        for mode in dict.fromkeys(study.modes):
+        for k in places:
             values = [study.followed[k, c] for c, name in enumerate(study.modes) if name == mode]
             if len(values) == 2 and _is_complex(values[0]):
                 cells.append(_format_eigenvalue(values[0], sign="±"))
             else:
                 # Capsize and castering may be a pair as well: each then shows its half.
                 cells.append(", ".join(_format_eigenvalue(value) for value in values))
-        table.add_row(f"{study.speeds[k]:g}", *cells)
-    return table
+        columns.append(Column(mode, cells))
+    return columns
 
 
 def _is_complex(value: complex) -> bool:

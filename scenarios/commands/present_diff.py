@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from ..compare import DIFFERS, TO_THE_BIT, WITHIN_ROUND_OFF, diff_remarks
+from .tables import Column, print_table
 
 _COLUMNS = (
     ("largest", "apart", "m"),
@@ -27,22 +27,23 @@ def show_diff(console: Console, document: Mapping[str, Any]) -> None:
     """Print one row per engine, then the differences line by line, then the verdict."""
     before, after = (run["name"] for run in document["runs"])
     console.print(f"{document['title']}: {before} against {after}", style="bold", markup=False, soft_wrap=True)
-    table = Table(box=None, pad_edge=False, collapse_padding=True)
-    # In a narrow terminal the engines' names are folded, so that numbers and verdicts stay on one line.
-    table.add_column("engine", overflow="fold")
-    for title in _COLUMNS:
-        table.add_column("{}\n{}\n[dim]{}[/dim]".format(*title), justify="right", no_wrap=True)
-    table.add_column("the same", no_wrap=True)
-    for name, entry in document["engines"].items():
-        colour = "red" if entry["verdict"] == DIFFERS else "green"
-        table.add_row(Text(name), *_format_numbers(entry), Text(_VERDICTS[entry["verdict"]], colour))
-    console.print(table)
+    entries = document["engines"].values()
+    numbers = [_format_numbers(entry) for entry in entries]
+    columns = [Column("engine", list(document["engines"]), right=False)]
+    for k, (first, second, unit) in enumerate(_COLUMNS):
+        columns.append(Column(f"{first}\n{second}", [row[k] for row in numbers], unit))
+    columns.append(Column("the same", [_format_verdict(entry) for entry in entries], right=False))
+    print_table(console, columns, gap=1)
     for line, style in _list_lines(document):
         console.print(line, style=style, markup=False, highlight=False, soft_wrap=True)
     if document["same"]:
         console.print("the engines in both runs are the same within round-off", style="bold green")
     else:
         console.print("the engines in both runs are not the same", style="bold red")
+
+
+def _format_verdict(entry: Mapping[str, Any]) -> Text:
+    return Text(_VERDICTS[entry["verdict"]], "red" if entry["verdict"] == DIFFERS else "green")
 
 
 def _format_numbers(entry: Mapping[str, Any]) -> list[str]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from itertools import groupby
 
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from ..gate import SHOWN, Verdict
+from .tables import Column, print_table
 
 STATUS_STYLES = {
     "holds": "green",
@@ -27,14 +27,17 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed
     """
     for name, group in groupby(verdicts, key=lambda item: item[0]):
         console.print(name, style="bold", markup=False)
-        table = Table("engine", box=None, pad_edge=False)
-        table.add_column("hold", justify="right")
-        table.add_column("friction\nneeded", justify="right")
-        table.add_column("CPU time,\nreference 1", justify="right")
-        table.add_column("moved most, against its limit")
-        for engine, rows in groupby((verdict for _, verdict in group), key=lambda verdict: verdict.engine):
-            table.add_row(*_format_engine_row(engine, list(rows)))
-        console.print(table)
+        by_engine = groupby((verdict for _, verdict in group), key=lambda verdict: verdict.engine)
+        rows = [_format_engine_row(engine, list(judged)) for engine, judged in by_engine]
+        engines, held, friction, cpu, moved = zip(*rows, strict=True)
+        columns = [
+            Column("engine", engines, right=False),
+            Column("hold", held),
+            Column("friction\nneeded", friction),
+            Column("CPU time,\nreference 1", cpu),
+            Column("moved most,\nagainst its limit", moved, right=False),
+        ]
+        print_table(console, columns)
     for name, verdict in verdicts:
         if verdict.told:
             line = f"{name}: {verdict.engine}: {verdict.quantity}: {verdict.status}: {verdict.reason}"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
+
+from .tables import Column, print_table
 
 
 def show_circular(console: Console, found: dict[str, Any]) -> None:
@@ -48,6 +50,11 @@ def _format_numbers(values: list[float]) -> str:
     return ", ".join(f"{value:.9g}" for value in values)
 
 
+def _make_number_columns(points: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> list[Column]:
+    """Return a column for each key, with nine decimals; a negative number that rounds to zero has no sign."""
+    return [Column(key.replace("_", " "), [f"{point[key]:z.9f}" for point in points]) for key in keys]
+
+
 def show_families(console: Console, document: Mapping[str, Any]) -> None:
     """Print the families: the ends, special points and stable sections of each."""
     for family in document["families"]:
@@ -58,17 +65,17 @@ def show_families(console: Console, document: Mapping[str, Any]) -> None:
             markup=False,
             highlight=False,
         )
-        table = Table("", "kind", box=None, pad_edge=False)
-        for title in ("rear rate", "front rate", "lean", "steer"):
-            table.add_column(title, justify="right")
-        for name, point in family["special_points"].items():
-            numbers = (f"{point[key]:.9f}" for key in ("rear_rate", "front_rate", "lean", "steer"))
-            table.add_row(name, point["kind"], *numbers)
-        if family["special_points"]:
-            console.print(table)
+        specials = family["special_points"]
+        if specials:
+            columns = [
+                Column("", list(specials), right=False),
+                Column("kind", [point["kind"] for point in specials.values()], right=False),
+            ]
+            columns += _make_number_columns(list(specials.values()), ("rear_rate", "front_rate", "lean", "steer"))
+            print_table(console, columns)
         for section in family["stable_sections"]:
             rates, causes = section["rear_rate"], section["cause"]
-            line = " to ".join(f"{rate:.9f} ({cause})" for rate, cause in zip(rates, causes, strict=True))
+            line = " to ".join(f"{rate:z.9f} ({cause})" for rate, cause in zip(rates, causes, strict=True))
             console.print(f"Lyapunov stable: rear rate {line}", style="green", markup=False, highlight=False)
     for number, reason in document["absent"].items():
         console.print(f"family {number}: no curve: {reason}", style="yellow", markup=False, soft_wrap=True)
@@ -84,16 +91,17 @@ def _curve_name(family: Mapping[str, Any]) -> str:
 
 def show_critical(console: Console, document: Mapping[str, Any]) -> None:
     """Print the critical shapes of the bowl."""
-    table = Table("families", "what happens", box=None, pad_edge=False)
-    for title in ("alpha", "rear rate", "lean", "steer"):
-        table.add_column(title, justify="right", no_wrap=True)
     rows = [("2, 4", "cusps D, I meet", document["cusp_collision"])]
     rows += [(", ".join(map(str, point["families"])), "curves touch", point) for point in document["merging"]]
     rows += [(n, "last stable", point) for n, point in document["last_stable"].items() if point is not None]
-    for families, what, point in rows:
-        numbers = (f"{point[key]:.9f}" for key in ("rear_rate", "lean", "steer"))
-        table.add_row(families, what, f"{point['alpha']:.11f}", *numbers)
-    console.print(table)
+    families, what, points = zip(*rows, strict=True)
+    columns = [
+        Column("families", families, right=False),
+        Column("what happens", what, right=False),
+        Column("alpha", [f"{point['alpha']:.11f}" for point in points]),
+        *_make_number_columns(points, ("rear_rate", "lean", "steer")),
+    ]
+    print_table(console, columns, keys=2)
     for number, point in document["last_stable"].items():
         if point is None:
             console.print(f"family {number} has no stable section", markup=False, highlight=False)
@@ -101,12 +109,13 @@ def show_critical(console: Console, document: Mapping[str, Any]) -> None:
 
 def show_atlas(console: Console, document: Mapping[str, Any], out: Path) -> None:
     """Print the stable regions of the atlas and the path of its folder."""
-    table = Table("family", box=None, pad_edge=False)
-    for title in ("stable from alpha", "to alpha", "where at rear rate"):
-        table.add_column(title, justify="right")
-    for region in document["stable"]:
-        end = region["vanishing"]
-        last = ("and on", "") if end is None else (f"{end['alpha']:.10f}", f"{end['rear_rate']:.6f}")
-        table.add_row(str(region["family"]), f"{region['alpha'][0]:g}", *last)
-    console.print(table)
+    regions = document["stable"]
+    ends = [region["vanishing"] for region in regions]
+    columns = [
+        Column("family", [str(region["family"]) for region in regions], right=False),
+        Column("stable from alpha", [f"{region['alpha'][0]:g}" for region in regions]),
+        Column("to alpha", ["and on" if end is None else f"{end['alpha']:.10f}" for end in ends]),
+        Column("where at rear rate", ["" if end is None else f"{end['rear_rate']:.6f}" for end in ends]),
+    ]
+    print_table(console, columns)
     console.print(f"{document['motions']} motions in {out}", markup=False, highlight=False, soft_wrap=True)

@@ -6,9 +6,18 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
 from ...reports.measure import compared_time
+from .tables import Column, print_table
+
+# (title, key of a point)
+_COLUMNS = (
+    ("step", "step"),
+    ("position error", "position_error"),
+    ("energy drift", "energy_drift"),
+    ("largest slip", "max_slip"),
+    ("CPU time", "cpu_time"),
+)
 
 
 def show_precision(console: Console, document: Mapping[str, Any]) -> None:
@@ -19,14 +28,14 @@ def show_precision(console: Console, document: Mapping[str, Any]) -> None:
     for name, entry in document["engines"].items():
         console.print()
         console.print(name, style="bold", markup=False)
-        table = Table(box=None, pad_edge=False)
-        for title in ("step", "position error", "energy drift", "largest slip", "CPU time", "order"):
-            table.add_column(title, justify="right", no_wrap=True)
+        points = entry["points"]
+        columns = [
+            Column(title, ["–" if point[key] is None else f"{point[key]:.4g}" for point in points])
+            for title, key in _COLUMNS
+        ]
         orders = ["", "", *("–" if order is None else f"{order:.3f}" for order in entry["orders"])]
-        for point, order in zip(entry["points"], orders, strict=False):
-            keys = ("step", "position_error", "energy_drift", "max_slip", "cpu_time")
-            table.add_row(*("–" if point[key] is None else f"{point[key]:.4g}" for key in keys), order)
-        console.print(table)
+        columns.append(Column("order", orders[: len(points)]))
+        print_table(console, columns)
         for line in _precision_lines(entry):
             console.print(line, markup=False, highlight=False, soft_wrap=True)
         for failure in entry["failures"]:

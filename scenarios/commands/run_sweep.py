@@ -19,11 +19,11 @@ from ..sweep import (
     plan_sweep,
     resume_command,
     run_sweep,
-    show_summary,
     status_of,
     summarise_sweep,
 )
 from .options import ending_with, print_json
+from .present_sweep import show_summary
 from .progress import show_working
 
 FOLDER = Path("sweeps")

@@ -2,13 +2,16 @@
 
 from .cluster import on_cluster
 from .file import SweepFile
-from .live import SweepView
+from .live import ROW_STYLES, SweepView
 from .plan import plan_sweep
 from .rows import STATUSES
 from .run import Work, locally, run_sweep
-from .summary import resume_command, show_summary, status_of, summarise_sweep
+from .store import RESULTS
+from .summary import resume_command, status_of, summarise_sweep
 
 __all__ = [
+    "RESULTS",
+    "ROW_STYLES",
     "STATUSES",
     "SweepFile",
     "SweepView",
@@ -18,7 +21,6 @@ __all__ = [
     "plan_sweep",
     "resume_command",
     "run_sweep",
-    "show_summary",
     "status_of",
     "summarise_sweep",
 ]

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
-from rich.console import Console
-from rich.table import Table
 
-from .live import ROW_STYLES
 from .plan import SweepPlan
 from .rows import BROKEN, REFUSED
 from .run import SweepOutcome
-from .store import RESULTS, TIMINGS, part_of
+from .store import TIMINGS, part_of
 
 _REASONS = 5
 
@@ -78,33 +75,3 @@ def resume_command(plan: SweepPlan, outcome: SweepOutcome, retry: Collection[str
     """Return the command that continues a stopped sweep."""
     again = "".join(f" --retry {status}" for status in retry)
     return f"velodrome sweep {plan.path} --out {outcome.folder} --resume{again}"
-
-
-def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> None:
-    """Print a table by engine, why rows broke, and where the data set is or how to continue."""
-    entries: Mapping[str, Mapping[str, Any]] = document["engines"]
-    statuses = [status for status in ROW_STYLES if any(entry["rows"].get(status) for entry in entries.values())]
-    table = Table("engine", box=None, pad_edge=False)
-    for status in statuses:
-        table.add_column(status, justify="right", style=ROW_STYLES[status], no_wrap=True)
-    for title in ("error,\nmedian, m", "error,\nworst, m", "rows/s of\na worker"):
-        table.add_column(title, justify="right", no_wrap=True)
-    for name, entry in entries.items():
-        error = entry.get("position_error") or {}
-        numbers = (error.get("median"), error.get("worst"), entry.get("rows_per_second"))
-        cells = ("–" if number is None else f"{number:.3g}" for number in numbers)
-        table.add_row(name, *(str(entry["rows"].get(status, 0)) for status in statuses), *cells)
-    console.print(table)
-    for name, entry in entries.items():
-        for reason in entry.get("reasons", ()):
-            _print_line(console, f"{name} {reason}", ROW_STYLES[reason.partition(":")[0]])
-    if document["stopped"] is None:
-        _print_line(console, f"data set: {document['folder']}/{RESULTS}")
-        return
-    missing = f"{document['missing']} of {document['tasks']} runs are missing, finished runs are kept"
-    _print_line(console, f"{document['stopped']}: {missing}", "yellow")
-    _print_line(console, f"continue with: {resume}")
-
-
-def _print_line(console: Console, line: str, style: str | None = None) -> None:
-    console.print(line, style=style, markup=False, highlight=False, soft_wrap=True)

@@ -1,0 +1,47 @@
+"""What `velodrome sweep` shows at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.text import Text
+
+from ..sweep import RESULTS, ROW_STYLES
+from .tables import Column, print_table
+
+
+def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> None:
+    """Print a table by engine, why rows broke, and where the data set is or how to continue."""
+    entries: Mapping[str, Mapping[str, Any]] = document["engines"]
+    columns = [Column("engine", list(entries), right=False)]
+    for status, style in ROW_STYLES.items():
+        if any(entry["rows"].get(status) for entry in entries.values()):
+            columns.append(
+                Column(status, [Text(str(entry["rows"].get(status, 0)), style) for entry in entries.values()])
+            )
+    errors = [entry.get("position_error") or {} for entry in entries.values()]
+    columns += [
+        Column("error,\nmedian, m", [_format_number(error.get("median")) for error in errors]),
+        Column("error,\nworst, m", [_format_number(error.get("worst")) for error in errors]),
+        Column("rows/s of\na worker", [_format_number(entry.get("rows_per_second")) for entry in entries.values()]),
+    ]
+    print_table(console, columns)
+    for name, entry in entries.items():
+        for reason in entry.get("reasons", ()):
+            _print_line(console, f"{name} {reason}", ROW_STYLES[reason.partition(":")[0]])
+    if document["stopped"] is None:
+        _print_line(console, f"data set: {document['folder']}/{RESULTS}")
+        return
+    missing = f"{document['missing']} of {document['tasks']} runs are missing, finished runs are kept"
+    _print_line(console, f"{document['stopped']}: {missing}", "yellow")
+    _print_line(console, f"continue with: {resume}")
+
+
+def _format_number(number: float | None) -> str:
+    return "–" if number is None else f"{number:.3g}"
+
+
+def _print_line(console: Console, line: str, style: str | None = None) -> None:
+    console.print(line, style=style, markup=False, highlight=False, soft_wrap=True)

@@ -1,0 +1,222 @@
+"""What commands print at any width: names and figures stay whole, and are the same."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from velodrome.reference.bicycle import Bicycle
+from velodrome.scenarios.cli import app
+from velodrome.scenarios.commands.present_bicycle import show_bicycle
+from velodrome.scenarios.commands.present_diff import show_diff
+from velodrome.scenarios.commands.present_gate import show_verdicts
+from velodrome.scenarios.commands.present_motions import show_atlas, show_circular, show_critical, show_families
+from velodrome.scenarios.commands.present_precision import show_precision
+from velodrome.scenarios.commands.present_run import show_outcome
+from velodrome.scenarios.commands.present_sweep import show_summary
+from velodrome.scenarios.commands.tables import Column, print_table
+from velodrome.scenarios.compare import diff_runs, read_pair
+from velodrome.scenarios.gate import Verdict
+from velodrome.scenarios.motions import families_document, solve_circular
+from velodrome.scenarios.run import RunOutcome, RunPlan, plan_run, run_plan
+from velodrome.scenarios.scenario import BicycleFile, load_scenario, make_bowl
+from velodrome.scenarios.studies import BicycleStudy, study_bicycle
+
+# The longest names of the suite's own engines, and one that rich would read as markup.
+LONG_NAMES = ("mujoco-exact-contact", "exudyn-plane-normal", "made[bold]up")
+NUMBERS = (-0.0033912345678e-7, 26.436362407, 1234.5678901234567, -2.2250738585072014e-308)
+Show = Callable[[Console], None]
+
+
+@cache
+def ridden() -> tuple[RunPlan, RunOutcome, dict[str, Any]]:
+    """A short ride and its difference from itself, both under several long names."""
+    changes = {"simulation.duration": 0.5, "simulation.output_rate": 50.0}
+    plan = plan_run(*load_scenario("q2-plus", changes), wanted=["mujoco-native"])
+    with TemporaryDirectory() as out:
+        outcome = run_plan(plan, Path(out), lambda *_: None, lambda _: None)
+        document = diff_runs(read_pair(outcome.folder, outcome.folder, None))
+    metrics = outcome.metrics | dict.fromkeys(LONG_NAMES, outcome.metrics["mujoco-native"])
+    entry = document["engines"]["mujoco-native"]
+    engines = document["engines"] | dict.fromkeys(LONG_NAMES, entry | {"verdict": "differs"})
+    return plan, replace(outcome, metrics=metrics), document | {"engines": engines}
+
+
+def show_run(console: Console) -> None:
+    plan, outcome, _ = ridden()
+    show_outcome(console, plan, outcome)
+
+
+def show_difference(console: Console) -> None:
+    show_diff(console, ridden()[2])
+
+
+def show_gate(console: Console) -> None:
+    verdicts = []
+    for name in LONG_NAMES:
+        for quantity, status in (("rear_rate_drift_rate", "holds"), ("required_friction", "shown"), ("x", "worse")):
+            verdicts.append(("q2-plus", Verdict(name, quantity, -3.21e-14, 1e-14, 1e-13, status, "moved by 4e-14")))
+    show_verdicts(console, verdicts)
+
+
+def show_study(console: Console) -> None:
+    keys = ("step", "position_error", "energy_drift", "max_slip", "cpu_time")
+    points = [{key: number * factor for factor, key in enumerate(keys, 1)} for number in NUMBERS]
+    entry = {
+        "points": points,
+        "orders": [1.98765, None],
+        "richardson_error": None,
+        "eigenvalues": None,
+        "failures": [],
+        "window": 1.5,
+    }
+    engines = dict.fromkeys(LONG_NAMES, entry)
+    show_precision(console, {"scenario": "q1", "horizon": None, "duration": 1.5, "engines": engines})
+
+
+def show_sweep(console: Console) -> None:
+    entry = {
+        "rows": {"done": 1234567, "refused": 12, "fell": 345, "failed": 6, "timeout": 78},
+        "position_error": {"median": 1.23e-10, "worst": 4.56e-05},
+        "rows_per_second": 1.234e-05,
+        "reasons": ["failed: something broke"],
+    }
+    document = {"engines": dict.fromkeys(LONG_NAMES, entry), "folder": "sweeps/x", "stopped": None}
+    show_summary(console, document, "")
+
+
+@cache
+def followed() -> dict[str, Any]:
+    return families_document(0.005)
+
+
+def show_all_families(console: Console) -> None:
+    show_families(console, followed())
+
+
+def show_critical_shapes(console: Console) -> None:
+    keys = ("alpha", "rear_rate", "lean", "steer")
+    shape = dict(zip(keys, NUMBERS, strict=True))
+    show_critical(
+        console,
+        {
+            "cusp_collision": shape,
+            "last_stable": {"1": None, "2": shape},
+            "merging": [shape | {"families": [1, 3]}, shape | {"families": [1]}],
+        },
+    )
+
+
+def show_regions(console: Console) -> None:
+    regions = [
+        {"family": 2, "alpha": [0.000123456, 1], "vanishing": {"alpha": 0.0333487046243, "rear_rate": 13.8896236}},
+        {"family": 12, "alpha": [0.0001, 1], "vanishing": None},
+    ]
+    show_atlas(console, {"stable": regions, "motions": 400000}, Path("atlas"))
+
+
+def show_motion(console: Console) -> None:
+    show_circular(console, solve_circular(Bicycle(), make_bowl(0.005), 18.0, 2, None).as_json())
+
+
+@cache
+def studied(deviation: float | None) -> BicycleStudy:
+    """The benchmark bicycle, with deviations of two parameters."""
+    names = () if deviation is None else ("rear_frame_Ixz", "front_wheel_mass")
+    source = BicycleFile("benchmark", Bicycle(), {name: deviation for name in names if deviation is not None})
+    return study_bicycle(source, np.linspace(0.0, 10.0, 201))
+
+
+def show_eigenvalues(console: Console) -> None:
+    show_bicycle(console, studied(0.0123))
+
+
+SHOWN = (
+    *(show_run, show_difference, show_gate, show_study, show_sweep),
+    *(show_all_families, show_critical_shapes, show_regions, show_motion, show_eigenvalues),
+)
+# Those with a row or a title for each engine.
+BY_ENGINE = (show_run, show_difference, show_gate, show_study, show_sweep)
+
+
+def printed(show: Show, width: int) -> str:
+    console = Console(file=io.StringIO(), width=width)
+    show(console)
+    assert isinstance(console.file, io.StringIO)
+    return console.file.getvalue()
+
+
+@pytest.mark.parametrize("width", [60, 80])
+@pytest.mark.parametrize("show", SHOWN)
+def test_words_and_figures_are_those_of_a_wide_terminal(show: Show, width: int) -> None:
+    narrow, wide = printed(show, width), printed(show, 200)
+    assert "…" not in narrow + wide
+    assert set(narrow.split()) == set(wide.split())
+    if show in BY_ENGINE:
+        assert set(LONG_NAMES) <= set(narrow.split())
+
+
+@pytest.mark.parametrize("show", [show_difference, show_gate, show_study, show_sweep, show_critical_shapes])
+def test_tables_fit_sixty_columns(show: Show) -> None:
+    # Lines of words below a table are left to the terminal; those of these documents are short.
+    lines = printed(show, 60).splitlines()
+    tables = [line for line in lines if ": " not in line]
+    assert len(tables) > len(LONG_NAMES)
+    assert all(len(line.rstrip()) <= 60 for line in tables)
+
+
+def test_a_table_is_one_where_it_fits_and_whole_where_nothing_does() -> None:
+    columns = [
+        Column("name", ["a", "b" * 64], right=False),
+        Column("first", ["1", "2"], "m"),
+        Column("next", ["3", "4"]),
+    ]
+
+    def show(console: Console) -> None:
+        print_table(console, columns)
+
+    wide = [line.split() for line in printed(show, 200).splitlines()]
+    assert wide == [["first"], ["name", "m", "next"], ["a", "1", "3"], ["b" * 64, "2", "4"]]
+    narrow = [line.split() for line in printed(show, 20).splitlines()]
+    assert narrow == [
+        ["first"],
+        ["name", "m"],
+        ["a", "1"],
+        ["b" * 64, "2"],
+        ["name", "next"],
+        ["a", "3"],
+        ["b" * 64, "4"],
+    ]
+
+
+def test_zero_has_no_sign() -> None:
+    text = printed(show_all_families, 200)
+    assert " 0.000000000" in text
+    assert "-0.000000000" not in text
+
+
+def test_no_deviation_of_zero_is_shown() -> None:
+    none, zero, some = (
+        printed(lambda console, d=d: show_bicycle(console, studied(d)), 200) for d in (None, 0.0, 0.0123)
+    )
+    assert "± 0.012" in some
+    assert zero.split() == none.split()
+
+
+@pytest.mark.parametrize("width", ["60", "80", "200"])
+def test_help_names_what_every_command_does(width: str, velodrome, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", width)
+    text = velodrome("--help").stdout
+    assert "..." not in text.partition("Commands:")[2]
+    rows = [" ".join(line.split()) for line in text.partition("Commands:")[2].splitlines()]
+    for command in app.registered_commands:
+        assert f"{command.name} {command.short_help}" in rows
