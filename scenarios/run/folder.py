@@ -20,6 +20,8 @@ from .machine import describe_machine, find_commit
 LIBRARIES = ("velodrome", "numpy", "scipy", "numba", "exudyn", "mujoco", "rerun-sdk", "pyarrow", "jinja2")
 
 
+SCENARIO_FILE = "scenario.toml"
+SCENARIO_DIGEST_KEY = "scenario_sha256"
 RUN_VERSION = 2  # of manifest.json and metrics.json; those of version 1 have no digest and no version
 
 
@@ -68,6 +70,7 @@ def resolve_plan(plan: RunPlan) -> Scenario:
 def write_manifest(
     folder: Path,
     plan: RunPlan,
+    scenario_digest: str,
     trajectories: Mapping[str, Trajectory],
     failures: Mapping[str, str],
     verdicts: Sequence[Mapping[str, Any]] = (),
@@ -78,7 +81,9 @@ def write_manifest(
     Parameters
     ----------
     folder : Path
-    plan : Plan
+    plan : RunPlan
+    scenario_digest : str
+        `velodrome.scenarios.files.file_digest` of the folder's scenario file.
     trajectories : mapping
         Those that are done.
     failures : mapping
@@ -100,6 +105,7 @@ def write_manifest(
     manifest = {
         "scenario": plan.name,
         "title": plan.scenario.title,
+        SCENARIO_DIGEST_KEY: scenario_digest,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "complete": complete,
         "engines": engines,
