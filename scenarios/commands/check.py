@@ -67,6 +67,8 @@ def check_command(
     if reason is not None and not update:
         raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
     # Before the work: minutes of it would be for nothing.
+    if baselines is not None and not baselines.exists() and not update:
+        raise ScenarioError(f"--baselines {baselines}: there is no such folder; with --update it is made")
     for option, path in (("--junit", junit), ("--markdown", markdown)):
         if path is not None:
             _check_path(option, path)

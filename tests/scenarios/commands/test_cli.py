@@ -316,6 +316,18 @@ def test_check_refuses_a_file_without_a_folder_before_its_work(
         assert (result.status, result.stderr) == (2, f"velodrome: {option} {path}: {words}\n")
 
 
+def test_check_refuses_an_absent_folder_of_baselines_before_its_work(
+    velodrome, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(gate, "check_gate", lambda *_: pytest.fail("the gate ran"))
+    result = velodrome("check", "--baselines", "nope")
+    words = "--baselines nope: there is no such folder; with --update it is made"
+    assert (result.status, result.stdout, result.stderr) == (2, "", f"velodrome: {words}\n")
+    judged(monkeypatch, WORSE)
+    monkeypatch.setattr(gate, "update_baselines", lambda fresh, *_: [tmp_path / f"{name}.json" for name in fresh])
+    assert velodrome("check", "--baselines", "nope", "--update").status == 0
+
+
 def test_two_engines_of_one_name_get_one_line(velodrome, monkeypatch: pytest.MonkeyPatch) -> None:
     words = "engine 'aaa' is announced by two packages, one and other; uninstall one of them"
 
