@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from numbers import Real
+
+import numpy as np
 
 from ...reference.bicycle import Bicycle
 from ...reference.surface import Surface
@@ -15,7 +18,7 @@ from ..motions import (
     follow_families,
     solve_circular,
 )
-from ..scenario import make_bowl
+from ..scenario import make_bowl, show_value
 
 
 def circular(
@@ -51,7 +54,8 @@ def circular(
     Raises
     ------
     ScenarioError
-        If there is no such motion, or the ground is given twice, not at all or is no surface of revolution.
+        If there is no such motion, an argument is of another type, or the ground is given twice, not at all or is no
+        surface of revolution.
 
     Examples
     --------
@@ -63,7 +67,11 @@ def circular(
     (0.73744, 2.83701)
     """
     ground = make_bowl(_ground(alpha, surface))
-    return solve_circular(bicycle or Bicycle(), ground, rear_rate, family, near)
+    if not isinstance(rear_rate, Real):
+        raise ScenarioError(f"rear_rate must be a number; it is {show_value(repr(rear_rate))}")
+    if near is not None and not (np.shape(near) == (2,) and all(isinstance(angle, Real) for angle in near)):
+        raise ScenarioError(f"near must be two numbers, lean and steer; it is {show_value(repr(near))}")
+    return solve_circular(_require_bicycle(bicycle), ground, rear_rate, family, near)
 
 
 def families(
@@ -98,7 +106,7 @@ def families(
     >>> found.curves[1].samples.lean.shape == found.curves[1].samples.rear_rate.shape
     True
     """
-    return follow_families(bicycle or Bicycle(), make_bowl(_ground(alpha, surface)))
+    return follow_families(_require_bicycle(bicycle), make_bowl(_ground(alpha, surface)))
 
 
 def critical(
@@ -126,9 +134,21 @@ def _say_nothing(*_: object) -> None:
     """Take the place of a progress bar."""
 
 
+def _require_bicycle(bicycle: Bicycle | None) -> Bicycle:
+    if bicycle is None:
+        return Bicycle()
+    if not isinstance(bicycle, Bicycle):
+        raise ScenarioError(f"bicycle must be a velodrome.Bicycle; it is {show_value(repr(bicycle))}")
+    return bicycle
+
+
 def _ground(alpha: float | None, surface: Surface | None) -> Surface | float:
     if alpha is not None and surface is None:
-        return alpha
+        if not isinstance(alpha, Real):
+            raise ScenarioError(f"alpha must be a number; it is {show_value(repr(alpha))}")
+        return float(alpha)
     if surface is not None and alpha is None:
+        if not isinstance(surface, Surface):
+            raise ScenarioError(f"surface must be a surface such as Sphere(20.0); it is {show_value(repr(surface))}")
         return surface
     raise ScenarioError("give the bowl by one of alpha and surface, such as alpha=0.005 or surface=Sphere(20.0)")
