@@ -73,6 +73,7 @@ def surface_function(function: Callable[..., tuple[Any, ...]]) -> SurfaceFunctio
     return SurfaceFunction(function)
 
 
+@runtime_checkable
 class Surface(Protocol):
     """Any smooth ground z = f(x, y), with gravity along -z.
 

@@ -11,7 +11,8 @@ from ..error import ScenarioError
 from .completion import complete_scenario
 from .options import JsonOption, ending_with, print_json, show_written
 
-_MOST_SPEEDS = 10_000  # in a list of speeds
+_FINEST = 10_000  # speeds of a list
+_FASTEST = 1e4  # [m/s]
 
 
 def bicycle_command(
@@ -51,23 +52,28 @@ def parse_speeds(text: str) -> list[float]:
     Raises
     ------
     ScenarioError
-        If the text is neither, or a speed is negative.
+        If it is neither, or a speed is out of range.
     """
-    wrong = ScenarioError(f"--speeds {text!r}: must be a range FROM:TO or rising speeds such as 1,3,5, in m/s from 0")
+    from ..scenario import show_value
+
+    def refuse(what: str) -> ScenarioError:
+        return ScenarioError(f"--speeds {show_value(repr(text))}: {what}")
+
+    wrong = refuse("must be a range FROM:TO or rising speeds such as 1,3,5, in m/s from 0")
     separator = ":" if ":" in text else ","
     try:
         numbers = [float(part) for part in text.split(separator)]
     except ValueError:
         raise wrong from None
-    if (
-        not all(0 <= number <= 1e4 for number in numbers)
-        or sorted(set(numbers)) != numbers
-        or len(numbers) > _MOST_SPEEDS
-    ):
+    if separator == ":" and len(numbers) != 2:
         raise wrong
+    if not all(0 <= number <= _FASTEST for number in numbers):
+        raise refuse(f"each speed must be from 0 to {_FASTEST:g} m/s")
+    if len(numbers) > _FINEST:
+        raise refuse(f"must be at most {_FINEST} speeds; they are {len(numbers)}")
+    if sorted(set(numbers)) != numbers:
+        raise refuse("TO must be above FROM" if separator == ":" else "each speed must be above the one before it")
     if separator == ",":
         return numbers
-    if len(numbers) != 2:
-        raise wrong
     start, end = numbers
     return [start + (end - start) * k / 200 for k in range(201)]

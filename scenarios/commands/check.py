@@ -32,7 +32,9 @@ def check_command(
         ),
     ] = None,
     baselines: Annotated[Path | None, typer.Option(help="Folder of the baselines instead of the suite's own.")] = None,
-    update: Annotated[bool, typer.Option("--update", help="Write this run's values as the new baselines.")] = False,
+    update: Annotated[
+        bool, typer.Option("--update", help="Write the values of engines that moved, changed or are new as baselines.")
+    ] = False,
     reason: Annotated[str | None, typer.Option(help="Why, for the new baselines; what moved if not given.")] = None,
     hold_cpu: Annotated[
         bool,
@@ -67,6 +69,8 @@ def check_command(
     if reason is not None and not update:
         raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
     # Checked first, so that minutes of work are not lost.
+    if baselines is not None and not baselines.exists() and not update:
+        raise ScenarioError(f"--baselines {baselines}: there is no such folder; with --update it is made")
     for option, path in (("--junit", junit), ("--markdown", markdown)):
         if path is not None:
             _check_path(option, path)
@@ -99,6 +103,8 @@ def check_command(
         else:
             console = Console()
             show_verdicts(console, verdicts, renewed=update)
+            if update and not written and not refused:
+                console.print("no baseline written: nothing moved beyond its limit")
             for name in written:
                 console.print(f"baseline written: {name}", soft_wrap=True)
             for name, verdict in refused:

@@ -17,8 +17,15 @@ from ...reports.drawing import assign_colours
 from ...reports.measure import ROUND_OFF, START_ERROR, Scale, cut_at_fall, evaluate_ride
 from ..error import ScenarioError
 from ..files import make_folder, write_json, write_text
-from ..run import configure_engine, find_part, installed_engines, read_document, read_ride, read_start_state
-from ..scenario import OF_THE_MOTION, CircularTable, Scenario, load_scenario, make_start
+from ..run import (
+    configure_engine,
+    installed_engines,
+    read_document,
+    read_ride,
+    read_start_state,
+    read_stored_scenario,
+)
+from ..scenario import OF_THE_MOTION, CircularTable, Scenario, make_start
 from .differences import DIFFERS, StoredGround, StoredRun, diff_document
 from .markdown import diff_markdown
 
@@ -58,9 +65,13 @@ def read_pair(first: Path, second: Path, engines: Sequence[str] | None = None) -
     names = (first.resolve().name, second.resolve().name)
     if names[0] == names[1]:
         names = (str(first), str(second))
-    scenarios = [load_scenario(str(find_part(folder, "scenario.toml")))[1] for folder in (first, second)]
+    manifests = [read_document(folder, "manifest.json") for folder in (first, second)]
+    scenarios = [read_stored_scenario(*pair) for pair in zip((first, second), manifests, strict=True)]
     _same_scenario(scenarios[0], scenarios[1], first, second)
-    runs = [_read(folder, name, engines) for folder, name in zip((first, second), names, strict=True)]
+    runs = [
+        _read(folder, name, manifest, engines)
+        for folder, name, manifest in zip((first, second), names, manifests, strict=True)
+    ]
     _same_start(runs[0], runs[1], first, second)
     common = [name for name in runs[1].manifest["engines"] if name in runs[0].manifest["engines"]]
     if not common:
@@ -88,8 +99,8 @@ def _dump_table(scenario: Scenario, name: str) -> dict[str, Any]:
     return asdict(scenario.make_bicycle()) if name == "bicycle" else scenario.model_dump(include={name})[name]
 
 
-def _read(folder: Path, name: str, engines: Sequence[str] | None) -> StoredRun:
-    manifest, metrics = read_document(folder, "manifest.json"), read_document(folder, "metrics.json")
+def _read(folder: Path, name: str, manifest: Mapping[str, Any], engines: Sequence[str] | None) -> StoredRun:
+    metrics = read_document(folder, "metrics.json")
     try:
         entries = {engine: manifest["engines"][engine] for engine in manifest["engines"] if _chosen(engine, engines)}
         _ = [manifest[key] for key in ("title", "scenario", "created", "complete", "libraries", "platform")]

@@ -330,10 +330,12 @@ def update_baselines(
     reason: str | None = None,
     baselines: Path | None = None,
 ) -> list[Path]:
-    """Write new baselines with the reason for the change, and return their paths.
+    """Write new baselines with the reason for the change, and return the paths of the files that changed.
 
-    Engines that were not run, or that are refused (`refused_verdicts`), keep their entries as long as they are
-    installed.
+    An engine's entry is written if it is new, a judged quantity moved beyond its limit, or the engine's version or
+    settings changed. Every other entry stays as it is, those of engines that were not run or are refused
+    (`refused_verdicts`) included; entries of engines that are not installed any more are removed. CPU times that were
+    not judged are no reason to write an entry. A file in which no entry changes is not touched.
 
     Parameters
     ----------
@@ -352,15 +354,28 @@ def update_baselines(
     """
     folder = BASELINES if baselines is None else baselines
     make_folder(folder)
-    paths, installed = [], installed_engines()
+    paths: list[Path] = []
+    installed = installed_engines()
     refused = {(scenario, verdict.engine) for scenario, verdict in refused_verdicts(verdicts)}
     for name, baseline in fresh.items():
         entries = {engine: entry for engine, entry in baseline["engines"].items() if (name, engine) not in refused}
         if baseline["engines"] and not entries:
             continue
-        moved = [verdict for scenario, verdict in verdicts if scenario == name and verdict.moved]
-        kept = {engine: entry for engine, entry in read_baseline(name, folder).items() if engine in installed}
-        words = reason or "; ".join(f"{v.engine}: {v.quantity}: {v.status}" for v in moved) or "nothing moved"
+        old = read_baseline(name, folder)
+        kept = {engine: entry for engine, entry in old.items() if engine in installed}
+        told = [verdict for scenario, verdict in verdicts if scenario == name and verdict.told]
+        changed = {verdict.engine for verdict in told}
+        renewed = {engine: entry for engine, entry in entries.items() if engine in changed or engine not in old}
+        if not renewed and kept == old:
+            continue
+        gone = [f"{engine}: not installed any more" for engine in old if engine not in kept]
+        words = reason or "; ".join([_describe_move(verdict) for verdict in told] + gone)
         paths.append(folder / f"{name}.json")
-        write_json(paths[-1], {**baseline, "reason": words, "engines": kept | entries})
+        write_json(paths[-1], {**baseline, "reason": words, "engines": kept | renewed})
     return paths
+
+
+def _describe_move(verdict: Verdict) -> str:
+    """Return the words for what a verdict reports: a quantity that moved, or a change of version or settings."""
+    what = verdict.reason if verdict.quantity == CHANGES else f"{verdict.quantity}: {verdict.status}"
+    return f"{verdict.engine}: {what}"

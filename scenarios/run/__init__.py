@@ -15,7 +15,15 @@ from .runner import (
     run_plan,
     store_run,
 )
-from .stored import find_part, read_document, read_json, read_ride, read_start_state
+from .stored import (
+    check_stored_scenario,
+    find_part,
+    read_document,
+    read_json,
+    read_ride,
+    read_start_state,
+    read_stored_scenario,
+)
 
 __all__ = [
     "RunOutcome",
@@ -23,6 +31,7 @@ __all__ = [
     "RunResult",
     "RunWatch",
     "Trace",
+    "check_stored_scenario",
     "claimed_noise",
     "configure_engine",
     "find_part",
@@ -35,6 +44,7 @@ __all__ = [
     "read_json",
     "read_ride",
     "read_start_state",
+    "read_stored_scenario",
     "ride_plan",
     "run_plan",
     "store_run",

@@ -20,6 +20,8 @@ from .machine import describe_machine, find_commit
 LIBRARIES = ("velodrome", "numpy", "scipy", "numba", "exudyn", "mujoco", "rerun-sdk", "pyarrow", "jinja2")
 
 
+SCENARIO_FILE = "scenario.toml"
+SCENARIO_DIGEST_KEY = "scenario_sha256"
 # Format version of manifest.json and metrics.json; files of version 1 have neither a digest nor a version.
 RUN_VERSION = 2
 
@@ -69,6 +71,7 @@ def resolve_plan(plan: RunPlan) -> Scenario:
 def write_manifest(
     folder: Path,
     plan: RunPlan,
+    scenario_digest: str,
     trajectories: Mapping[str, Trajectory],
     failures: Mapping[str, str],
     verdicts: Sequence[Mapping[str, Any]] = (),
@@ -80,6 +83,8 @@ def write_manifest(
     ----------
     folder : Path
     plan : RunPlan
+    scenario_digest : str
+        `velodrome.scenarios.files.file_digest` of the folder's scenario file.
     trajectories : mapping
         Finished trajectories by engine.
     failures : mapping
@@ -101,6 +106,7 @@ def write_manifest(
     manifest = {
         "scenario": plan.name,
         "title": plan.scenario.title,
+        SCENARIO_DIGEST_KEY: scenario_digest,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "complete": complete,
         "engines": engines,

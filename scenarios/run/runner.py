@@ -18,7 +18,7 @@ from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, Unsuitabl
 from ...engines.storage import write_trajectory
 from ...reports.measure import ROUND_OFF, compute_metrics, cut_at_fall, evaluate_ride
 from ..error import ScenarioError
-from ..files import write_sealed, write_text
+from ..files import file_digest, write_sealed, write_text
 from ..scenario import (
     Scenario,
     Start,
@@ -29,7 +29,16 @@ from ..scenario import (
     make_start,
     refuse_engine,
 )
-from .folder import RUN_VERSION, RunPlan, new_folder, resolve_plan, write_manifest, write_page, write_run_recording
+from .folder import (
+    RUN_VERSION,
+    SCENARIO_FILE,
+    RunPlan,
+    new_folder,
+    resolve_plan,
+    write_manifest,
+    write_page,
+    write_run_recording,
+)
 
 # (engine, simulated time reached, duration)
 RunWatch = Callable[[str, float, float], None]
@@ -181,13 +190,14 @@ def store_run(
     See `run_plan` for the parameters.
     """
     folder = new_folder(out, plan.name)
-    write_text(folder / "scenario.toml", tomli_w.dumps(resolve_plan(plan).model_dump(exclude_none=True)))
-    write_manifest(folder, plan, {}, {})
+    write_text(folder / SCENARIO_FILE, tomli_w.dumps(resolve_plan(plan).model_dump(exclude_none=True)))
+    digest = file_digest(folder / SCENARIO_FILE)
+    write_manifest(folder, plan, digest, {}, {})
 
     def store(name: str, rides: Rides) -> None:
         if name in rides.trajectories:
             write_trajectory(rides.trajectories[name], folder / f"{name}.parquet")
-        write_manifest(folder, plan, rides.trajectories, rides.failures)
+        write_manifest(folder, plan, digest, rides.trajectories, rides.failures)
 
     rides = ride_plan(plan, watch, note, trace, store)
     with _block_interrupts():
@@ -195,9 +205,8 @@ def store_run(
         write_sealed(folder / "metrics.json", result.metrics, RUN_VERSION)
         write_run_recording(folder, plan, result.shown, result.metrics, result.failures, result.verdicts)
         complete = not result.interrupted
-        manifest = write_manifest(
-            folder, plan, result.trajectories, result.failures, result.verdicts, complete=complete
-        )
+        done, failures = result.trajectories, result.failures
+        manifest = write_manifest(folder, plan, digest, done, failures, result.verdicts, complete=complete)
         write_page(folder, plan, result.shown, result.metrics, manifest)
     return folder, result
 

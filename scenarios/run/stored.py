@@ -13,9 +13,9 @@ from ...engines.engine import Trajectory
 from ...engines.format_version import VERSION_KEY, read_version
 from ...engines.storage import read_trajectory
 from ..error import ScenarioError
-from ..files import DIGEST_KEY, content_digest
-from ..scenario import show_value
-from .folder import RUN_VERSION
+from ..files import DIGEST_KEY, content_digest, file_digest
+from ..scenario import Scenario, load_scenario, show_value
+from .folder import RUN_VERSION, SCENARIO_DIGEST_KEY, SCENARIO_FILE
 
 
 def find_part(folder: Path, name: str) -> Path:
@@ -66,6 +66,42 @@ def read_document(folder: Path, name: str) -> Mapping[str, Any]:
             "run the scenario again, or take the folder from where it is whole"
         )
     return {key: value for key, value in found.items() if key not in (VERSION_KEY, DIGEST_KEY)}
+
+
+def read_stored_scenario(folder: Path, manifest: Mapping[str, Any]) -> Scenario:
+    """Return the scenario of a run folder.
+
+    Raises
+    ------
+    ScenarioError
+        If it is missing, invalid, or was changed since it was written.
+    """
+    check_stored_scenario(folder, manifest)
+    return load_scenario(str(folder / SCENARIO_FILE))[1]
+
+
+def check_stored_scenario(folder: Path, manifest: Mapping[str, Any]) -> None:
+    """Compare the scenario file of a run folder with its digest in the manifest.
+
+    Manifests of earlier versions have no digest of it; nothing is compared then.
+
+    Raises
+    ------
+    ScenarioError
+        If it is missing, or was changed since it was written.
+    """
+    path = find_part(folder, SCENARIO_FILE)
+    if SCENARIO_DIGEST_KEY not in manifest:
+        return
+    try:
+        found = file_digest(path)
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from error
+    if found != manifest[SCENARIO_DIGEST_KEY]:
+        raise ScenarioError(
+            f"{path}: was changed since the run was made: it does not match its digest in manifest.json; "
+            "undo the change, or give a changed copy to velodrome run"
+        )
 
 
 def read_json(path: Path) -> Any:

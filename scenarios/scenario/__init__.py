@@ -19,6 +19,7 @@ from .start import Start, make_start, output_times
 from .surfaces import make_bowl, name_surface, parse_surface
 from .table import (
     Table,
+    Texts,
     error_place,
     format_validation_error,
     join_complaints,
@@ -38,6 +39,7 @@ __all__ = [
     "Simulation",
     "Start",
     "Table",
+    "Texts",
     "configure_engine",
     "error_place",
     "format_validation_error",

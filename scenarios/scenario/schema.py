@@ -16,7 +16,7 @@ from ..names import list_library
 from .engine_settings import list_engine_faults
 from .parameters import PARAMETERS
 from .surfaces import SurfaceTable
-from .table import Table, join_complaints, list_complaints, read_toml, set_keys, show_value, validate_known
+from .table import Table, Texts, join_complaints, list_complaints, read_toml, set_keys, show_value, validate_known
 
 # Tables of a scenario that determine its motion.
 OF_THE_MOTION = ("surface", "motion", "perturbation", "bicycle")
@@ -127,8 +127,7 @@ class Scenario(Table):
     """A scenario as its file declares it."""
 
     title: str = Field(description="one line of text")
-    # TOML arrays are read as lists.
-    tags: Annotated[tuple[str, ...], Field(strict=False)] = Field(default=(), description="for velodrome run --tag")
+    tags: Texts = Field(default=(), description="for velodrome run --tag")
     surface: SurfaceTable = Field(description="the ground")
     motion: Annotated[CircularTable | UprightTable, Field(discriminator="kind")] = Field(
         description="the motion to start from"
@@ -300,7 +299,8 @@ def read_scenario_file(source: str) -> tuple[str, str]:
     try:
         if path.exists() and not path.is_file():
             # Reading a pipe would block.
-            raise ScenarioError(f"{show_value(source)}: cannot be read: it is no file")
+            what = "it is a folder" if path.is_dir() else "it is no file"
+            raise ScenarioError(f"{show_value(source)}: cannot be read: {what}")
         return path.stem, path.read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:
         if isinstance(error, ScenarioError):

@@ -5,9 +5,17 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable, Collection, Iterable, Mapping
-from typing import Any, Self, TypeVar, get_args
+from typing import Annotated, Any, Self, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    ValidationError,
+    model_validator,
+)
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from ...engines.names import closest_name, suggest_name
@@ -157,8 +165,25 @@ _PLAIN_WORDS = {
     "union_tag_not_found": "kind is missing",
     "model_type": "must be a table",
     "dict_type": "must be a table",
+    "tuple_type": "must be a list",
     "model_attributes_type": "must be a table",
 }
+
+
+def refuse_other_than_list(value: Any) -> Any:
+    """Return what may be a list of texts as it is; its items are validated later.
+
+    Raises
+    ------
+    ValueError
+        If it is no list.
+    """
+    if not isinstance(value, list | tuple):
+        raise ValueError("must be a list of texts")
+    return value
+
+
+Texts = Annotated[tuple[str, ...], Field(strict=False), BeforeValidator(refuse_other_than_list)]
 
 
 def list_kinds() -> set[str]:
@@ -208,6 +233,10 @@ def error_place(entry: ErrorDetails) -> tuple[str, ...]:
 def _format_complaint(entry: ErrorDetails) -> str:
     place, found, facts = error_place(entry), entry.get("input"), entry.get("ctx", {})
     message = " ".join(_PLAIN_WORDS.get(entry["type"], entry["msg"].removeprefix("Value error, ")).split())
+    if entry["type"] in ("too_short", "too_long") and facts.get("field_type") in ("Tuple", "Value"):
+        count = facts["min_length"] if entry["type"] == "too_short" else facts["max_length"]
+        bound = "at least" if entry["type"] == "too_short" else "at most"
+        message = f"must have {bound} {count} item{'' if count == 1 else 's'}"
     left_out = isinstance(found, Mapping | BaseModel) or entry["type"] == "missing"
     if entry["type"] == UNKNOWN_NAME:
         place, left_out = place[:-1], True

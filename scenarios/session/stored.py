@@ -9,8 +9,8 @@ from typing import Any
 
 from ...engines.engine import Problem
 from ..error import ScenarioError
-from ..run import find_part, read_document, read_ride, read_start_state
-from ..scenario import Scenario, load_scenario, output_times, show_value
+from ..run import find_part, read_document, read_ride, read_start_state, read_stored_scenario
+from ..scenario import Scenario, output_times, show_value
 from ..view import RECORDING
 from .result import Run
 from .table import MetricsTable
@@ -44,7 +44,7 @@ def load(folder: str | Path) -> Run:
     """
     folder = Path(folder)
     manifest, metrics = read_document(folder, "manifest.json"), read_document(folder, "metrics.json")
-    _, scenario = load_scenario(str(find_part(folder, "scenario.toml")))
+    scenario = read_stored_scenario(folder, manifest)
     try:
         return _read_run(folder, manifest, metrics, scenario)
     except ScenarioError:

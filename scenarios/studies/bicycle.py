@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...engines.names import suggest_name
 from ...reference.bicycle import Bicycle
 from ...reference.upright import (
     CanonicalMatrices,
@@ -23,7 +24,7 @@ from ...reference.upright import (
 )
 from ..error import ScenarioError
 from ..files import make_folder, write_json
-from ..scenario import BicycleFile, load_scenario, read_bicycle_file, read_toml
+from ..scenario import BicycleFile, library_names, load_scenario, read_bicycle_file, read_toml, show_value
 
 BENCHMARK = "benchmark"
 
@@ -117,6 +118,11 @@ def find_bicycle(source: str) -> BicycleFile:
             return read_bicycle_file(path)
     elif path.suffix or path.exists():
         return read_bicycle_file(path)
+    elif source not in library_names():
+        raise ScenarioError(
+            f"no bicycle {show_value(repr(source))}: give {BENCHMARK}, a bicycle file (BicycleParameters or TOML), "
+            f"or a scenario ({suggest_name(source, [BENCHMARK, *library_names()])})"
+        )
     name, scenario = load_scenario(source)
     return BicycleFile(name, scenario.make_bicycle(), convention="the suite's names, z up")
 

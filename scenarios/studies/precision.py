@@ -168,10 +168,27 @@ def _sample_problem(plan: RunPlan, ladders: Mapping[str, list[Settings]]) -> Pro
         problem = replace(plan.start.problem, times=times)
         if all(_fits(name, plan.engines[name][0], ladder, problem) for name, ladder in ladders.items()):
             return problem
+    coarsest = max((step, name) for name, ladder in ladders.items() for step in map(_step, ladder) if step is not None)
     raise ScenarioError(
-        f"{plan.name}: no output interval up to {_LONGEST_INTERVAL / simulation.output_rate:g} s is a multiple of all "
-        "engines' steps; steps and a duration that are multiples of one another would do"
+        f"{plan.name}: no output interval divides {simulation.duration:g} s and is a multiple of all steps, the "
+        f"coarsest of which is {coarsest[0]:g} s of {coarsest[1]}; {_advise(plan, ladders)}"
     )
+
+
+def _step(settings: Settings) -> float | None:
+    return getattr(settings, "step", None)
+
+
+def _advise(plan: RunPlan, ladders: Mapping[str, list[Settings]]) -> str:
+    """Say which duration all steps fit, or what to do if none does."""
+    simulation = plan.scenario.simulation
+    for merged in range(1, _LONGEST_INTERVAL + 1):
+        interval = merged / simulation.output_rate
+        count = int(np.ceil(round(simulation.duration / interval, 9)))
+        problem = replace(plan.start.problem, times=np.arange(count + 1) * merged / simulation.output_rate)
+        if all(_fits(name, plan.engines[name][0], ladder, problem) for name, ladder in ladders.items()):
+            return f"--duration {count * merged / simulation.output_rate:g} fits them"
+    return "set steps and an output rate whose intervals are multiples of one another"
 
 
 def _fits(name: str, engine: Engine, ladder: list[Settings], problem: Problem) -> bool:

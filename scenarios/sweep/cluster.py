@@ -7,6 +7,7 @@ elsewhere. Dask's protocol carries pickles: connect only to a scheduler that you
 
 from __future__ import annotations
 
+import asyncio
 import threading
 from collections import deque
 from collections.abc import Generator, Sequence
@@ -16,6 +17,7 @@ from typing import Any
 
 from ..error import ScenarioError
 from ..run import library_versions
+from ..scenario import show_value
 from .plan import Task
 from .pool import Done, Pool, WorkersBroken
 from .run import Work
@@ -38,12 +40,19 @@ def on_cluster(address: str) -> Work:
     """
     try:
         from distributed import Client
+
+        # A client that could not connect prints a traceback when it is collected, so none is made before this answers.
+        answer = asyncio.run(_ask_identity(address))
     except ImportError as error:
         raise ScenarioError("--scheduler needs Dask: pip install 'velodrome[cluster]'") from error
+    except (OSError, ValueError, TypeError) as error:  # a TypeError where there are no certificates for TLS
+        raise ScenarioError(_describe_silence(address)) from error
+    if answer.get("type") != "Scheduler":
+        raise ScenarioError(_describe_silence(address))
     try:
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise ScenarioError(f"--scheduler {address}: no Dask scheduler answers there") from error
+        raise ScenarioError(_describe_silence(address)) from error
 
     def work(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
         try:
@@ -55,6 +64,22 @@ def on_cluster(address: str) -> Work:
             client.close()
 
     return work
+
+
+async def _ask_identity(address: str) -> dict[str, Any]:
+    """Ask a Dask server what it is; raise an error if none answers."""
+    from distributed import rpc
+    from distributed.security import Security
+
+    async with rpc(address, connection_args=Security().get_connection_args("client")) as server:
+        return await asyncio.wait_for(server.identity(), _PATIENCE)
+
+
+def _describe_silence(address: str) -> str:
+    return (
+        f"--scheduler {show_value(address)}: no Dask scheduler answers there; "
+        "give the address that it printed when it started, e.g. tcp://127.0.0.1:8786"
+    )
 
 
 def _run_batches(client: Any, setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:

@@ -13,6 +13,7 @@ from ..error import ScenarioError
 from ..scenario import (
     Scenario,
     Table,
+    Texts,
     join_complaints,
     list_complaints,
     load_scenario,
@@ -24,7 +25,7 @@ from ..scenario import (
 
 _Range = Annotated[tuple[float, float], Field(strict=False)]  # TOML has arrays only
 _Values = Annotated[tuple[Any, ...], Field(strict=False, min_length=1)]
-_Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
+_Names = Annotated[Texts, Field(min_length=1)]
 
 
 def flatten_table(table: Any) -> Any:

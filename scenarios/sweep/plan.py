@@ -166,7 +166,7 @@ def _find_engine(key: str) -> str | None:
 
 def _name_other_engines(sweep: SweepFile, changes: Mapping[str, Any]) -> Iterator[str]:
     """Yield a complaint about every changed setting of an engine that the sweep does not use."""
-    riding = (*sweep.engines, REFERENCE)
+    riding = dict.fromkeys((*sweep.engines, REFERENCE))
     for key in changes:
         engine = _find_engine(key)
         if engine is not None and engine not in riding:

@@ -9,8 +9,8 @@ from pathlib import Path
 from ...reports.measure import cut_at_fall, evaluate_ride
 from ..error import ScenarioError
 from ..files import write_text
-from ..run import find_part, read_document, read_ride
-from ..scenario import load_scenario, show_value
+from ..run import check_stored_scenario, find_part, read_document, read_ride, read_stored_scenario
+from ..scenario import show_value
 from .server import LOOPBACK, RunPageServer
 from .viewer import ReplayError, rerun, viewer_files
 
@@ -23,15 +23,31 @@ def open_native(folder: Path) -> None:
     Raises
     ------
     ScenarioError
-        If the folder has no recording, or the viewer cannot run here.
+        If the folder has no recording, its scenario was changed, or the viewer cannot run here.
     """
-    command = native_command(find_part(folder, RECORDING))
+    command = native_command(find_recording(folder))
     try:
         status = subprocess.call(command)
     except OSError as error:
         raise ScenarioError(f"the viewer {command[0]} cannot be started: {error.strerror}") from error
     if status != 0:
         raise ScenarioError(f"the viewer ended with status {status}; without a display, use --web")
+
+
+def find_recording(folder: Path) -> Path:
+    """Return the path of a run's recording, after a check that the run's scenario was not changed since.
+
+    A folder that holds nothing but a recording, as a run that was not stored makes it, has no manifest to check with.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no recording, or the scenario was changed.
+    """
+    path = find_part(folder, RECORDING)
+    if (folder / "manifest.json").exists():
+        check_stored_scenario(folder, read_document(folder, "manifest.json"))
+    return path
 
 
 def native_command(recording: Path) -> list[str]:
@@ -66,7 +82,7 @@ def serve(folder: Path, port: int, ready: Callable[[str], None]) -> None:
 
 def page_server(folder: Path, port: int) -> RunPageServer:
     """Make the server of `serve`, which listens but does not answer yet."""
-    find_part(folder, RECORDING)
+    find_recording(folder)
     if not (folder / REPORT).is_file():
         text = stored_page(folder)
         try:
@@ -113,7 +129,7 @@ def stored_page(folder: Path) -> str:
     from ...reports.page import make_page
 
     manifest, measured = read_document(folder, "manifest.json"), read_document(folder, "metrics.json")
-    _, scenario = load_scenario(str(find_part(folder, "scenario.toml")))
+    scenario = read_stored_scenario(folder, manifest)
     try:
         where = scenario.make_bicycle(), scenario.surface.make()
         rides = {name: evaluate_ride(read_ride(folder, manifest, measured, name), *where) for name in measured}

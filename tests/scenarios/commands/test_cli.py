@@ -316,6 +316,18 @@ def test_check_refuses_a_file_without_a_folder_before_its_work(
         assert (result.status, result.stderr) == (2, f"velodrome: {option} {path}: {words}\n")
 
 
+def test_check_refuses_an_absent_folder_of_baselines_before_its_work(
+    velodrome, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(gate, "check_gate", lambda *_: pytest.fail("the gate ran"))
+    result = velodrome("check", "--baselines", "nope")
+    words = "--baselines nope: there is no such folder; with --update it is made"
+    assert (result.status, result.stdout, result.stderr) == (2, "", f"velodrome: {words}\n")
+    judged(monkeypatch, WORSE)
+    monkeypatch.setattr(gate, "update_baselines", lambda fresh, *_: [tmp_path / f"{name}.json" for name in fresh])
+    assert velodrome("check", "--baselines", "nope", "--update").status == 0
+
+
 def test_two_engines_of_one_name_get_one_line(velodrome, monkeypatch: pytest.MonkeyPatch) -> None:
     words = "engine 'aaa' is announced by two packages, one and other; uninstall one of them"
 
@@ -330,11 +342,15 @@ def test_two_engines_of_one_name_get_one_line(velodrome, monkeypatch: pytest.Mon
 
 def test_check_judges_what_it_is_asked_for(velodrome, tmp_path: Path) -> None:
     arguments = ("check", "q2", "--engine", "mujoco-multipliers", "--baselines", str(tmp_path / "own"))
+    (tmp_path / "own").mkdir()
     assert "no baseline" in velodrome(*arguments).stdout
     result = velodrome(*arguments, "--update", "--reason", "the first of its kind", "--json")
     assert (result.status, result.json()["updated"]) == (0, [str(tmp_path / "own" / "q2.json")])
     assert json.loads((tmp_path / "own" / "q2.json").read_text())["reason"] == "the first of its kind"
     assert re.search(r"mujoco-multipliers  18 of 18 +0\.96 +\d+  nothing moved", velodrome(*arguments).stdout)
+    again = velodrome(*arguments, "--update")
+    assert again.status == 0
+    assert again.stdout.endswith("no baseline written: nothing moved beyond its limit\n")
     for wrong, words in (
         (("q2", "--engine", "warp"), "engine 'warp' is not installed"),
         (("--reason", "none"), "--reason: it belongs to --update"),

@@ -16,7 +16,7 @@ import tomli_w
 from rerun.chunk import RrdReader
 from rich.console import Console
 
-from tests.sealing import age_folder, contents, sealed
+from tests.sealing import age_folder, change_scenario, contents, sealed
 from velodrome.engines.storage import read_trajectory, write_trajectory
 from velodrome.scenarios.commands.present_diff import show_diff
 from velodrome.scenarios.compare.folders import diff_runs, read_pair, write_diff
@@ -139,9 +139,7 @@ def test_an_engine_that_is_gone_is_held_to_round_off(folder: Path, copy: Path) -
 def test_runs_that_cannot_be_compared_are_told_apart(
     folder: Path, copy: Path, table: str, key: str, value: float, words: str
 ) -> None:
-    scenario = tomllib.loads((copy / "scenario.toml").read_text())
-    scenario[table][key] = value
-    (copy / "scenario.toml").write_text(tomli_w.dumps(scenario))
+    change_scenario(copy, lambda scenario: scenario[table].update({key: value}))
     with pytest.raises(ScenarioError, match=words.replace(".", r"\.")):
         read_pair(folder, copy)
 

@@ -452,6 +452,51 @@ def test_updated_baselines_hold_the_next_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("rides_only")
+def test_an_update_writes_only_entries_that_changed(tmp_path: Path) -> None:
+    engines, path = ["mujoco-native", "mujoco-multipliers"], tmp_path / "q2.json"
+
+    def update(step: float, wanted: list[str]) -> list[Path]:
+        verdicts, fresh = gate.check_gate(lambda *_: None, ["q2"], wanted, tmp_path, set_to(step=step))
+        # Other CPU times and another day: of a run that is otherwise the same.
+        for entry in fresh["q2"]["engines"].values():
+            entry["quantities"]["cpu_ratio"] *= 1.5
+            entry["created"] = "2000-01-01"
+        return gate.update_baselines(fresh, verdicts, None, tmp_path)
+
+    assert update(0.004, engines) == [path]
+    first = path.read_text()
+    assert update(0.004, engines) == []
+    assert path.read_text() == first
+    # Another step moves what is held; the entry that was not run, or did not move, stays to the letter.
+    entries = json.loads(first)["engines"]
+    changed = entries | {"mujoco-multipliers": entries["mujoco-multipliers"] | {"created": "1999-01-01"}}
+    path.write_text(json.dumps(json.loads(first) | {"engines": changed}))
+    assert update(0.002, ["mujoco-native"]) == [path]
+    document = json.loads(path.read_text())
+    assert document["engines"]["mujoco-multipliers"] == changed["mujoco-multipliers"]
+    assert document["engines"]["mujoco-native"]["settings"]["step"] == 0.002
+    assert "mujoco-native: since the baseline of 2000-01-01: step 0.004 -> 0.002" in document["reason"]
+
+
+@pytest.mark.usefixtures("rides_only")
+def test_an_update_tells_entries_that_moved_from_those_that_did_not(tmp_path: Path) -> None:
+    engines, path = ["mujoco-native", "mujoco-multipliers"], tmp_path / "q2.json"
+    verdicts, fresh = gate.check_gate(lambda *_: None, ["q2"], engines, tmp_path)
+    gate.update_baselines(fresh, verdicts, None, tmp_path)
+    document = json.loads(path.read_text())
+    document["engines"]["mujoco-native"]["quantities"]["energy_drift"] *= 1.1
+    for entry in document["engines"].values():
+        entry["created"] = "2000-01-01"
+    path.write_text(json.dumps(document))
+    verdicts, fresh = gate.check_gate(lambda *_: None, ["q2"], engines, tmp_path)
+    assert gate.update_baselines(fresh, verdicts, None, tmp_path) == [path]
+    after = json.loads(path.read_text())
+    assert after["reason"] == "mujoco-native: energy_drift: changed"
+    assert after["engines"]["mujoco-multipliers"] == document["engines"]["mujoco-multipliers"]
+    assert after["engines"]["mujoco-native"] == fresh["q2"]["engines"]["mujoco-native"]
+
+
+@pytest.mark.usefixtures("rides_only")
 def test_progress_names_the_engine_and_stays_within_the_run() -> None:
     seen: list[tuple[str, float, float]] = []
     gate.check_gate(lambda *report: seen.append(report), ["q2"], ["mujoco-native"])

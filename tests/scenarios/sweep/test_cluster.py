@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import logging
+import socket
+import subprocess
+import sys
 from collections import Counter
 from collections.abc import Generator, Sequence
 from pathlib import Path
@@ -14,7 +17,6 @@ from processes import killed
 from sweeping import UPRIGHT, data_set, here, planned, swept
 from test_kills import MANY, indices
 
-from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.sweep.plan import Task
 from velodrome.scenarios.sweep.pool import Done
 from velodrome.scenarios.sweep.run import Work
@@ -100,9 +102,26 @@ def test_faults_on_a_cluster_are_the_rows_they_are_here(tmp_path: Path, monkeypa
     assert data_set(tmp_path / "cluster") == data_set(tmp_path / "local")
 
 
-def test_no_scheduler_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    from velodrome.scenarios.sweep import cluster
-
-    monkeypatch.setattr(cluster, "_PATIENCE", 1)
-    with pytest.raises(ScenarioError, match="no Dask scheduler answers"):
-        on_cluster("tcp://127.0.0.1:1")
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nope", "", "http://nope", "tls://127.0.0.1:1", "LISTENER"])
+def test_no_scheduler_is_said_in_one_line(address: str) -> None:
+    # In a process of its own: Dask complains when its objects are collected.
+    code = (
+        "import gc, sys\n"
+        "from velodrome.scenarios.error import ScenarioError\n"
+        "from velodrome.scenarios.sweep import cluster\n"
+        "cluster._PATIENCE = 1\n"
+        "try:\n"
+        "    cluster.on_cluster(sys.argv[1])\n"
+        "except ScenarioError as error:\n"
+        "    line = str(error)\n"
+        "gc.collect()\n"
+        "print(line)\n"
+    )
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        if address == "LISTENER":  # accepts and says nothing
+            address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        done = subprocess.run([sys.executable, "-c", code, address], capture_output=True, text=True, timeout=60)
+    words = f"--scheduler {address}: no Dask scheduler answers there; give the address"
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(words)
+    assert done.stdout.count("\n") == 1
