@@ -139,13 +139,13 @@ class _Examination:
         if first is None:
             return
         yield check_refusals(self.engine, self.settings, first, wrong, suitable)
-        checks = tuple(_check_ride(first))
+        checks = tuple(_check_ride(self, first))
         yield from checks
         # An engine that has the benchmark bicycle or the plane hard-coded passes the checks so far.
         second_motion = make_motion(accepted[-1], OTHER_BICYCLE, self.interval)
         second, faults = self.try_ride(second_motion)
         yield make_check(f"ride on {second_motion.name}", _RIDE, faults)
-        more = () if second is None else tuple(_check_ride(second))
+        more = () if second is None else tuple(_check_ride(self, second))
         yield from more
         yield from self.check_repeats(first)
         yield self.check_order(first, _has_wrong_map(checks))
@@ -186,6 +186,24 @@ class _Examination:
             return None, [why_failed(error)]
         return ride, list(_list_ride_faults(ride, self.engine.gives, self.reported[-1]))
 
+    def ride_coarser(self, motion: TransientMotion) -> Ride | None:
+        """Simulate a motion with twice the step; return None if the engine cannot."""
+        try:
+            return self.ride(motion, self.refine(motion, 2.0))
+        except Exception:  # no such step; `check_order` reports a failure
+            return None
+
+    def ride_every_step(self, motion: TransientMotion) -> Ride | None:
+        """Simulate a motion with output at every step; return None if the engine cannot, or has no step."""
+        step, problem = getattr(self.settings, "step", None), motion.problem
+        if not (isinstance(step, float) and 0 < step < np.inf):
+            return None
+        samples = round(float(problem.times[-1]) / step)
+        try:
+            return self.ride(make_motion(motion.ground, problem.bicycle, step, samples))
+        except Exception:  # the engine refuses these times, or breaks
+            return None
+
     def check_repeats(self, first: Ride) -> Iterator[ConformanceCheck]:
         """Check that the first ride, repeated after another one, is the same and is the engine's own."""
         try:
@@ -213,7 +231,7 @@ def _has_wrong_map(checks: Iterable[ConformanceCheck]) -> bool:
     return any(check.outcome == "failed" and check.name.startswith("maps on ") for check in checks)
 
 
-def _check_ride(ride: Ride) -> Iterator[ConformanceCheck]:
+def _check_ride(examination: _Examination, ride: Ride) -> Iterator[ConformanceCheck]:
     """Check one ride; skip the checks for which it has too few samples."""
     maps = check_maps(ride)
     map_is_wrong = maps.outcome == "failed"
@@ -231,7 +249,7 @@ def _check_ride(ride: Ride) -> Iterator[ConformanceCheck]:
         return
     yield check_rates(ride)
     yield check_clock(ride)
-    yield check_forces(ride)
+    yield check_forces(ride, examination.ride_coarser(ride.motion), lambda: examination.ride_every_step(ride.motion))
 
 
 def _list_ride_faults(ride: Ride, gives: Iterable[str], reported: list[float]) -> Iterator[str]:
