@@ -18,7 +18,7 @@ from ...reference.bicycle import Bicycle
 from .forces import check_forces
 from .maps import check_maps
 from .motions import GROUNDS, OTHER_BICYCLE, SAMPLES, TransientMotion, make_motion, make_problem, output_interval
-from .order import check_order
+from .order import CLAIM, check_order
 from .protocol import check_settings, guard_engine, step_noise_of
 from .refusals import check_refusals, suits
 from .repeats import check_bits, check_own_work
@@ -134,22 +134,33 @@ class _Examination:
             yield make_check("grounds", "it rides on one ground at least", [*wrong, refused])
             return
         motion = make_motion(accepted[0], Bicycle(), self.interval)
-        try:
-            first = self.ride(motion)
-        except Exception as error:  # another package's code may break in any way
-            yield make_check(f"ride on {motion.name}", _RIDE, [why_failed(error)])
+        first, faults = self.try_ride(motion)
+        yield make_check(f"ride on {motion.name}", _RIDE, faults)
+        if first is None:
             return
-        yield make_check(
-            f"ride on {motion.name}", _RIDE, _list_ride_faults(first, self.engine.gives, self.reported[-1])
-        )
         yield check_refusals(self.engine, self.settings, first, wrong, suitable)
-        checks = tuple(_check_ride(first))
+        checks = tuple(_check_ride(self, first))
         yield from checks
         # An engine that has the benchmark bicycle or the plane hard-coded passes the checks so far.
-        yield from self.check_second_ride(make_motion(accepted[-1], OTHER_BICYCLE, self.interval))
+        second_motion = make_motion(accepted[-1], OTHER_BICYCLE, self.interval)
+        second, faults = self.try_ride(second_motion)
+        yield make_check(f"ride on {second_motion.name}", _RIDE, faults)
+        more = () if second is None else tuple(_check_ride(self, second))
+        yield from more
         yield from self.check_repeats(first)
-        map_is_wrong = any(check.outcome == "failed" for check in checks if _is_map_check(check))
-        yield self.check_order(first, map_is_wrong=map_is_wrong)
+        yield self.check_order(first, _has_wrong_map(checks))
+        # Every ground is compared with the reference, so that none can be ridden as another.
+        for ground in accepted[1:-1]:
+            between = make_motion(ground, Bicycle(), self.interval)
+            ride, faults = self.try_ride(between)
+            yield make_check(f"ride on {between.name}", _RIDE, faults)
+            if ride is not None:
+                yield self.check_order(ride, _has_wrong_map(checks))
+        if second is not None:
+            yield self.check_order(second, _has_wrong_map((*checks, *more)))
+        for ground in suitable:
+            if ground not in accepted:
+                yield skip_check(f"order on {ground}", CLAIM, "it refuses this ground")
 
     @property
     def interval(self) -> float:
@@ -167,17 +178,31 @@ class _Examination:
             wrong += more
         return wrong, suitable
 
-    def check_second_ride(self, motion: TransientMotion) -> Iterator[ConformanceCheck]:
-        """Check a ride of a second motion."""
+    def try_ride(self, motion: TransientMotion) -> tuple[Ride | None, list[str]]:
+        """Simulate a motion; return the ride, or None if it fails, and its faults."""
         try:
-            second = self.ride(motion)
+            ride = self.ride(motion)
         except Exception as error:  # another package's code may break in any way
-            yield make_check(f"ride on {motion.name}", _RIDE, [why_failed(error)])
-            return
-        yield make_check(
-            f"ride on {motion.name}", _RIDE, _list_ride_faults(second, self.engine.gives, self.reported[-1])
-        )
-        yield from _check_ride(second)
+            return None, [why_failed(error)]
+        return ride, list(_list_ride_faults(ride, self.engine.gives, self.reported[-1]))
+
+    def ride_coarser(self, motion: TransientMotion) -> Ride | None:
+        """Simulate a motion with twice the step; return None if the engine cannot."""
+        try:
+            return self.ride(motion, self.refine(motion, 2.0))
+        except Exception:  # no such step; `check_order` reports a failure
+            return None
+
+    def ride_every_step(self, motion: TransientMotion) -> Ride | None:
+        """Simulate a motion with output at every step; return None if the engine cannot, or has no step."""
+        step, problem = getattr(self.settings, "step", None), motion.problem
+        if not (isinstance(step, float) and 0 < step < np.inf):
+            return None
+        samples = round(float(problem.times[-1]) / step)
+        try:
+            return self.ride(make_motion(motion.ground, problem.bicycle, step, samples))
+        except Exception:  # the engine refuses these times, or breaks
+            return None
 
     def check_repeats(self, first: Ride) -> Iterator[ConformanceCheck]:
         """Check that the first ride, repeated after another one, is the same and is the engine's own."""
@@ -189,24 +214,24 @@ class _Examination:
             yield check_bits(first, again.trajectory)
         yield check_own_work(first, self.engine.name)
 
-    def check_order(self, first: Ride, map_is_wrong: bool) -> ConformanceCheck:
-        """Check the order of convergence on rides with other steps."""
-        motion = first.motion
+    def check_order(self, ride: Ride, map_is_wrong: bool) -> ConformanceCheck:
+        """Check the order of convergence of a ride, and what it converges to, on rides with other steps."""
+        motion = ride.motion
         name, claim = f"order on {motion.name}", "it is checked along a ride in the right coordinates"
         if map_is_wrong:
             return skip_check(name, claim, _MAP_IS_WRONG)
-        if first.trajectory.ended is not None:
+        if ride.trajectory.ended is not None:
             return skip_check(name, claim, "it does not ride to the end")
         return check_order(
             motion.name, lambda factor: self.refine(motion, factor), lambda settings: self.ride(motion, settings)
         )
 
 
-def _is_map_check(check: ConformanceCheck) -> bool:
-    return check.name.startswith("maps on ")
+def _has_wrong_map(checks: Iterable[ConformanceCheck]) -> bool:
+    return any(check.outcome == "failed" and check.name.startswith("maps on ") for check in checks)
 
 
-def _check_ride(ride: Ride) -> Iterator[ConformanceCheck]:
+def _check_ride(examination: _Examination, ride: Ride) -> Iterator[ConformanceCheck]:
     """Check one ride; skip the checks for which it has too few samples."""
     maps = check_maps(ride)
     map_is_wrong = maps.outcome == "failed"
@@ -224,7 +249,7 @@ def _check_ride(ride: Ride) -> Iterator[ConformanceCheck]:
         return
     yield check_rates(ride)
     yield check_clock(ride)
-    yield check_forces(ride)
+    yield check_forces(ride, examination.ride_coarser(ride.motion), lambda: examination.ride_every_step(ride.motion))
 
 
 def _list_ride_faults(ride: Ride, gives: Iterable[str], reported: list[float]) -> Iterator[str]:

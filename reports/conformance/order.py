@@ -12,6 +12,7 @@ from ...engines.engine import why_failed
 from ..measure import SAME_BITS, extrapolate, observed_orders, order_limit
 from .explain import EXPLAINED
 from .maps import find_scaled_rate, violation
+from .mistakes import find_mistake
 from .report import ConformanceCheck, make_check, skip_check
 from .rides import Ride
 
@@ -76,7 +77,9 @@ def _judge_order(name: str, rides: Sequence[Ride]) -> ConformanceCheck:
     order = observed_orders(paths)[-1]
     order_text = f"an order of {order:.3g} is seen"
     if not order >= _LEAST_ORDER:
-        return make_check(name, CLAIM, [f"{order_text}: it does not converge"], tolerance=_LIMIT)
+        mistake = find_mistake(rides[-1])
+        wrong = [f"{order_text}: it does not converge", *([] if mistake is None else [mistake])]
+        return make_check(name, CLAIM, wrong, tolerance=_LIMIT)
     found = extrapolate(paths)
     return _judge_limit(name, rides, found.value, found.uncertainty, order_text)
 
@@ -84,12 +87,16 @@ def _judge_order(name: str, rides: Sequence[Ride]) -> ConformanceCheck:
 def _judge_limit(
     name: str, rides: Sequence[Ride], value: np.ndarray, uncertainty: float, order_text: str
 ) -> ConformanceCheck:
-    """Compare the limit of rides, known up to an uncertainty, with the reference; contacts with friction always pass.
+    """Compare the limit of rides, known up to an uncertainty, with the reference.
 
-    Contacts with friction are another model, which converges to its own limit.
+    Contacts with friction are another model, which converges to its own limit. Their rides fail only if a mistake in
+    the ground or the bicycle explains the difference.
     """
     finest = rides[-1]
     if finest.trajectory.friction is not None:
+        mistake = find_mistake(finest)
+        if mistake is not None:
+            return make_check(name, CLAIM, [mistake], tolerance=_LIMIT)
         limit_text = "its contacts have friction: what it converges to is its own model's ride"
         return make_check(name, CLAIM, [], [order_text, limit_text])
     exact = finest.exact.q[: len(value)] / finest.motion.sizes
@@ -101,8 +108,11 @@ def _judge_limit(
 
 
 def _explain(rides: Sequence[Ride], off: float) -> list[str]:
-    """Explain a wrong limit: by maps if the wheels slip as much, else by other parameters of the bicycle."""
+    """Explain a wrong limit: by a wrong ground or bicycle, or by maps if the wheels slip as much."""
     finest = rides[-1]
+    mistake = find_mistake(finest)
+    if mistake is not None:
+        return [mistake]
     motion, trajectory = finest.motion, finest.trajectory
     slip = violation(motion, trajectory.q, trajectory.qd)
     if slip <= EXPLAINED * off:

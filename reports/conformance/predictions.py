@@ -24,7 +24,7 @@ from .coordinate_maps import CoordinateMap, coordinate_maps
 from .motions import TransientMotion
 
 _STEP = 1e-3  # step of the rides that simulate_as_it_is a violation of the constraints [s]
-_DISTINCT = 100.0  # a prediction differs from the right ride by more than so many times the methods' error
+DISTINCT = 100.0  # a prediction differs from the right ride by more than so many times the methods' error
 _LIFTS = 5  # Newton steps that put the rear wheel on the ground
 
 
@@ -56,14 +56,12 @@ def predictions(motion: TransientMotion) -> tuple[Prediction, ...]:
     them: such a mistake does not show in this motion.
     """
     exact = motion.exact
-    error = max(
-        measure_distance(motion, ride.q, ride.qd, exact.q, exact.qd) for ride in _simulate_start(motion.problem)
-    )
+    error = max(measure_distance(motion, ride.q, ride.qd, exact.q, exact.qd) for ride in simulate_start(motion.problem))
     found = (prediction for map_ in coordinate_maps() for prediction in _predict(motion, map_))
     return tuple(
         prediction
         for prediction in found
-        if measure_distance(motion, prediction.q, prediction.qd, exact.q, exact.qd) > _DISTINCT * max(error, ROUND_OFF)
+        if measure_distance(motion, prediction.q, prediction.qd, exact.q, exact.qd) > DISTINCT * max(error, ROUND_OFF)
     )
 
 
@@ -72,12 +70,12 @@ def _predict(motion: TransientMotion, map_: CoordinateMap) -> Iterator[Predictio
     exact, problem, simple = motion.exact, motion.problem, map_.simple
     yield Prediction(f"{map_.what} on the way back", simple, exact.q @ back, exact.qd @ rates_back)
     start = replace(problem, q=map_.positions @ problem.q, qd=map_.rates @ problem.qd)
-    for found in _simulate_start(start):
+    for found in simulate_start(start):
         yield Prediction(map_.what, simple, found.q @ back, found.qd @ rates_back)
         yield Prediction(f"{map_.what} on the way in", simple, found.q, found.qd)
 
 
-def _simulate_start(start: Problem) -> Iterator[PreciseMotion]:
+def simulate_start(start: Problem) -> Iterator[PreciseMotion]:
     """Yield the reference's rides from a start that may violate the constraints, if they reach the end.
 
     Three ways are tried: the start is projected onto the constraints; the violation is kept; or the rear wheel is first
