@@ -45,7 +45,8 @@ def run(
     changes : mapping, optional
         Fields of the scenario to override, by dotted key, such as ``{"perturbation.lean_rate": 0.2}``.
     progress : callable, optional
-        Called with the engine at work, the simulated time that it has reached and the duration [s].
+        Called with the engine at work, the simulated time that it has reached and the duration [s]. An exception that
+        it raises ends the run and is raised unchanged, so that a run can be cancelled.
 
     Returns
     -------
@@ -57,7 +58,9 @@ def run(
     ScenarioError
         If the scenario, an engine's name or a setting is wrong, or the motion does not exist.
     KeyboardInterrupt
-        If Ctrl-C was pressed; with ``out`` the engines that were done are in the run folder.
+        If Ctrl-C was pressed or ``progress`` raised it; with ``out`` the engines that were done are in the run folder.
+    Exception
+        What ``progress`` raises; with ``out`` a run folder of the engines that were done, without metrics, is left.
 
     Examples
     --------

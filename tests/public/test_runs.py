@@ -182,6 +182,38 @@ def test_progress_is_told_and_nothing_is_printed(capfd: pytest.CaptureFixture[st
     assert capfd.readouterr() == ("", "")
 
 
+class Cancelled(Exception):
+    """Raised by a user's callback."""
+
+
+@pytest.mark.parametrize("name", velodrome.engine_names())
+def test_an_exception_of_the_callback_comes_out_unchanged(name: str, tmp_path: Path) -> None:
+    cause = ValueError("the user's own cause")
+    error = Cancelled("stop please")
+    seen: list[str] = []
+
+    def cancel(engine: str, _time: float, _duration: float) -> None:
+        seen.append(engine)
+        if engine == name:
+            raise error from cause
+
+    scenario = "plane-circle" if name == "exudyn-builtin" else "q2"
+    with pytest.raises(Cancelled) as caught:
+        velodrome.run(scenario, engines=[name], duration=2.0, progress=cancel, out=tmp_path)
+    assert caught.value is error
+    assert error.__cause__ is cause
+    assert seen[-1] == name
+    (folder,) = tmp_path.iterdir()
+    assert (folder / "reference.parquet").exists() == (name != "reference")
+    assert not json.loads((folder / "manifest.json").read_text())["complete"]
+
+
+def test_a_callback_of_the_wrong_signature_is_the_callers_error() -> None:
+    wrong: Any = lambda: None  # noqa: E731
+    with pytest.raises(TypeError, match="takes 0 positional arguments"):
+        velodrome.run("q2", engines=[], duration=0.1, progress=wrong)
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
