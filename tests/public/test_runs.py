@@ -222,7 +222,7 @@ def test_a_callback_of_the_wrong_signature_is_the_callers_error() -> None:
         ({"duration": -1}, "simulation.duration"),
         ({"changes": {"motion.warp": 1}}, "unknown key 'warp'"),
         ({"settings": {NATIVE: {"stepp": 1}}}, f"engines.{NATIVE}: unknown key 'stepp'"),
-        ({"settings": {NATIVE: 0.001}}, "must be a mapping"),
+        ({"settings": {NATIVE: 0.001}}, f"settings['{NATIVE}'] is 0.001 (float); it must be a mapping"),
         ({"settings": {"warp": {}}}, "engine 'warp' is not installed"),
     ],
 )
