@@ -321,3 +321,20 @@ def test_a_run_of_nothing_has_nothing_to_show(monkeypatch: pytest.MonkeyPatch) -
     assert not run.metrics
     with pytest.raises(velodrome.ScenarioError, match="no trajectory"):
         run.show()
+
+
+def test_what_a_run_holds_is_shown_in_a_few_lines_and_compared_by_identity(stored: velodrome.Run) -> None:
+    assert stored.folder is not None
+    again = velodrome.load(stored.folder)
+    ride = stored.trajectories[NATIVE]
+    for one, other in ((ride, again.trajectories[NATIVE]), (stored.start, again.start)):
+        assert one == one
+        assert one != other
+        assert len({one, other}) == 2
+        assert repr(one) == repr(other)
+        lines = repr(one).splitlines()
+        assert len(lines) <= 10
+        assert all(len(line) < 200 for line in lines)
+    assert repr(ride).startswith(f"Trajectory of {NATIVE} {ride.version}: 21 samples, 0 to 0.2 s\n")
+    assert repr(stored.start).startswith("Problem: 21 output times from 0 to 0.2 s\n")
+    assert len(repr(stored).splitlines()) <= 10
