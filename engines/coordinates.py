@@ -1,7 +1,8 @@
 """Conversion between the suite's coordinates and an engine's rigid bodies.
 
 The nine coordinates and their order are `COORDINATES`, the four bodies `BODIES`; the theory page of the documentation
-states the axes.
+states the axes. Maps of coordinates take those of a trajectory, of shape (n, 9), or of one state, of shape (9,), and
+raise ValueError for others.
 
 - An engine that uses these coordinates gets the poses of its bodies from `body_positions` and `body_quaternions`, and
   their twists from `body_velocities` and `angular_velocities`. These functions also place the bodies at the start.

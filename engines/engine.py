@@ -10,6 +10,7 @@ An engine is any object that satisfies `Engine` and is announced under the entry
 from __future__ import annotations
 
 import re
+import reprlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -20,6 +21,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from ..reference.bicycle import Bicycle
+from ..reference.kinematics import COORDINATES
 from ..reference.surface import Surface
 from .format_version import VERSION_KEY
 from .guard import EngineError as EngineError
@@ -36,7 +38,7 @@ REFERENCE = "reference"
 Progress = Callable[[float], None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Problem:
     """A bicycle on a surface, started from a state that satisfies its constraints.
 
@@ -47,7 +49,16 @@ class Problem:
     q, qd : ndarray, shape (9,)
         Generalised coordinates and rates at the start, including wheel angles and yaw.
     times : ndarray, shape (n,)
-        Output times, rising from 0 [s].
+        Output times, rising from 0 [s]; at least two.
+
+    Raises
+    ------
+    ValueError
+        If an array has another shape, the coordinates or rates are not finite, or the times do not rise from 0.
+
+    Notes
+    -----
+    Arrays are converted to double precision where they are of another type; problems are compared by identity.
     """
 
     bicycle: Bicycle
@@ -55,6 +66,36 @@ class Problem:
     q: np.ndarray
     qd: np.ndarray
     times: np.ndarray
+
+    def __post_init__(self) -> None:
+        for name in ("q", "qd", "times"):
+            given = getattr(self, name)
+            try:
+                values = np.asarray(given, dtype=float)
+            except (TypeError, ValueError) as error:
+                raise ValueError(f"{name} is {reprlib.repr(given)}; it must be an array of numbers") from error
+            object.__setattr__(self, name, values)
+        for name in ("q", "qd"):
+            values = getattr(self, name)
+            if values.shape != (9,) or not np.all(np.isfinite(values)):
+                text = reprlib.repr(values.tolist())
+                raise ValueError(f"{name} has shape {values.shape}, {text}; it must be 9 finite numbers")
+        times = self.times
+        if times.ndim != 1 or len(times) < 2:
+            raise ValueError(f"times have shape {times.shape}; they must be an array of shape (n,), at least two")
+        if not (np.all(np.isfinite(times)) and times[0] == 0 and np.all(np.diff(times) > 0)):
+            raise ValueError(f"times are {np.array2string(times, threshold=6)}; they must be finite and rise from 0 s")
+
+    def __repr__(self) -> str:
+        lines = [
+            f"Problem: {len(self.times)} output times from 0 to {self.times[-1]:g} s",
+            f"  bicycle: {_shorten(self.bicycle)}",
+            f"  surface: {_shorten(self.surface)}",
+        ]
+        for name, values in (("q", self.q), ("qd", self.qd)):
+            named = (f"{key} {value:.6g}" for key, value in zip(COORDINATES, values, strict=True))
+            lines.append(f"  {name}: {', '.join(named)}")
+        return "\n".join(lines)
 
 
 # Shapes of a trajectory's sampled fields without the axis of samples; the first five fields are required.
@@ -74,11 +115,11 @@ SHAPES: dict[str, tuple[int, ...]] = {
 REQUIRED = tuple(SHAPES)[:5]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Trajectory:
     """The result of an engine. Fields that the engine does not compute are None.
 
-    All fields are keyword-only.
+    All fields are given by name. Trajectories are compared by identity; compare their arrays for equal values.
 
     Attributes
     ----------
@@ -143,6 +184,21 @@ class Trajectory:
     unconverged_steps: int | None = None
     largest_residual: float | None = None
 
+    def __repr__(self) -> str:
+        span = f"{self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else "no time"
+        given = [name for name in SHAPES if getattr(self, name) is not None]
+        lines = [
+            f"Trajectory of {self.engine} {self.version}: {len(self.time)} samples, {span}",
+            f"  {self.steps} steps in {self.cpu_time:.3g} s of CPU time",
+            f"  arrays: {', '.join(given)}",
+            f"  settings: {_shorten(self.settings)}",
+        ]
+        if self.ended is not None:
+            lines.append(f"  ended: {self.ended}")
+        if self.unconverged_steps:
+            lines.append(f"  steps that did not converge: {self.unconverged_steps}")
+        return "\n".join(lines)
+
     def first(self, samples: int) -> Self:
         """Return the first samples of the trajectory; steps and CPU time remain those of the whole."""
         cut = {name: value[:samples] for name in SHAPES if (value := getattr(self, name)) is not None}
@@ -187,6 +243,12 @@ class Trajectory:
         """Return the names of the given fields that are not finite in some samples."""
         given = ((name, getattr(self, name)) for name in SHAPES)
         return [name for name, value in given if value is not None and not np.all(np.isfinite(value))]
+
+
+def _shorten(value: Any) -> str:
+    """Return the repr of a value as a part of one line, cut in the middle where it is long."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 160 else f"{text[:100]} ... {text[-55:]}"
 
 
 class Settings(BaseModel):

@@ -169,12 +169,13 @@ def simulate_guarded(engine: Engine, problem: Problem, settings: Any, progress: 
     try:
         trajectory = call_engine(engine.simulate, _copy_problem(problem), settings, report)
     except Exception:
-        if raised:
-            raise raised[0] from None
-        raise
-    if raised:
-        raise raised[0]
-    return trajectory
+        if not raised:
+            raise
+    else:
+        if not raised:
+            return trajectory
+    # Outside the handler, so that the exception keeps its own cause and context.
+    raise raised[0]
 
 
 def _copy_problem(problem: Problem) -> Problem:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Callable
+from functools import lru_cache, wraps
+from typing import TypeVar, cast
 
 import numpy as np
 
@@ -67,13 +69,35 @@ def _axis_angle(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
     return np.eye(3) + sine * k + (1 - cosine) * (k @ k)
 
 
+_Map = TypeVar("_Map", bound=Callable[..., np.ndarray])
+
+
+def _of_one_or_many(map_states: _Map) -> _Map:
+    """Let a map of states of shape (n, 9) take a single state of shape (9,) too; its result has no first axis then."""
+
+    @wraps(map_states)
+    def mapped(bicycle: Bicycle, q: np.ndarray, *qd: np.ndarray, **named: np.ndarray) -> np.ndarray:
+        states = [np.asarray(state) for state in (q, *qd, *named.values())]
+        for name, state in zip(("q", "qd"), states, strict=False):
+            if state.ndim not in (1, 2) or state.shape[-1] != len(COORDINATES):
+                raise ValueError(f"{name} has shape {state.shape}; it must be (9,) or (n, 9)")
+            if state.shape != states[0].shape:
+                raise ValueError(f"{name} has shape {state.shape}, but q has {states[0].shape}; they must be the same")
+        if states[0].ndim == 2:
+            return map_states(bicycle, *states)
+        return map_states(bicycle, *(state[None] for state in states))[0]
+
+    return cast("_Map", mapped)
+
+
+@_of_one_or_many
 def rotations(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
     """Compute the rotation matrices of the four bodies along a trajectory.
 
     Parameters
     ----------
     bicycle : Bicycle
-    q : ndarray, shape (n, 9)
+    q : ndarray, shape (n, 9) or (9,)
         Generalised coordinates [m, rad].
 
     Returns
@@ -94,6 +118,7 @@ def _frame_rotations(bicycle: Bicycle, q: np.ndarray) -> tuple[np.ndarray, np.nd
     return rear, rear @ _axis_angle(bicycle.steer_axis, q[:, STEER])
 
 
+@_of_one_or_many
 def body_positions(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
     """Compute the centres of mass of the four bodies, shape (n, 4, 3) [m], from coordinates (n, 9)."""
     # A wheel's centre lies on its axle, so the wheel's own rotation does not move it.
@@ -102,13 +127,14 @@ def body_positions(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
     return q[:, None, :3] + np.stack([turned @ offset for turned, offset in zip(carriers, offsets, strict=True)], 1)
 
 
+@_of_one_or_many
 def body_quaternions(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
     """Compute the orientations of the four bodies as unit quaternions from coordinates.
 
     Parameters
     ----------
     bicycle : Bicycle
-    q : ndarray, shape (n, 9)
+    q : ndarray, shape (n, 9) or (9,)
         Generalised coordinates [m, rad].
 
     Returns
@@ -147,6 +173,7 @@ def _multiply(a: _Quaternion, b: _Quaternion) -> _Quaternion:
     )
 
 
+@_of_one_or_many
 def angular_velocities(bicycle: Bicycle, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """Compute the angular velocities of the four bodies in inertial axes, shape (n, 4, 3) [rad/s]."""
     x, _, z = np.eye(3)
@@ -159,6 +186,7 @@ def angular_velocities(bicycle: Bicycle, q: np.ndarray, qd: np.ndarray) -> np.nd
     return np.stack((rear, front, *wheels), axis=1)
 
 
+@_of_one_or_many
 def body_velocities(bicycle: Bicycle, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """Compute the velocities of the four centres of mass in inertial axes, shape (n, 4, 3) [m/s]."""
     arms = body_positions(bicycle, q) - q[:, None, :3]

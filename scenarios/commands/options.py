@@ -98,7 +98,7 @@ def parse_ground(alpha: float | None, surface: str | None) -> Surface | float:
         return alpha
     from ..scenario import parse_surface
 
-    return parse_surface(surface)
+    return parse_surface(surface, "--surface")
 
 
 def show_written(paths: Iterable[Path]) -> None:

@@ -128,7 +128,7 @@ def _plan_source(source: str, changes: dict[str, Any], wanted: list[str] | None)
     from ..run import plan_run
     from ..scenario import load_scenario
 
-    name, scenario = load_scenario(source, changes)
+    name, scenario = load_scenario(source, changes, "--set")
     try:
         return plan_run(name, scenario, wanted)
     except ScenarioError as error:

@@ -81,7 +81,7 @@ def precision_command(
     from .progress import ProgressBars
 
     changes = parse_changes(change, duration)
-    name, loaded = load_scenario(scenario, changes)
+    name, loaded = load_scenario(scenario, changes, "--set")
     if out is not None:
         make_folder(out)  # first, so that no work is lost if it fails
     with showing_traceback(traceback), ProgressBars() as progress:

@@ -15,12 +15,12 @@ from ...reference.kinematics import YAW
 from ...reference.stability import growth_rate, linearise
 from ...reference.surface import SurfaceOfRevolution
 from ..error import ScenarioError
-from ..scenario import name_surface
+from ..scenario import name_surface, show_value
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class CircularSolution:
-    """A circular motion with its contacts, energy and stability.
+    """A circular motion with its contacts, energy and stability; solutions are compared by identity.
 
     Parameters
     ----------
@@ -63,6 +63,24 @@ class CircularSolution:
     def physical(self) -> bool:
         """Whether the ground pushes both wheels."""
         return bool(np.all(self.normal_force > 0))
+
+    def __repr__(self) -> str:
+        motion = self.motion
+        rates = ", ".join(f"{name} {getattr(motion, name):.6g}" for name in ("rear_rate", "front_rate", "yaw_rate"))
+        angles = ", ".join(f"{name} {getattr(motion, name):.6g}" for name in ("lean", "steer", "pitch"))
+        stable = "Lyapunov stable" if self.lyapunov_stable else "not Lyapunov stable"
+        ground = name_surface(self.surface)
+        where = f"alpha {ground['alpha']:g} 1/m" if ground["alpha"] is not None else show_value(repr(self.surface))
+        return "\n".join(
+            [
+                f"CircularSolution: family {self.family}, {where}",
+                f"  rates [rad/s]: {rates}",
+                f"  angles [rad]: {angles}",
+                f"  normal forces [N]: rear {self.normal_force[0]:.6g}, front {self.normal_force[1]:.6g}",
+                f"  energy [J]: {self.energy:.6g}",
+                f"  {stable}: growth rate {self.growth_rate:.6g} 1/s",
+            ]
+        )
 
     def as_json(self) -> dict[str, Any]:
         """Return the JSON document of `velodrome circular`."""

@@ -123,9 +123,9 @@ class SolutionFamilies:
         }
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class CriticalShapes:
-    """Critical shapes of the paraboloid.
+    """Critical shapes of the paraboloid; they are compared by identity.
 
     Attributes
     ----------
@@ -141,6 +141,21 @@ class CriticalShapes:
     cusp_collision: CriticalPoint | None
     last_stable: dict[int, CriticalPoint | None]
     merging: tuple[CriticalPoint, ...]
+
+    def __repr__(self) -> str:
+        def show(point: CriticalPoint | None) -> str:
+            return "none" if point is None else f"{point.alpha:.6g}"
+
+        last = ", ".join(f"family {number} {show(point)}" for number, point in self.last_stable.items())
+        merging = ", ".join(f"families {' and '.join(map(str, one.families))} {show(one)}" for one in self.merging)
+        return "\n".join(
+            [
+                "CriticalShapes, alpha [1/m]:",
+                f"  cusps of families 2 and 4 meet: {show(self.cusp_collision)}",
+                f"  last stable section vanishes: {last}",
+                f"  families exchange parts: {merging or 'none'}",
+            ]
+        )
 
     def as_json(self) -> dict[str, Any]:
         """Return the JSON document of `velodrome critical`."""

@@ -231,17 +231,34 @@ def ride_plan(
     Returns
     -------
     Rides
-        Rides of all engines, or of the engines that had finished when Ctrl-C was pressed.
+        Of the engines that were done before Ctrl-C was pressed, if it was.
+
+    Raises
+    ------
+    BaseException
+        What ``watch`` raises, unchanged. A KeyboardInterrupt is handled like Ctrl-C.
     """
     rides = Rides({}, {})
     for line in plan.start.problem.bicycle.warnings():
         note(line)
     problem, duration = plan.start.problem, plan.scenario.simulation.duration
+    # What `watch` raises, for example to cancel the run, is not a failure of the engine that called it.
+    raised: list[BaseException] = []
+
+    def report(name: str, time: float) -> None:
+        try:
+            watch(name, time, duration)
+        except BaseException as error:
+            raised.append(error)
+            raise
+
     try:
         for name, (engine, settings) in plan.engines.items():
             try:
-                trajectory = ride_engine(engine, problem, settings, lambda t, name=name: watch(name, t, duration))
-            except Exception as error:  # an engine may raise anything; the other engines still run
+                trajectory = ride_engine(engine, problem, settings, lambda time, name=name: report(name, time))
+            except Exception as error:  # whatever an engine raises must not cost the others' results
+                if raised:
+                    raise
                 rides.failures[name] = why_failed(error)
                 note(f"{name}: {rides.failures[name]}")
                 if trace is not None:

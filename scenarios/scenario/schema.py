@@ -214,7 +214,9 @@ def library_names() -> list[str]:
     return list_library()
 
 
-def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tuple[str, Scenario]:
+def load_scenario(
+    source: str, changes: Mapping[str, Any] | None = None, given_by: str = "changes:"
+) -> tuple[str, Scenario]:
     """Read a scenario by library name or path, apply changes, and validate the result.
 
     Parameters
@@ -223,6 +225,8 @@ def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tupl
         A library name, or a path to a TOML file.
     changes : mapping, optional
         Dotted key to value, e.g. ``{"simulation.duration": 5.0}``.
+    given_by : str
+        What the changes were given by, for errors: an argument or an option.
 
     Returns
     -------
@@ -254,7 +258,7 @@ def load_scenario(source: str, changes: Mapping[str, Any] | None = None) -> tupl
         try:
             data = set_keys(data, {key: value})
         except ValueError as error:
-            faults.append(f"--set {error}")
+            faults.append(f"{given_by} {error}")
     try:
         scenario = validate_scenario(data, source)
     except ScenarioError as error:

@@ -185,10 +185,16 @@ _KINDS: dict[type, str] = {
 }
 
 
-def parse_surface(text: str) -> Surface:
+def parse_surface(text: str, given_by: str = "surface") -> Surface:
     """Make the surface that ``KIND`` or ``KIND:KEY=VALUE,...`` names, e.g. ``sphere:radius=20``.
 
     Values are TOML: ``profile:coefficients=[0.005, 1e-6]``.
+
+    Parameters
+    ----------
+    text : str
+    given_by : str
+        What the text was given by, for errors: an argument or an option.
 
     Raises
     ------
@@ -196,7 +202,7 @@ def parse_surface(text: str) -> Surface:
         If the text names no surface. The message is one line.
     """
     kind, _, fields = text.partition(":")
-    where = f"--surface {show_value(text)}"
+    where = f"{given_by} {show_value(text)}"
     try:
         table = read_toml(f"surface = {{ {fields} }}")["surface"]
         # A line break would start a second TOML statement.

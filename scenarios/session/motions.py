@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 from ...reference.bicycle import Bicycle
 from ...reference.surface import Surface
-from ..error import ScenarioError
 from ..motions import (
     CircularSolution,
     CriticalShapes,
@@ -16,13 +15,14 @@ from ..motions import (
     solve_circular,
 )
 from ..scenario import make_bowl
+from .arguments import read_bicycle, read_family, read_ground, read_near, read_number, require_callable
 
 
 def circular(
     *,
     rear_rate: float,
     alpha: float | None = None,
-    surface: Surface | None = None,
+    surface: Surface | str | None = None,
     family: int | None = None,
     near: tuple[float, float] | None = None,
     bicycle: Bicycle | None = None,
@@ -35,8 +35,9 @@ def circular(
         Rate of the rear wheel, positive [rad/s].
     alpha : float, optional
         Shape of the bowl z = alpha (x^2 + y^2) [1/m]; 0 is the level plane. Either this or ``surface`` is needed.
-    surface : Surface, optional
-        Another surface of revolution about z, such as ``Sphere(20.0)``.
+    surface : Surface or str, optional
+        Another surface of revolution about z, such as ``Sphere(20.0)``, or the text that names it on the command line,
+        such as ``"sphere:radius=20"``.
     family : int, optional
         Solution family, 1 to 4. Either this or ``near`` is needed; both if the family has several motions.
     near : tuple of float, optional
@@ -51,7 +52,8 @@ def circular(
     Raises
     ------
     ScenarioError
-        If there is no such motion, or the ground is given twice, not given, or not a surface of revolution.
+        If there is no such motion, an argument has a wrong type or value, or the ground is given twice, not at all or
+        is no surface of revolution.
 
     Examples
     --------
@@ -62,12 +64,13 @@ def circular(
     >>> round(found.motion.lean, 5), round(found.motion.steer, 5)
     (0.73744, 2.83701)
     """
-    ground = make_bowl(_choose_ground(alpha, surface))
-    return solve_circular(bicycle or Bicycle(), ground, rear_rate, family, near)
+    ground = make_bowl(read_ground(alpha, surface))
+    rate = read_number("rear_rate", rear_rate, "rad/s")
+    return solve_circular(read_bicycle(bicycle), ground, rate, read_family(family), read_near(near))
 
 
 def families(
-    *, alpha: float | None = None, surface: Surface | None = None, bicycle: Bicycle | None = None
+    *, alpha: float | None = None, surface: Surface | str | None = None, bicycle: Bicycle | None = None
 ) -> SolutionFamilies:
     """Follow the four families of circular motions, with special points and stable sections.
 
@@ -75,8 +78,8 @@ def families(
     ----------
     alpha : float, optional
         Shape of the bowl z = alpha (x^2 + y^2) [1/m]; 0 is the level plane. Either this or ``surface`` is needed.
-    surface : Surface, optional
-        Another surface of revolution about z.
+    surface : Surface or str, optional
+        Another surface of revolution about z, or the text that names it, such as ``"sphere:radius=20"``.
     bicycle : Bicycle, optional
         The benchmark bicycle if not given.
 
@@ -87,7 +90,8 @@ def families(
     Raises
     ------
     ScenarioError
-        If the ground is given twice, not given, or not a surface of revolution.
+        If an argument has a wrong type or value, or the ground is given twice, not at all or is no surface of
+        revolution.
 
     Examples
     --------
@@ -98,7 +102,7 @@ def families(
     >>> found.curves[1].samples.lean.shape == found.curves[1].samples.rear_rate.shape
     True
     """
-    return follow_families(bicycle or Bicycle(), make_bowl(_choose_ground(alpha, surface)))
+    return follow_families(read_bicycle(bicycle), make_bowl(read_ground(alpha, surface)))
 
 
 def critical(
@@ -118,17 +122,15 @@ def critical(
     Returns
     -------
     CriticalShapes
+
+    Raises
+    ------
+    ScenarioError
+        If an argument has a wrong type.
     """
-    return find_critical_shapes(bicycle or Bicycle(), progress or _ignore_progress)
+    require_callable("progress", progress)
+    return find_critical_shapes(read_bicycle(bicycle), progress or _ignore_progress)
 
 
 def _ignore_progress(*_: object) -> None:
     """Ignore the progress of a computation."""
-
-
-def _choose_ground(alpha: float | None, surface: Surface | None) -> Surface | float:
-    if alpha is not None and surface is None:
-        return alpha
-    if surface is not None and alpha is None:
-        return surface
-    raise ScenarioError("give the bowl by one of alpha and surface, such as alpha=0.005 or surface=Sphere(20.0)")

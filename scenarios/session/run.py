@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-import numpy as np
-
-from ...engines.engine import REFERENCE, Settings
-from ..error import ScenarioError
+from ...engines.engine import Settings
 from ..run import RunPlan, RunResult, measure_run, plan_run, ride_plan, store_run, write_run_recording
 from ..scenario import Scenario, load_scenario
+from .arguments import plain_value, read_changes, read_engines, read_path, read_settings, require_callable
 from .result import Run
 from .table import MetricsTable
 
@@ -44,7 +42,8 @@ def run(
     changes : mapping, optional
         Fields of the scenario to override, by dotted key, such as ``{"perturbation.lean_rate": 0.2}``.
     progress : callable, optional
-        Called with the running engine, the simulated time that it has reached and the duration [s].
+        Called with the engine at work, the simulated time that it has reached and the duration [s]. An exception that
+        it raises ends the run and is raised unchanged, so that a run can be cancelled.
 
     Returns
     -------
@@ -54,9 +53,11 @@ def run(
     Raises
     ------
     ScenarioError
-        If the scenario, an engine's name or a setting is wrong, or the motion does not exist.
+        If an argument has a wrong type or value, or the motion does not exist: one line that names the argument.
     KeyboardInterrupt
-        If Ctrl-C was pressed. With ``out``, the engines that had finished are in the run folder.
+        If Ctrl-C was pressed or ``progress`` raised it; with ``out`` the engines that were done are in the run folder.
+    Exception
+        What ``progress`` raises; with ``out`` a run folder of the engines that were done, without metrics, is left.
 
     Examples
     --------
@@ -67,16 +68,20 @@ def run(
     >>> run.trajectories["mujoco-multipliers"].q.shape
     (51, 9)
     """
-    fields = {key: _to_plain(value) for key, value in (changes or {}).items()}
+    read_path("scenario", scenario)
+    wanted, given = read_engines(engines), read_settings(settings)
+    into = None if out is None else read_path("out", out)
+    require_callable("progress", progress)
+    fields = read_changes(changes)
     if duration is not None:
-        fields["simulation.duration"] = _to_plain(duration)
+        fields["simulation.duration"] = plain_value(duration)
     name, resolved = load_scenario(str(scenario), fields)
-    plan = plan_run(name, _override_settings(resolved, settings or {}), _list_wanted(engines))
+    plan = plan_run(name, _with_settings(resolved, given), wanted)
     watch = progress if progress is not None else _ignore_progress
-    if out is None:
+    if into is None:
         folder, result = None, measure_run(plan, ride_plan(plan, watch, _ignore_progress))
     else:
-        folder, result = store_run(plan, Path(out), watch, _ignore_progress)
+        folder, result = store_run(plan, into, watch, _ignore_progress)
     if result.interrupted:
         raise KeyboardInterrupt
     return _make_run(plan, result, folder)
@@ -86,35 +91,10 @@ def _ignore_progress(*_: Any) -> None:
     """Ignore progress and notes; failures are reported in the result."""
 
 
-def _list_wanted(engines: str | Iterable[str] | None) -> list[str] | None:
-    if engines is None:
-        return None
-    return [engines] if isinstance(engines, str) else list(engines) or [REFERENCE]
-
-
-def _to_plain(value: Any) -> Any:
-    """Convert a numpy value to a Python value, which a TOML file can contain."""
-    given: Any = value
-    return given.tolist() if isinstance(value, np.generic | np.ndarray) else value
-
-
-def _override_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
-    """Return the scenario with some of its engine settings overridden.
-
-    Raises
-    ------
-    ScenarioError
-        If the settings of an engine are neither a mapping nor an instance of `Settings`.
-    """
+def _with_settings(scenario: Scenario, settings: Mapping[str, Mapping[str, Any]]) -> Scenario:
+    """Return the scenario with engine settings put on top of its own."""
     engines = dict(scenario.engines)
-    for name, given in settings.items():
-        if isinstance(given, Settings):
-            values = given.model_dump(mode="json", exclude_none=True)
-        elif isinstance(given, Mapping):
-            table = cast("Mapping[str, Any]", given)
-            values = {key: _to_plain(value) for key, value in table.items()}
-        else:
-            raise ScenarioError(f"settings of {name!r} are {given!r}; they must be a mapping such as {{'step': 0.001}}")
+    for name, values in settings.items():
         engines[name] = {**engines.get(name, {}), **values}
     return scenario.model_copy(update={"engines": engines})
 

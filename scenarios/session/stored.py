@@ -12,6 +12,7 @@ from ..error import ScenarioError
 from ..run import find_part, read_document, read_ride, read_start_state, read_stored_scenario
 from ..scenario import Scenario, output_times, show_value
 from ..view import RECORDING
+from .arguments import read_path
 from .result import Run
 from .table import MetricsTable
 
@@ -31,7 +32,7 @@ def load(folder: str | Path) -> Run:
     Raises
     ------
     ScenarioError
-        If the folder is not a run folder, or one of its files is missing, damaged or from another run.
+        If it is no path or no run folder, or a file of it is missing, damaged or of another run.
 
     Examples
     --------
@@ -42,7 +43,7 @@ def load(folder: str | Path) -> Run:
     >>> again.metrics == written.metrics
     True
     """
-    folder = Path(folder)
+    folder = read_path("folder", folder)
     manifest, metrics = read_document(folder, "manifest.json"), read_document(folder, "metrics.json")
     scenario = read_stored_scenario(folder, manifest)
     try:

@@ -31,7 +31,10 @@ def open_native(folder: Path) -> None:
     except OSError as error:
         raise ScenarioError(f"the viewer {command[0]} cannot be started: {error.strerror}") from error
     if status != 0:
-        raise ScenarioError(f"the viewer ended with status {status}; without a display, use --web")
+        raise ScenarioError(
+            f"the viewer ended with status {status}; it needs a display. Without one, "
+            f"open {folder / REPORT} in a browser, or run: velodrome view --web {folder}"
+        )
 
 
 def find_recording(folder: Path) -> Path:

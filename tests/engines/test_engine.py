@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import Distribution, EntryPoint
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -113,3 +115,37 @@ def test_a_ride_is_cut_in_all_that_is_sampled() -> None:
     for field in ("time", "q", "qd", "body_position", "body_quaternion", *OPTIONAL):
         if field != "slip":
             assert np.array_equal(getattr(first, field), getattr(trajectory, field)[:3]), field
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"q": np.zeros(5)}, "q has shape (5,)"),
+        ({"q": np.zeros((1, 9))}, "q has shape (1, 9)"),
+        ({"qd": np.full(9, np.nan)}, "qd has shape (9,), [nan"),
+        ({"qd": "x"}, "qd is 'x'; it must be an array of numbers"),
+        ({"times": []}, "times have shape (0,)"),
+        ({"times": [0.0]}, "at least two"),
+        ({"times": np.zeros((2, 2))}, "times have shape (2, 2)"),
+        ({"times": [1.0, 2.0]}, "rise from 0 s"),
+        ({"times": [0.0, 0.2, 0.1]}, "rise from 0 s"),
+        ({"times": [0.0, 0.1, 0.1]}, "rise from 0 s"),
+        ({"times": [0.0, np.inf]}, "must be finite"),
+    ],
+)
+def test_a_problem_refuses_arrays_that_are_none_of_it(given: dict[str, Any], words: str) -> None:
+    right = circle(Paraboloid(0.005))
+    with pytest.raises(ValueError, match=re.escape(words)) as told:
+        replace(right, **given)
+    assert "\n" not in str(told.value)
+
+
+def test_a_problem_keeps_its_arrays_and_takes_lists() -> None:
+    right = circle(Paraboloid(0.005))
+    same = replace(right)
+    assert same.q is right.q
+    listed = replace(right, q=right.q.tolist(), qd=right.qd.tolist(), times=right.times.tolist())
+    for name in ("q", "qd", "times"):
+        assert getattr(listed, name).tobytes() == getattr(right, name).tobytes()
+    assert right != same
+    assert len({right, same}) == 2

@@ -20,7 +20,7 @@ from velodrome.engines.guard import GuardedEngine, call_engine, where_raised
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.surface import Plane
 
-PROBLEM = Problem(Bicycle(), Plane(), np.zeros(9), np.zeros(9), np.zeros(1))
+PROBLEM = Problem(Bicycle(), Plane(), np.zeros(9), np.zeros(9), np.array([0.0, 1.0]))
 
 
 def raising(error: BaseException) -> Callable[[], None]:

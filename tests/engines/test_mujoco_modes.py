@@ -26,7 +26,7 @@ MOTIONS: dict[str, tuple[int, tuple[float, float] | None]] = {"q1": (1, None), "
 def upright() -> Problem:
     rates = (0.0, 0.0, 4.6 / Bicycle().rear_wheel_radius)
     state = consistent_state(Bicycle(), Plane(), (0.0, 0.0), 0.0, 0.0, rates)
-    return Problem(Bicycle(), Plane(), *state, np.zeros(1))
+    return Problem(Bicycle(), Plane(), *state, np.array([0.0, 1.0]))
 
 
 @cache
@@ -34,7 +34,7 @@ def circle(name: str) -> tuple[Problem, Linearisation]:
     family, near = MOTIONS[name]
     surface = Paraboloid(1 / 200)
     state = find_motion(Bicycle(), surface, 18.0, family, near)[1].state()
-    return Problem(Bicycle(), surface, *state, np.zeros(1)), linearise(Bicycle(), surface, *state)
+    return Problem(Bicycle(), surface, *state, np.array([0.0, 1.0])), linearise(Bicycle(), surface, *state)
 
 
 def weave(engine: MujocoEngine[Any], levels: int = 2, **settings: Any) -> tuple[complex, Identified]:

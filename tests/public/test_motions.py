@@ -79,6 +79,24 @@ def test_critical_shapes_are_the_reference_modules(monkeypatch: pytest.MonkeyPat
     assert told[0] == ("merging", 0.5, 1.0)
     assert (found.cusp_collision, found.merging) == (point, (point,))
     assert found.last_stable == {1: None, 2: point, 3: None, 4: None}
+    assert repr(found).splitlines() == [
+        "CriticalShapes, alpha [1/m]:",
+        "  cusps of families 2 and 4 meet: 0.012",
+        "  last stable section vanishes: family 1 none, family 2 0.012, family 3 none, family 4 none",
+        "  families exchange parts: families 2 and 4 0.012",
+    ]
     document = found.as_json()
     assert document["last_stable"]["1"] is None
     assert document["cusp_collision"]["alpha"] == document["last_stable"]["2"]["alpha"] == 0.012
+
+
+def test_a_solution_is_shown_in_a_few_lines_and_compared_by_identity() -> None:
+    found, other = (velodrome.circular(alpha=0.005, rear_rate=18.0, family=2) for _ in range(2))
+    assert found == found
+    assert found != other
+    assert len({found, other}) == 2
+    lines = repr(found).splitlines()
+    assert len(lines) <= 10
+    assert lines[0] == "CircularSolution: family 2, alpha 0.005 1/m"
+    assert "lean 0.737443, steer 2.83701" in lines[2]
+    assert "  Lyapunov stable: growth rate -" in lines[-1]

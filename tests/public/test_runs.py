@@ -182,6 +182,38 @@ def test_progress_is_told_and_nothing_is_printed(capfd: pytest.CaptureFixture[st
     assert capfd.readouterr() == ("", "")
 
 
+class Cancelled(Exception):
+    """Raised by a user's callback."""
+
+
+@pytest.mark.parametrize("name", velodrome.engine_names())
+def test_an_exception_of_the_callback_comes_out_unchanged(name: str, tmp_path: Path) -> None:
+    cause = ValueError("the user's own cause")
+    error = Cancelled("stop please")
+    seen: list[str] = []
+
+    def cancel(engine: str, _time: float, _duration: float) -> None:
+        seen.append(engine)
+        if engine == name:
+            raise error from cause
+
+    scenario = "plane-circle" if name == "exudyn-builtin" else "q2"
+    with pytest.raises(Cancelled) as caught:
+        velodrome.run(scenario, engines=[name], duration=2.0, progress=cancel, out=tmp_path)
+    assert caught.value is error
+    assert error.__cause__ is cause
+    assert seen[-1] == name
+    (folder,) = tmp_path.iterdir()
+    assert (folder / "reference.parquet").exists() == (name != "reference")
+    assert not json.loads((folder / "manifest.json").read_text())["complete"]
+
+
+def test_a_callback_of_the_wrong_signature_is_the_callers_error() -> None:
+    wrong: Any = lambda: None  # noqa: E731
+    with pytest.raises(TypeError, match="takes 0 positional arguments"):
+        velodrome.run("q2", engines=[], duration=0.1, progress=wrong)
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -190,7 +222,7 @@ def test_progress_is_told_and_nothing_is_printed(capfd: pytest.CaptureFixture[st
         ({"duration": -1}, "simulation.duration"),
         ({"changes": {"motion.warp": 1}}, "unknown key 'warp'"),
         ({"settings": {NATIVE: {"stepp": 1}}}, f"engines.{NATIVE}: unknown key 'stepp'"),
-        ({"settings": {NATIVE: 0.001}}, "must be a mapping"),
+        ({"settings": {NATIVE: 0.001}}, f"settings['{NATIVE}'] is 0.001 (float); it must be a mapping"),
         ({"settings": {"warp": {}}}, "engine 'warp' is not installed"),
     ],
 )
@@ -289,3 +321,20 @@ def test_a_run_of_nothing_has_nothing_to_show(monkeypatch: pytest.MonkeyPatch) -
     assert not run.metrics
     with pytest.raises(velodrome.ScenarioError, match="no trajectory"):
         run.show()
+
+
+def test_what_a_run_holds_is_shown_in_a_few_lines_and_compared_by_identity(stored: velodrome.Run) -> None:
+    assert stored.folder is not None
+    again = velodrome.load(stored.folder)
+    ride = stored.trajectories[NATIVE]
+    for one, other in ((ride, again.trajectories[NATIVE]), (stored.start, again.start)):
+        assert one == one
+        assert one != other
+        assert len({one, other}) == 2
+        assert repr(one) == repr(other)
+        lines = repr(one).splitlines()
+        assert len(lines) <= 10
+        assert all(len(line) < 200 for line in lines)
+    assert repr(ride).startswith(f"Trajectory of {NATIVE} {ride.version}: 21 samples, 0 to 0.2 s\n")
+    assert repr(stored.start).startswith("Problem: 21 output times from 0 to 0.2 s\n")
+    assert len(repr(stored).splitlines()) <= 10

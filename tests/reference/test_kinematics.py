@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from velodrome.reference import kinematics
 from velodrome.reference.bicycle import BODIES, Bicycle
 from velodrome.reference.kernels.kinematics import frames
 from velodrome.reference.kinematics import (
@@ -102,3 +103,24 @@ def test_quaternions_are_continuous_and_right() -> None:
     rebuilt = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=-1)
     assert np.allclose(rebuilt, turned[..., 0, :], atol=1e-14)
     assert wxyz[0] == pytest.approx(np.tile([1, 0, 0, 0], (4, 1)))
+
+
+@pytest.mark.parametrize(
+    "name", ["rotations", "body_positions", "body_quaternions", "angular_velocities", "body_velocities"]
+)
+def test_maps_take_one_state_or_many(name: str) -> None:
+    states = np.random.default_rng(1).normal(size=(2, 3, 9))
+    rates = name.endswith("velocities")
+    taken = states if rates else states[:1]
+    map_states = getattr(kinematics, name)
+    many = map_states(Bicycle(), *taken)
+    for k in range(3):
+        one = map_states(Bicycle(), *taken[:, k])
+        assert one.shape == many.shape[1:]
+        assert np.allclose(one, many[k], rtol=0, atol=1e-15)
+    for shape in ((8,), (3, 8), (1, 3, 9), ()):
+        with pytest.raises(ValueError, match=r"q has shape .* it must be \(9,\) or \(n, 9\)"):
+            map_states(Bicycle(), *np.zeros((len(taken), *shape)))
+    if rates:
+        with pytest.raises(ValueError, match=r"qd has shape \(9,\), but q has \(3, 9\)"):
+            map_states(Bicycle(), states[0], states[1, 0])

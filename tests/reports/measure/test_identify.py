@@ -38,7 +38,7 @@ def motion(name: str) -> tuple[Problem, Linearisation]:
     alpha, rear_rate, family, near = (MOTIONS | ALONG)[name]
     surface = Paraboloid(alpha)
     state = find_motion(BICYCLE, surface, rear_rate, family, near)[1].state()
-    return Problem(BICYCLE, surface, *state, np.zeros(1)), linearise(BICYCLE, surface, *state)
+    return Problem(BICYCLE, surface, *state, np.array([0.0, 1.0])), linearise(BICYCLE, surface, *state)
 
 
 def error(name: str, engine: str, settings: Settings, levels: int = 3) -> tuple[float, Any]:
@@ -92,7 +92,7 @@ def test_the_weave_of_the_straight_motion_is_meijaards() -> None:
     """On the plane: the free eigenvalues, since a straight motion's zeros split by the root of any noise."""
     rates = (0.0, 0.0, 4.6 / BICYCLE.rear_wheel_radius)
     state = consistent_state(BICYCLE, Plane(), (0.0, 0.0), 0.0, 0.0, rates)
-    problem = Problem(BICYCLE, Plane(), *state, np.zeros(1))
+    problem = Problem(BICYCLE, Plane(), *state, np.array([0.0, 1.0]))
     found = identify(load_engine("reference"), LagrangeSettings(tolerance=1e-11), problem, levels=2)
     weave = max(found.eigenvalues, key=lambda value: value.imag)
     exact = max(free_eigenvalues(Plane(), linearise(BICYCLE, Plane(), *state).eigenvalues, 0.0), key=lambda v: v.imag)

@@ -218,7 +218,7 @@ def test_all_changes_are_checked_at_once() -> None:
     with pytest.raises(ScenarioError) as caught:
         load_scenario("q2", {"title.x": 1, "surface.alpa": 2, "tags.y.z": 3})
     assert str(caught.value) == (
-        "--set title.x: title is no table; --set tags.y.z: tags is no table; "
+        "changes: title.x: title is no table; changes: tags.y.z: tags is no table; "
         "q2: surface: unknown key 'alpa' (did you mean 'alpha'?)"
     )
 

@@ -86,7 +86,7 @@ def test_a_surface_is_what_it_says_in_text_and_file(text: str, surface: Surface)
 def test_a_surface_that_is_none_is_refused_in_one_line(text: str, words: list[str]) -> None:
     with pytest.raises(ScenarioError) as caught:
         parse_surface(text)
-    line = str(caught.value).replace(f"--surface {text}", "")
+    line = str(caught.value).replace(f"surface {text}", "")
     assert "\n" not in line
     assert all(word in line for word in words), line
 
