@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+from itertools import pairwise
 from typing import Annotated, NoReturn
 
 import typer
@@ -92,6 +93,7 @@ def main() -> NoReturn:
     """Run the command in this process; bad input ends with one line on stderr and exit status 2."""
     status = 0
     try:
+        _refuse_empty_out(sys.argv[1:])
         status = app(sys.argv[1:] or ["--help"], standalone_mode=False)
     except ScenarioError as error:
         _complain(str(error))
@@ -111,6 +113,12 @@ def main() -> NoReturn:
     except (OSError, UnicodeEncodeError) as error:  # the latter of a path that is no text
         _complain(f"cannot write: {error}")
     sys.exit(status or 0)
+
+
+def _refuse_empty_out(arguments: list[str]) -> None:
+    """Refuse ``--out ''``, as a shell's unset variable makes it; parsed, it would be the working folder."""
+    if "--out=" in arguments or ("--out", "") in pairwise(arguments):
+        raise ScenarioError("--out: it is empty; name a folder, or . for the working folder")
 
 
 def _is_completion(arguments: list[str]) -> bool:

@@ -82,3 +82,20 @@ def test_critical_shapes_are_the_reference_modules(monkeypatch: pytest.MonkeyPat
     document = found.as_json()
     assert document["last_stable"]["1"] is None
     assert document["cusp_collision"]["alpha"] == document["last_stable"]["2"]["alpha"] == 0.012
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"alpha": "a"}, "^alpha must be a number; it is 'a'$"),
+        ({"alpha": None, "surface": "a"}, r"^surface must be a surface such as Sphere\(20\.0\); it is 'a'$"),
+        ({"rear_rate": "fast"}, "^rear_rate must be a number; it is 'fast'$"),
+        ({"near": 3}, "^near must be two numbers, lean and steer; it is 3$"),
+        ({"near": (0.7, "a")}, "^near must be two numbers"),
+        ({"bicycle": "mine"}, r"^bicycle must be a velodrome\.Bicycle; it is 'mine'$"),
+    ],
+)
+def test_an_argument_of_another_type_is_told(changes: dict[str, Any], said: str) -> None:
+    arguments: dict[str, Any] = {"alpha": 0.005, "rear_rate": 18.0, "family": 2} | changes
+    with pytest.raises(velodrome.ScenarioError, match=said):
+        velodrome.circular(**arguments)
