@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
+from itertools import pairwise
 from typing import Annotated, NoReturn
 
 import typer
@@ -63,7 +65,7 @@ def _take_options(
 
 
 # In the order of the help. The short helps fit beside the names in 60 columns, where longer ones would be cut.
-for _command, _short_help in {
+_COMMANDS: dict[Callable[..., None], str] = {
     list_command: "Scenarios and engines",
     show_command: "A scenario, engine, bicycle or file format",
     run_command: "Run scenarios and compare the engines",
@@ -78,7 +80,8 @@ for _command, _short_help in {
     view_command: "View a run's recording or report",
     sweep_command: "Run a grid or a sample of scenarios",
     check_command: "Hold the gated scenarios to baselines",
-}.items():
+}
+for _command, _short_help in _COMMANDS.items():
     app.command(_command.__name__.removesuffix("_command"), short_help=_short_help)(_command)
 
 
@@ -91,6 +94,7 @@ def main() -> NoReturn:
     """Run the command in this process; bad input ends with one line on stderr and exit status 2."""
     status = 0
     try:
+        _refuse_empty_out(sys.argv[1:])
         status = app(sys.argv[1:] or ["--help"], standalone_mode=False)
     except ScenarioError as error:
         _complain(str(error))
@@ -110,6 +114,12 @@ def main() -> NoReturn:
     except (OSError, UnicodeEncodeError) as error:  # the latter for a path that is not valid text
         _complain(f"cannot write: {error}")
     sys.exit(status or 0)
+
+
+def _refuse_empty_out(arguments: list[str]) -> None:
+    """Refuse ``--out ''``, as a shell's unset variable makes it; parsed, it would be the working folder."""
+    if "--out=" in arguments or ("--out", "") in pairwise(arguments):
+        raise ScenarioError("--out: it is empty; name a folder, or . for the working folder")
 
 
 def _is_completion(arguments: list[str]) -> bool:

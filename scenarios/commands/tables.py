@@ -64,8 +64,7 @@ def print_table(console: Console, columns: Sequence[Column], keys: int = 1, gap:
             header = Text(column.title)
             if column.unit:
                 header.append("\n").append(column.unit, "dim")
-            justify = "right" if column.right else "left"
-            table.add_column(header, justify=justify, no_wrap=True)
+            table.add_column(header, justify="right" if column.right else "left", no_wrap=True)
         for row in zip(*(column.cells for column in (*leading, *part)), strict=True):
             # Brackets in a name are no markup.
             table.add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in row))

@@ -202,7 +202,8 @@ def read_ground(alpha: Any, surface: Any) -> Surface | float:
         raise _refuse("surface", surface, f"it must be a surface, not its class: {show_value(made)}")
     if not (hasattr(surface, "function") and hasattr(surface, "parameters")):
         raise _refuse("surface", surface, "it must be a surface such as Sphere(20.0), or a text: 'sphere:radius=20'")
-    return surface
+    ground: Surface = surface
+    return ground
 
 
 def read_bicycle(bicycle: Any) -> Bicycle:

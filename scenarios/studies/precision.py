@@ -168,10 +168,11 @@ def _sample_problem(plan: RunPlan, ladders: Mapping[str, list[Settings]]) -> Pro
         problem = replace(plan.start.problem, times=times)
         if all(_fits(name, plan.engines[name][0], ladder, problem) for name, ladder in ladders.items()):
             return problem
-    coarsest = max((step, name) for name, ladder in ladders.items() for step in map(_step, ladder) if step is not None)
+    steps = [(step, name) for name, ladder in ladders.items() for step in map(_step, ladder) if step is not None]
+    coarsest = ", the coarsest of which is {:g} s of {}".format(*max(steps)) if steps else ""
     raise ScenarioError(
-        f"{plan.name}: no output interval divides {simulation.duration:g} s and is a multiple of all steps, the "
-        f"coarsest of which is {coarsest[0]:g} s of {coarsest[1]}; {_advise(plan, ladders)}"
+        f"{plan.name}: no output interval divides {simulation.duration:g} s and is a multiple of all steps{coarsest}; "
+        f"{_advise(plan, ladders)}"
     )
 
 

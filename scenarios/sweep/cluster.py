@@ -71,8 +71,10 @@ async def _ask_identity(address: str) -> dict[str, Any]:
     from distributed import rpc
     from distributed.security import Security
 
+    answer: dict[str, Any] = {}
     async with rpc(address, connection_args=Security().get_connection_args("client")) as server:
-        return await asyncio.wait_for(server.identity(), _PATIENCE)
+        answer = await asyncio.wait_for(server.identity(), _PATIENCE)
+    return answer
 
 
 def _describe_silence(address: str) -> str:

@@ -82,11 +82,15 @@ def test_the_table_shows_a_pair_of_two_modes_as_complex(velodrome, tmp_path: Pat
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["bicycle", "--speeds", "5:1"], "--speeds '5:1': must be a range FROM:TO"),
+        (["bicycle", "--speeds", "5:1"], "--speeds '5:1': TO must be above FROM"),
         (["bicycle", "--speeds", "fast"], "--speeds 'fast'"),
         (["bicycle", "--speeds", "-1:3"], "--speeds '-1:3'"),
         (["bicycle", "nowhere.txt"], "nowhere.txt: there is no such file"),
-        (["bicycle", "nothing"], "no scenario 'nothing' in the library"),
+        (["bicycle", "--speeds", "1:1"], "--speeds '1:1': TO must be above FROM"),
+        (["bicycle", "--speeds", "1,3,2"], "--speeds '1,3,2': each speed must be above the one before it"),
+        (["bicycle", "--speeds", "1:1e9"], "--speeds '1:1e9': each speed must be from 0 to 10000 m/s"),
+        (["bicycle", "--speeds", "1:2:3"], "--speeds '1:2:3': must be a range FROM:TO"),
+        (["bicycle", "nothing"], "no bicycle 'nothing': give benchmark, a bicycle file (BicycleParameters or TOML)"),
     ],
 )
 def test_bad_input_is_one_line(velodrome, arguments: list[str], said: str) -> None:

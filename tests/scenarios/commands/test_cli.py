@@ -216,6 +216,9 @@ CIRCULAR = ("circular", "--alpha", "0.005")
         ((*RUN, "--set", "motion.rear_rate=500"), ["q2", "no circular motion", "500"]),
         ((*RUN, "--set", "perturbation.lean=3"), ["q2", "below the ground"]),
         (("run", "q2", "--duration", "0.1", "--out", "file"), ["file", "cannot be made"]),
+        (("run", "q2", "--duration", "0.1", "--out", ""), ["--out: it is empty; name a folder"]),
+        (("bicycle", "--out="), ["--out: it is empty; name a folder"]),
+        ((*RUN, "--set", "tags=x"), ["tags: must be a list of texts (it is 'x')"]),
         (("run", "q2", "--duration", "0.1", "--out", "file/x"), ["file/x", "cannot be made"]),
         (CIRCULAR, ["--rear-rate"]),
         ((*CIRCULAR, "--rear-rate", "18"), ["family", "near"]),
@@ -245,6 +248,12 @@ def test_bad_input_is_one_line_and_leaves_nothing(
     for word in words:
         assert word in result.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_folder_is_no_scenario_file(velodrome, tmp_path: Path) -> None:
+    (tmp_path / "dir.toml").mkdir()
+    result = velodrome("run", "dir.toml")
+    assert (result.status, result.stderr) == (2, "velodrome: dir.toml: cannot be read: it is a folder\n")
 
 
 def test_no_arguments_show_the_commands(velodrome) -> None:

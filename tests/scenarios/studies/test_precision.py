@@ -127,6 +127,12 @@ def test_steps_that_share_no_output_interval_are_refused_in_one_line() -> None:
     with pytest.raises(ScenarioError, match="no output interval") as caught:
         study("q2", {"simulation.duration": 0.75, "engines.mujoco-native.step": 0.005}, ["mujoco-native"], 3)
     assert "\n" not in str(caught.value)
+    with pytest.raises(ScenarioError, match="no output interval") as caught:
+        study("q2", {"simulation.duration": 0.5}, ["mujoco-exact-contact"], 2)
+    advice = "the coarsest of which is 0.008 s of mujoco-exact-contact; --duration 0.52 fits them"
+    assert str(caught.value).endswith(advice)
+    document = study("q2", {"simulation.duration": 0.52}, ["mujoco-exact-contact"], 2)
+    assert len(document["engines"]["mujoco-exact-contact"]["points"]) == 2
 
 
 def test_document_and_figure_are_written(tmp_path: Path) -> None:
