@@ -165,7 +165,7 @@ def _table(path: Path) -> pa.Table:
     """A Parquet file's table; of one file, whatever its folder is called."""
     try:
         with path.open("rb") as file:
-            # With pyarrow's threads a process that exits soon after was seen to abort, about twice in a hundred times.
+            # A worker of pyarrow's that frees a buffer of the file as the interpreter ends would abort the process.
             return pq.ParquetFile(file).read(use_threads=False)
     except OSError as error:
         reason = error.strerror or str(error)
