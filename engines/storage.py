@@ -168,7 +168,8 @@ def _read_table(path: Path) -> pa.Table:
     """Read the table of one Parquet file, without taking names of folders for partitions."""
     try:
         with path.open("rb") as file:
-            return pq.ParquetFile(file).read()
+            # A worker of pyarrow's that frees a buffer of the file as the interpreter ends would abort the process.
+            return pq.ParquetFile(file).read(use_threads=False)
     except OSError as error:
         reason = error.strerror or str(error)
     except (pa.ArrowException, ValueError) as error:
