@@ -66,15 +66,13 @@ def on_cluster(address: str) -> Work:
     return work
 
 
-async def _ask_identity(address: str) -> dict[str, Any]:
+async def _ask_identity(address: str) -> Any:
     """Ask a Dask server what it is; raise an error if none answers."""
     from distributed import rpc
     from distributed.security import Security
 
-    answer: dict[str, Any] = {}
     async with rpc(address, connection_args=Security().get_connection_args("client")) as server:
-        answer = await asyncio.wait_for(server.identity(), _PATIENCE)
-    return answer
+        return await asyncio.wait_for(server.identity(), _PATIENCE)
 
 
 def _describe_silence(address: str) -> str:
