@@ -204,10 +204,18 @@ def trace_all(
     for found in search_starts(bicycle, surface):
         if not any(is_on_curve(curve.equations, curve.points, found) for curve in curves):
             curve = trace_from(_searched_anchor(Steady(bicycle, surface), found), longest)
-            if _is_ridden_somewhere(curve):
+            # A followed curve may have ended a step before a motion that lies on it.
+            known = any(_is_part_of(other, curve) for other in curves)
+            if not known and _is_ridden_somewhere(curve):
                 curves.append(curve)
     numbers = {number for curve in curves for number in curve.numbers}
     return curves, {number: why for number, why in absent.items() if number not in numbers}
+
+
+def _is_part_of(other: Family, curve: Family) -> bool:
+    """Return whether a curve passes through the middle of another."""
+    middle = other.points[len(other.points) // 2]
+    return is_on_curve(curve.equations, curve.points, FoundStart(middle.unknowns, middle.tangent))
 
 
 def _searched_anchor(equations: Steady, found: FoundStart) -> Anchor:

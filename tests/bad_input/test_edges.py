@@ -244,7 +244,7 @@ def test_curves_end_before_a_tip_however_long_the_steps(surface: Torus) -> None:
             assert np.all(sides > 0) or np.all(sides < 0)
             assert "pivot" not in curve.ends
     assert all(one == found[0] for one in found)
-    numbers = {number for number, _ in found[0][0]}
+    numbers = {number for number, _ in found[0][0] if number is not None}
     assert numbers | set(found[0][1]) == set(FAMILIES)
     assert (3, ("flat", "tip")) in found[0][0]
 

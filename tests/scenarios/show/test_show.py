@@ -114,7 +114,7 @@ def test_the_bicycle_is_shown_with_units_and_meanings() -> None:
 def test_tables_of_a_scenario_file_are_all_told() -> None:
     tables = make_document("scenario", SweepFile)["tables"]
     kinds = [table["kind"] for table in tables if table["table"] == "surface"]
-    assert kinds == ["plane", "paraboloid", "sphere", "cone", "torus", "profile", "height-field"]
+    assert kinds == ["plane", "inclined-plane", "paraboloid", "sphere", "cone", "torus", "profile", "height-field"]
     names = {table["table"] for table in tables}
     assert names >= {"", "motion", "motion.near", "perturbation", "simulation", "gate", "criterion", "bicycle"}
     assert names >= {f"engines.{engine}" for engine in OURS}
