@@ -51,8 +51,14 @@ class InclinedPlaneTable(Table):
     """A plane through the origin that rises in one direction."""
 
     kind: Literal["inclined-plane"]
-    slope: float = Field(gt=0, le=1e3, description="rise over run [-]")
-    direction: float = Field(0.0, ge=-10.0, le=10.0, description="in which it rises, from the x axis towards y [rad]")
+    slope: float = Field(gt=0, le=1e3, description="rise over run", json_schema_extra={"unit": "1"})
+    direction: float = Field(
+        default=0.0,
+        ge=-10.0,
+        le=10.0,
+        description="direction in which it rises, from the x axis towards y",
+        json_schema_extra={"unit": "rad"},
+    )
 
     def make(self) -> InclinedPlane:
         """The surface."""
