@@ -35,7 +35,7 @@ def bowl_circle(duration: float) -> Problem:
     return circle(BOWL, 18.0, 2, (0.74, 2.84), duration)
 
 
-def test_creep_follows_its_law():
+def test_creep_follows_its_law() -> None:
     """slip = J' q' / b within 5 % over two decades of b, on plane and bowl, at two steps for each b.
 
     What else there is: the change of the motion at its own rates, 12.3 1/s at most, against b (>= 105 1/s);
@@ -51,7 +51,7 @@ def test_creep_follows_its_law():
 
 @pytest.mark.parametrize("impratio", [1.0, 100.0])
 @pytest.mark.parametrize("name", ["plane", "1/200", "1/20", "1/5"])
-def test_whole_law_holds_at_any_friction_on_any_bowl(name, impratio):
+def test_whole_law_holds_at_any_friction_on_any_bowl(name, impratio) -> None:
     """With softness and sinking, from b = 105 to 21000 1/s: within 5 %, and within the motion's fastest rate over b.
 
     The first law alone is 24 % off with soft friction and 12 % on the steepest bowl at the smallest b, where the
@@ -75,7 +75,7 @@ def test_whole_law_holds_at_any_friction_on_any_bowl(name, impratio):
         assert max(rows[0].worst) > 0.05
 
 
-def test_creep_does_not_depend_on_the_step():
+def test_creep_does_not_depend_on_the_step() -> None:
     """Only on b: at one time constant, steps of a half and a tenth of it."""
     slips = [
         creep_row(plane_circle(0.5), NativeSettings(step=step, time_constant=0.004, impratio=100.0)).slip
@@ -85,7 +85,7 @@ def test_creep_does_not_depend_on_the_step():
     np.testing.assert_allclose(slips[0], slips[1], rtol=18.0 * 0.002)
 
 
-def test_creep_follows_its_law_at_any_speed_and_radius():
+def test_creep_follows_its_law_at_any_speed_and_radius() -> None:
     """Circles of the plane and of steep bowls, at 2 to 8 m/s: J' q' from 4 to 18 m/s^2, radii from 1.3 to 7 m."""
     gentle = [
         circle(Plane(), 8.0, 1, None, 0.3),
@@ -104,7 +104,7 @@ def test_creep_follows_its_law_at_any_speed_and_radius():
         np.testing.assert_allclose(row.slip, row.law, rtol=0.05)
 
 
-def test_one_step_integrators_add_energy_in_proportion_to_the_step():
+def test_one_step_integrators_add_energy_in_proportion_to_the_step() -> None:
     """Exact contacts, so that slip costs nothing: half the step, half the gain, 5 W a millisecond; RK4 of order 4.
 
     The next power of the step is the fastest mode's rate times the step.
@@ -120,7 +120,7 @@ def test_one_step_integrators_add_energy_in_proportion_to_the_step():
     assert np.log2(gain["RK4", 0.004] / gain["RK4", 0.002]) > 3.5
 
 
-def test_settings_have_the_effects_that_they_have():
+def test_settings_have_the_effects_that_they_have() -> None:
     """Trends of the settings on a circle of the plane at 2 ms and a time constant of 5 ms.
 
     - Hard friction brings the slip to its law (impratio 1: 19 % above, 10: 2 %, 100: on it), noslip as well.
@@ -170,7 +170,7 @@ def value(rate: Rate | None) -> float:
     return rate.value
 
 
-def test_exact_contact_has_no_law_and_no_loss():
+def test_exact_contact_has_no_law_and_no_loss() -> None:
     row = ride_row(exact_contact.ENGINE, {}, plane_circle(2.0))
     assert row.law is None
     assert row.slip < 1e-7
@@ -179,7 +179,7 @@ def test_exact_contact_has_no_law_and_no_loss():
     assert row.ridden == 2.0
 
 
-def test_drift_rate_covers_the_truth_as_often_as_it_says():
+def test_drift_rate_covers_the_truth_as_often_as_it_says() -> None:
     """A line with noise and a slow wave: the interval holds the slope in 19 of 20 cases, not in all."""
     rng = np.random.default_rng(3)
     time = np.linspace(0, 100, 1001)

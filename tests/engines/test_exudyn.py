@@ -77,21 +77,21 @@ DURATIONS = [SHORT, pytest.param(LONG, marks=pytest.mark.slow)]
 
 
 @pytest.mark.parametrize("duration", DURATIONS)
-def test_position_error_falls_with_the_square_of_the_step(duration):
+def test_position_error_falls_with_the_square_of_the_step(duration) -> None:
     exact = bowl_reference(duration).q
     coarse, fine = (furthest(bowl_run(duration, step).q, exact) for step in (2e-3, 1e-3))
     assert coarse / fine == pytest.approx(4, rel=next_order(2e-3))
 
 
 @pytest.mark.parametrize("duration", DURATIONS)
-def test_limit_of_small_steps_is_the_reference(duration):
+def test_limit_of_small_steps_is_the_reference(duration) -> None:
     exact = bowl_reference(duration).q
     coarse, fine = bowl_run(duration, 2e-3).q, bowl_run(duration, 1e-3).q
     assert furthest((4 * fine - coarse) / 3, exact) < next_order(2e-3) * furthest(fine, exact) < 1e-5
 
 
 @pytest.mark.parametrize("duration", DURATIONS)
-def test_contact_forces_are_the_multipliers_of_the_reference(duration):
+def test_contact_forces_are_the_multipliers_of_the_reference(duration) -> None:
     exact = bowl_reference(duration).force
     coarse, fine = (relative_force_error(bowl_run(duration, step), exact) for step in (2e-3, 1e-3))
     # Multipliers are of second order like everything else, from the first step on.
@@ -102,7 +102,7 @@ def test_contact_forces_are_the_multipliers_of_the_reference(duration):
 
 
 @pytest.mark.parametrize("duration", DURATIONS)
-def test_constraints_hold(duration):
+def test_constraints_hold(duration) -> None:
     result = bowl_run(duration, 1e-3)
     assert result.gap is not None
     assert result.slip is not None
@@ -113,7 +113,7 @@ def test_constraints_hold(duration):
 
 
 @pytest.mark.parametrize("duration", DURATIONS)
-def test_energy_error_falls_with_the_square_of_the_step(duration):
+def test_energy_error_falls_with_the_square_of_the_step(duration) -> None:
     def drift(step: float) -> float:
         result = bowl_run(duration, step)
         assert result.kinetic_energy is not None
@@ -124,7 +124,7 @@ def test_energy_error_falls_with_the_square_of_the_step(duration):
     assert drift(2e-3) / drift(1e-3) == pytest.approx(4, rel=next_order(2e-3))
 
 
-def test_contact_points_are_those_of_the_reference():
+def test_contact_points_are_those_of_the_reference() -> None:
     from velodrome.reference.contact import observe
 
     task, result = bowl(SHORT), bowl_run(SHORT, 1e-3)
@@ -137,7 +137,7 @@ def test_contact_points_are_those_of_the_reference():
     assert np.abs(result.kinetic_energy / seen.kinetic_energy - 1).max() < next_order(1e-3) ** 2
 
 
-def test_initial_state_comes_back():
+def test_initial_state_comes_back() -> None:
     task = problem(Paraboloid(0.005), 0.3, -0.4, 0.01, yaw=8.0)
     task.q[7:] = 100.0, -50.0  # some turns of the wheels
     result = run(task, 1e-3)
@@ -146,7 +146,7 @@ def test_initial_state_comes_back():
     np.testing.assert_allclose(result.qd[0], task.qd, rtol=0, atol=10 * RATE * np.finfo(float).eps)
 
 
-def test_runs_are_bitwise_identical():
+def test_runs_are_bitwise_identical() -> None:
     first, second = bowl_run(SHORT, 2e-3), run(bowl(SHORT), 2e-3)
     for field in dataclasses.fields(Trajectory):
         if field.name != "cpu_time":
@@ -168,7 +168,7 @@ class Waves:
     parameters = np.array([0.02, 1.0])
 
 
-def test_any_bicycle_on_any_surface():
+def test_any_bicycle_on_any_surface() -> None:
     bicycle = Bicycle(trail=0.06, steer_axis_tilt=0.4, rear_wheel_radius=0.33, front_wheel_mass=2.0, gravity=9.0)
     task = problem(Waves(), 0.2, -0.1, SHORT, bicycle, yaw=2.0)
     exact = simulate(bicycle, task.surface, task.q, task.qd, task.times)
@@ -178,7 +178,7 @@ def test_any_bicycle_on_any_surface():
     assert furthest((4 * fine.q - coarse.q) / 3, exact.q) < next_order(2e-3) * error
 
 
-def test_kernel_rows_are_derivatives():
+def test_kernel_rows_are_derivatives() -> None:
     """Normal row = gradient of the gap; all rows = velocity of the rim's material point in the contact frame."""
     from velodrome.engines.exudyn import kernel
 
@@ -224,7 +224,7 @@ def triad_upright(triad: np.ndarray) -> np.ndarray:
         (np.array([0.0, 0.1, 0.3]), "evenly spaced"),
     ],
 )
-def test_times_off_the_steps_are_refused(times, complaint):
+def test_times_off_the_steps_are_refused(times, complaint) -> None:
     task = dataclasses.replace(bowl(0.1), times=times)
     with pytest.raises(ValueError, match=complaint):
         run(task, 2e-3)
@@ -242,12 +242,12 @@ def test_times_off_the_steps_are_refused(times, complaint):
         ("steps", 1.0),
     ],
 )
-def test_wrong_settings_are_refused(name, value):
+def test_wrong_settings_are_refused(name, value) -> None:
     with pytest.raises(ValidationError, match=name):
         ENGINE.settings.model_validate({name: value})
 
 
-def test_a_fall_ends_the_run_and_prints_nothing(capfd):
+def test_a_fall_ends_the_run_and_prints_nothing(capfd) -> None:
     bicycle = Bicycle()
     q, qd = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.3, 0.0, (1.0, 0.0, 2.0))
     task = Problem(bicycle, Plane(), q, qd, np.arange(1001) / 100)
@@ -262,14 +262,14 @@ def test_a_fall_ends_the_run_and_prints_nothing(capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_start_without_contact_is_an_error():
+def test_a_start_without_contact_is_an_error() -> None:
     task = dataclasses.replace(bowl(0.1), surface=Sphere(20.0))
     task.q[0] = 1e3  # beyond the sphere, where there is no ground
     with pytest.raises(EngineError, match="could not start"):
         run(task, 1e-3)
 
 
-def test_progress_is_told_and_may_stop_the_run():
+def test_progress_is_told_and_may_stop_the_run() -> None:
     told: list[float] = []
     ENGINE.simulate(bowl(0.5), ENGINE.settings(), told.append)
     assert told == sorted(told)
@@ -285,7 +285,7 @@ def test_progress_is_told_and_may_stop_the_run():
         ENGINE.simulate(bowl(0.5), ENGINE.settings(), stop)
 
 
-def test_interrupt_gets_out():
+def test_interrupt_gets_out() -> None:
     # A background job inherits SIGINT ignored: this is about what happens where it is not.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
@@ -299,7 +299,7 @@ def test_interrupt_gets_out():
         signal.signal(signal.SIGINT, before)
 
 
-def test_library_is_imported_only_to_run():
+def test_library_is_imported_only_to_run() -> None:
     load = "import sys; from velodrome.engines.engine import load_engine; load_engine('exudyn').version"
     check = f"{load}; assert 'exudyn' not in sys.modules"
     subprocess.run([sys.executable, "-c", check], check=True)

@@ -57,7 +57,7 @@ def falling_point(write_period: float | None = None) -> np.ndarray:
     return np.array(system.GetSensorStoredData(sensor))
 
 
-def test_every_sample_of_a_long_ride_is_where_its_time_says():
+def test_every_sample_of_a_long_ride_is_where_its_time_says() -> None:
     found, asked = falling_point(), STEP * np.arange(STEPS + 1)
     assert len(found) == STEPS + 1
     # A product of the step and a number, each rounded once.
@@ -66,7 +66,7 @@ def test_every_sample_of_a_long_ride_is_where_its_time_says():
     np.testing.assert_allclose(found[:, 1], asked, rtol=STEPS * ROUND_OFF, atol=0)
 
 
-def test_the_library_s_own_sensors_leave_out_a_sample():
+def test_the_library_s_own_sensors_leave_out_a_sample() -> None:
     """As long as this passes, `velodrome.engines.exudyn.solve` has to tell the samples."""
     assert len(falling_point(STEP)) == STEPS, f"Exudyn {exu.__version__} has mended this"
 
@@ -79,7 +79,7 @@ def upright(speed: float, duration: float, rate: float, surface: Surface | None 
 
 
 @pytest.mark.slow
-def test_a_hundred_seconds_at_every_step():
+def test_a_hundred_seconds_at_every_step() -> None:
     speed = 5.0
     task = upright(speed, 100.0, 1000.0)
     found = ride_engine(ENGINE, task, ENGINE.settings(), lambda _time: None)
@@ -144,7 +144,7 @@ def figures(engine: ExudynEngine, name: str, **settings: float) -> tuple[np.ndar
 
 
 @pytest.mark.parametrize(("engine", "name"), RIDES)
-def test_what_is_shown_is_the_step_s_error_and_not_the_tolerance_s(engine, name):
+def test_what_is_shown_is_the_step_s_error_and_not_the_tolerance_s(engine, name) -> None:
     """The default leaves of Newton's method less than a hundredth of the step's own error, or next to nothing."""
     problem = task(name)
     exact = simulate(problem.bicycle, problem.surface, problem.q, problem.qd, problem.times)
@@ -162,7 +162,7 @@ def test_what_is_shown_is_the_step_s_error_and_not_the_tolerance_s(engine, name)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_residual_is_told_and_within_the_tolerance(engine):
+def test_residual_is_told_and_within_the_tolerance(engine) -> None:
     """Newton's method starts from the weights, with next to nothing of inertia on an undisturbed ride."""
     for settings in ({}, {"newton_relative_tolerance": 1e-7}):
         result = run(engine, "straight", **settings)
@@ -174,7 +174,7 @@ def test_residual_is_told_and_within_the_tolerance(engine):
     assert result.largest_residual > 100 * (run(engine, "straight").largest_residual or 1.0)
 
 
-def test_a_wheel_without_contact_has_no_normal():
+def test_a_wheel_without_contact_has_no_normal() -> None:
     """The plane of the library's disc must not turn to a guess."""
     out, where = np.zeros((2, 3)), np.zeros((2, 7))
     where[:, 3] = 1.0

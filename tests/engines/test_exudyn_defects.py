@@ -30,32 +30,32 @@ def disc(solver, step, *rest, **options) -> np.ndarray:
         return SCRIPT.disc_force(solver, step, 0.2, *rest, **options)
 
 
-def test_initial_accelerations_omit_a_term_of_rolling():
+def test_initial_accelerations_omit_a_term_of_rolling() -> None:
     """The first contact force of the library's own disc is wrong by W (W q')_q q', 16 % of it."""
     error = disc(SCRIPT.SOLVERS.GeneralizedAlpha, 4e-3, 0.8)
     assert error[0] == pytest.approx(0.16, abs=0.01), FIXED
 
 
-def test_the_trapezoidal_rule_never_forgets_it():
+def test_the_trapezoidal_rule_never_forgets_it() -> None:
     """At any step the force alternates by the initial error, changed by k h only, about what is constant."""
     for step in (4e-3, 1e-3):
         error = disc(SCRIPT.SOLVERS.TrapezoidalIndex2, step)
         np.testing.assert_allclose(error, error[0], rtol=SPIN * step, err_msg=FIXED)
 
 
-def test_a_spectral_radius_below_one_forgets_it():
+def test_a_spectral_radius_below_one_forgets_it() -> None:
     """Within a tenth of a second, by the radius in every step: 0.8^100 at 1 ms, with growth by the steps' number."""
     error = disc(SCRIPT.SOLVERS.GeneralizedAlpha, 1e-3, 0.8)
     assert error[100:].max() < error[0] * 0.8**100 * 100**2 + (SPIN * 1e-3) ** 2
 
 
-def test_imported_accelerations_cure_it():
+def test_imported_accelerations_cure_it() -> None:
     """Newton's method leaves 1e-10 of forces that one step's square makes of positions; the method (k h)^2."""
     error = disc(SCRIPT.SOLVERS.TrapezoidalIndex2, 1e-3, right_start=True)
     assert error[1:].max() < (SPIN * 1e-3) ** 2
 
 
-def test_first_steps_of_generalized_alpha_are_of_first_order():
+def test_first_steps_of_generalized_alpha_are_of_first_order() -> None:
     """The library starts from what it was given: a pendulum's reaction is off by O(h), later by O(h^2)."""
     with no_progress():
         coarse, fine = (SCRIPT.pendulum_force(step, 1.0, 0.8) for step in (2e-3, 1e-3))
@@ -64,7 +64,7 @@ def test_first_steps_of_generalized_alpha_are_of_first_order():
     assert coarse[-2:].max() / fine[-2:].max() == pytest.approx(4, rel=3 * fastest * 2e-3)
 
 
-def test_the_library_s_discs_give_wrong_forces_on_the_bicycle_at_any_step():
+def test_the_library_s_discs_give_wrong_forces_on_the_bicycle_at_any_step() -> None:
     q, qd = consistent_state(Bicycle(), Plane(), (0.986, 2.148), 0.7, 2.83, (0.1, 0.0, 18.0))
     problem = Problem(Bicycle(), Plane(), q, qd, np.arange(11) / 10)
     exact = simulate(problem.bicycle, problem.surface, q, qd, problem.times).force

@@ -39,7 +39,7 @@ def drift(ride: Any) -> float:
 
 
 @pytest.mark.parametrize("surface", [EXAMPLE.BOWL, Plane(), Sphere(2.6)])
-def test_steady_precession_is_kept_with_order_two(surface):
+def test_steady_precession_is_kept_with_order_two(surface) -> None:
     """Centre and contact force of the example's equations, which ask for the circle only, not for the surface."""
     with no_progress():
         rides = [EXAMPLE.ride(MOTION, step, 1.0, surface=surface) for step in (STEP, STEP / 2)]
@@ -51,7 +51,7 @@ def test_steady_precession_is_kept_with_order_two(surface):
     assert fine[1] < MOTION.spin * STEP / 2
 
 
-def test_a_system_solved_again_does_the_same():
+def test_a_system_solved_again_does_the_same() -> None:
     """What the joint remembers of a run is a matter of speed only."""
     container: Any = exu.SystemContainer()
     mbs = container.AddSystem()
@@ -74,12 +74,12 @@ def test_a_system_solved_again_does_the_same():
     np.testing.assert_array_equal(*seen)
 
 
-def test_energy_is_conserved_with_order_two(kicked):
+def test_energy_is_conserved_with_order_two(kicked) -> None:
     assert drift(kicked[0]) / drift(kicked[1]) == pytest.approx(4, rel=NEXT_ORDER)
     assert drift(kicked[1]) < (MOTION.spin * STEP / 2) ** 2
 
 
-def test_sensors_see_the_edge_on_the_surface(kicked):
+def test_sensors_see_the_edge_on_the_surface(kicked) -> None:
     for ride in kicked:
         ground = evaluate(EXAMPLE.BOWL, ride.point[:, 0], ride.point[:, 1])[:, 0]
         # Differences of coordinates of two metres: a few tens of their round-off.
@@ -90,7 +90,7 @@ def test_sensors_see_the_edge_on_the_surface(kicked):
         assert np.abs(ride.slip).max() < 1e-10 * EXAMPLE.INERTIA.Mass() * EXAMPLE.GRAVITY
 
 
-def test_force_sensor_gives_what_moves_the_disc(kicked):
+def test_force_sensor_gives_what_moves_the_disc(kicked) -> None:
     """m c'' = F - m g: second differences of the centre, with an error of the interval squared."""
     ride = kicked[1]
     interval = ride.time[1] - ride.time[0]
@@ -155,7 +155,7 @@ def rolled(axle: int, offset: float, joints: int) -> np.ndarray:
     return np.stack([mbs.GetSensorStoredData(sensor)[-1, 1:] for sensor in sensors])
 
 
-def test_body_axes_and_sharing_do_not_matter():
+def test_body_axes_and_sharing_do_not_matter() -> None:
     plain = rolled(axle=1, offset=0.0, joints=1)
     assert np.linalg.norm(plain[0] - [0, 0, plain[0, 2]]) > 0.4  # it has rolled
     np.testing.assert_allclose(plain[1] - plain[0], [0, 1, 0], atol=1e-10)  # what Newton's method leaves
@@ -181,7 +181,7 @@ def body(mbs: Any, node: Any = exu.NodeType.RotationEulerParameters) -> Any:
         ({"newmarkRatio": 0.0}, "about 0.5"),
     ],
 )
-def test_wrong_arguments_are_refused(change, complaint):
+def test_wrong_arguments_are_refused(change, complaint) -> None:
     container: Any = exu.SystemContainer()
     mbs = container.AddSystem()
     arguments = {"bodyNumbers": [body(mbs), body(mbs)], "discRadius": 0.2, "surface": Plane()} | change
@@ -189,7 +189,7 @@ def test_wrong_arguments_are_refused(change, complaint):
         CreateRollingJointOnSurface(mbs, **arguments)
 
 
-def test_bodies_that_are_no_wheels_are_refused():
+def test_bodies_that_are_no_wheels_are_refused() -> None:
     container: Any = exu.SystemContainer()
     mbs = container.AddSystem()
     for other, complaint in (
@@ -201,7 +201,7 @@ def test_bodies_that_are_no_wheels_are_refused():
             CreateRollingJointOnSurface(mbs, bodyNumbers=[other], discRadius=0.2, surface=Plane())
 
 
-def test_wrong_sensors_are_refused():
+def test_wrong_sensors_are_refused() -> None:
     container: Any = exu.SystemContainer()
     mbs = container.AddSystem()
     joint = CreateRollingJointOnSurface(mbs, bodyNumbers=[body(mbs)], discRadius=0.2, surface=Paraboloid(0.1))

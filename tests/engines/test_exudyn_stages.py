@@ -67,7 +67,7 @@ def model_of(task: Problem) -> Model:
         return build_model(task, ENGINE.settings(), constrain)
 
 
-def test_poses_and_velocities_at_the_start():
+def test_poses_and_velocities_at_the_start() -> None:
     task = disturbed(0.01, 0.01)
     model = model_of(task)
     with no_progress():
@@ -81,7 +81,7 @@ def test_poses_and_velocities_at_the_start():
     np.testing.assert_allclose(motion.spin[0], angular_velocities(task.bicycle, q, qd)[0], **limit)
 
 
-def test_accelerations_at_the_start():
+def test_accelerations_at_the_start() -> None:
     """Of the four mass centres, and the angular ones, 2 vec(theta'' conj(theta)) of the Euler parameters."""
     task = disturbed(1.0)
     model, solver = model_of(task), exu.MainSolverImplicitSecondOrder()
@@ -111,7 +111,7 @@ def _angular_acceleration(theta: np.ndarray, second: np.ndarray) -> np.ndarray:
     return 2 * (theta[0] * second[1:] - second[0] * theta[1:] - np.cross(second[1:], theta[1:]))
 
 
-def test_contact_forces_at_the_start():
+def test_contact_forces_at_the_start() -> None:
     task = disturbed(1.0)
     multipliers = dynamics(task.bicycle, task.surface, task.q, task.qd).force
     force = run(disturbed(0.01, 0.01), 1e-3).contact_force
@@ -120,7 +120,7 @@ def test_contact_forces_at_the_start():
     assert np.linalg.norm(force[0] - multipliers, axis=1).max() < 1e-6 * np.linalg.norm(multipliers, axis=1).max()
 
 
-def test_the_first_tenth_of_a_second():
+def test_the_first_tenth_of_a_second() -> None:
     """Every step of it: positions to the method's (k h)^2 / 12 of the way, forces to (k h)^2 of themselves."""
     step = 1e-3
     result, there = run(disturbed(0.1, step), step), exact(0.1, step)
@@ -131,7 +131,7 @@ def test_the_first_tenth_of_a_second():
     assert (apart / np.linalg.norm(there.force, axis=2)).max() < (RATE * step) ** 2
 
 
-def test_engine_s_own_start_is_of_first_order():
+def test_engine_s_own_start_is_of_first_order() -> None:
     """What the corrected start is for: without it, forces are wrong by k h in the first steps."""
     step = 1e-3
     there = exact(0.1, step).force
@@ -145,14 +145,14 @@ def test_engine_s_own_start_is_of_first_order():
 
 
 @pytest.mark.slow
-def test_twenty_seconds():
+def test_twenty_seconds() -> None:
     result, there = run(disturbed(20.0), 1e-3), exact(20.0)
     way = 20 * float(np.linalg.norm(there.qd[:, :3], axis=1).max())
     assert furthest(result.q, there.q) < (RATE * 1e-3) ** 2 / 12 * way
 
 
 @pytest.mark.slow
-def test_limit_of_ten_seconds():
+def test_limit_of_ten_seconds() -> None:
     """Observed order over three halvings, and Richardson's limit."""
     there = exact(10.0).q
     runs = [run(disturbed(10.0), step, newton_relative_tolerance=1e-12).q for step in (4e-3, 2e-3, 1e-3, 5e-4)]
@@ -167,7 +167,7 @@ def test_limit_of_ten_seconds():
 
 
 @pytest.mark.slow
-def test_drift_of_two_minutes():
+def test_drift_of_two_minutes() -> None:
     """Q2 undisturbed: nothing drifts but the phase; the energy as generalized alpha dissipates, with h^3."""
     q, qd = q2().state()
     task = Problem(BICYCLE, BOWL, q, qd, np.arange(1201) / 10)

@@ -55,13 +55,13 @@ def force_error(result: Trajectory, force: np.ndarray) -> np.ndarray:
 # Errors C h^2 (1 + k h + ...) fall by 4 (1 +- k h) when the step h is halved.
 @pytest.mark.parametrize(("engine", "surface"), [(PLANE_NORMAL, BOWL), (PLANE_NORMAL, LEVEL), (BUILTIN, LEVEL)])
 @pytest.mark.parametrize("solver", ["generalized-alpha", "trapezoidal-index2"])
-def test_discs_converge_to_the_reference(engine, surface, solver):
+def test_discs_converge_to_the_reference(engine, surface, solver) -> None:
     there = exact(surface).q
     coarse, fine = (furthest(run(engine, surface, step, solver=solver).q, there) for step in STEPS[1:3])
     assert coarse / fine == pytest.approx(4, rel=RATE * 2e-3)
 
 
-def test_constraints_converge_with_the_trapezoidal_rule():
+def test_constraints_converge_with_the_trapezoidal_rule() -> None:
     there = exact(BOWL)
     runs = [run(ENGINE, BOWL, step, solver="trapezoidal-index2") for step in STEPS[1:3]]
     coarse, fine = (furthest(result.q, there.q) for result in runs)
@@ -72,14 +72,14 @@ def test_constraints_converge_with_the_trapezoidal_rule():
 
 
 @pytest.mark.parametrize("policy", ["iteration", "reuse"])
-def test_jacobian_policies_agree(policy):
+def test_jacobian_policies_agree(policy) -> None:
     """All solve the same equations: they differ by what Newton's method leaves of them."""
     usual = run(ENGINE, BOWL, 2e-3)
     other = run(ENGINE, BOWL, 2e-3, jacobian=policy)
     assert furthest(other.q, usual.q) < 1e-11 * usual.steps * 0.094 * 9.81 * 2
 
 
-def test_on_the_plane_a_following_normal_changes_nothing():
+def test_on_the_plane_a_following_normal_changes_nothing() -> None:
     following, fixed = (run(engine, LEVEL, 2e-3) for engine in (PLANE_NORMAL, BUILTIN))
     np.testing.assert_array_equal(following.q, fixed.q)
     assert following.contact_force is not None
@@ -87,7 +87,7 @@ def test_on_the_plane_a_following_normal_changes_nothing():
     np.testing.assert_array_equal(following.contact_force, fixed.contact_force)
 
 
-def test_discs_drift_off_the_ground_and_constraints_do_not():
+def test_discs_drift_off_the_ground_and_constraints_do_not() -> None:
     free = [run(PLANE_NORMAL, BOWL, step).gap for step in STEPS[1:3]]
     held = run(ENGINE, BOWL, 2e-3).gap
     assert held is not None
@@ -99,7 +99,7 @@ def test_discs_drift_off_the_ground_and_constraints_do_not():
 
 
 @pytest.mark.parametrize(("duration", "steps"), [(1.0, STEPS[:3]), pytest.param(10.0, STEPS, marks=pytest.mark.slow)])
-def test_limits_on_the_plane_are_the_same(duration, steps):
+def test_limits_on_the_plane_are_the_same(duration, steps) -> None:
     """At strong lean, the joint of this suite and the library's own."""
     there = exact(LEVEL, duration).q
     limits = []
@@ -113,23 +113,23 @@ def test_limits_on_the_plane_are_the_same(duration, steps):
 
 
 @pytest.mark.parametrize(("engine", "surface"), [(PLANE_NORMAL, BOWL), (BUILTIN, LEVEL)])
-def test_runs_are_bitwise_identical(engine, surface):
+def test_runs_are_bitwise_identical(engine, surface) -> None:
     problem, settings = task(surface), engine.settings.model_validate({"step": 4e-3})
     again = engine.simulate(problem, settings, lambda _time: None)
     np.testing.assert_array_equal(again.q, run(engine, surface, 4e-3).q)
 
 
-def test_builtin_refuses_a_bowl():
+def test_builtin_refuses_a_bowl() -> None:
     with pytest.raises(ValueError, match=r"^it rolls on the level plane only[^\n]*$"):
         BUILTIN.check(task(BOWL), BUILTIN.settings())
     BUILTIN.check(task(LEVEL), BUILTIN.settings())
 
 
-def test_discs_have_no_corrected_start():
+def test_discs_have_no_corrected_start() -> None:
     with pytest.raises(ValidationError, match="start"):
         PLANE_NORMAL.settings.model_validate({"start": "second-order"})
 
 
 @pytest.mark.parametrize("engine", [ENGINE, PLANE_NORMAL, BUILTIN])
-def test_settings_are_explained(engine):
+def test_settings_are_explained(engine) -> None:
     assert all(field.description for field in engine.settings.model_fields.values())

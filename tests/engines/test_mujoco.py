@@ -103,7 +103,7 @@ def rate_of_velocity(q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarr
 # ---------------------------------------------------------------------------------------------- the tree
 
 
-def test_state_round_trip():
+def test_state_round_trip() -> None:
     rng = np.random.default_rng(1)
     for _ in range(50):
         q, qd = random_state(rng)
@@ -114,7 +114,7 @@ def test_state_round_trip():
         np.testing.assert_allclose(np.concatenate(again).ravel(), [*q, *qd], rtol=0, atol=1e-13)
 
 
-def test_mass_matrix_and_bias_are_those_of_the_reference(q2):
+def test_mass_matrix_and_bias_are_those_of_the_reference(q2) -> None:
     """M = T^T M' T and h = T^T (h' + M' T' q') with qvel = T q' ."""
     rng = np.random.default_rng(2)
     for _ in range(20):
@@ -135,7 +135,7 @@ def test_mass_matrix_and_bias_are_those_of_the_reference(q2):
         np.testing.assert_allclose(force, bias, rtol=0, atol=1e-12 * np.abs(bias).max())
 
 
-def test_poses_and_energies_are_those_of_the_reference(q2_disturbed):
+def test_poses_and_energies_are_those_of_the_reference(q2_disturbed) -> None:
     trajectory = run(q2_disturbed)
     bicycle = q2_disturbed.bicycle
     seen = observe(bicycle, BOWL, trajectory.q, trajectory.qd)
@@ -148,13 +148,13 @@ def test_poses_and_energies_are_those_of_the_reference(q2_disturbed):
     np.testing.assert_allclose(np.abs(same), 1, rtol=0, atol=1e-12)
 
 
-def test_start_is_exact(q2_disturbed):
+def test_start_is_exact(q2_disturbed) -> None:
     trajectory = run(replace(q2_disturbed, times=every(0.01, 0.01)))
     np.testing.assert_allclose(trajectory.q[0], q2_disturbed.q, rtol=0, atol=1e-14)
     np.testing.assert_allclose(trajectory.qd[0], q2_disturbed.qd, rtol=0, atol=1e-13)
 
 
-def test_turns_at_the_start_are_kept(q2):
+def test_turns_at_the_start_are_kept(q2) -> None:
     q = q2.q.copy()
     q[3] += 4 * np.pi
     trajectory = run(replace(q2, q=q, surface=BOWL, times=every(0.01, 0.1)))
@@ -166,7 +166,7 @@ def test_turns_at_the_start_are_kept(q2):
 
 
 @pytest.mark.parametrize("surface", [BOWL, Paraboloid(0.2), Ripples(0.05)])
-def test_contact_is_the_closest_approach_on_any_surface(surface):
+def test_contact_is_the_closest_approach_on_any_surface(surface) -> None:
     """MuJoCo's distance, normal and point on the moving planes are those of the true surface."""
     bicycle = Bicycle()
     for x, y, lean, steer in ((1.0, 2.0, 0.4, 0.3), (-2.0, 0.5, -0.6, -0.4), (0.3, -1.5, 0.1, 1.0)):
@@ -186,12 +186,12 @@ def test_contact_is_the_closest_approach_on_any_surface(surface):
             np.testing.assert_allclose(rig.data.contact.pos[i], middle, rtol=0, atol=1e-4)
 
 
-def test_plane_and_flat_bowl_are_the_same(circle):
+def test_plane_and_flat_bowl_are_the_same(circle) -> None:
     flat = run(replace(circle, surface=Paraboloid(0.0)))
     np.testing.assert_array_equal(flat.q, run(circle).q)
 
 
-def test_moving_planes_on_flat_ground_change_nothing(circle):
+def test_moving_planes_on_flat_ground_change_nothing(circle) -> None:
     """A bowl with a radius of curvature of 5e9 m takes the moving planes, and rides like the plane."""
     # At 2.5 m its slope is 5e-10, which makes 2.5e-9 m in 1 s; ten times that for angles and the wheels.
     bowl = run(replace(circle, surface=Paraboloid(1e-10), times=every(0.01, 1.0)))
@@ -210,7 +210,7 @@ def creep(problem: Problem, trajectory: Trajectory) -> tuple[np.ndarray, float]:
 
 @pytest.mark.parametrize("step", [0.002, 0.001])
 @pytest.mark.parametrize("start", ["circle", "q2_disturbed"])
-def test_wheels_creep_by_the_missing_acceleration(start, step, request):
+def test_wheels_creep_by_the_missing_acceleration(start, step, request) -> None:
     """Slip = J' q' / b, but for what is of higher order.
 
     - The contact lies half the depth inside the wheel: spin * depth / 2.
@@ -256,7 +256,7 @@ def total_energy(trajectory: Trajectory) -> np.ndarray:
 
 
 @pytest.mark.parametrize("integrator", ["implicitfast", "RK4"])
-def test_energy_is_lost_to_creep_and_gained_by_the_integrator(circle, integrator):
+def test_energy_is_lost_to_creep_and_gained_by_the_integrator(circle, integrator) -> None:
     """On the plane dE/dt = friction power + what a first-order integrator adds (RK4: nothing)."""
     trajectory = run(circle, integrator=integrator)
     settled = trajectory.time >= 0.1
@@ -269,7 +269,7 @@ def test_energy_is_lost_to_creep_and_gained_by_the_integrator(circle, integrator
     assert work < 0
 
 
-def test_errors_are_of_first_order_with_contacts_of_two_steps(q2):
+def test_errors_are_of_first_order_with_contacts_of_two_steps(q2) -> None:
     """Slip, energy loss and radius drift halve with the step."""
     steps = (0.002, 0.001, 0.0005)
     radius = np.hypot(q2.q[0], q2.q[1])
@@ -287,7 +287,7 @@ def test_errors_are_of_first_order_with_contacts_of_two_steps(q2):
     assert np.all(second < 2 * (SPIN + FASTEST_MODE) * steps[2])
 
 
-def test_disturbed_q2_stays_up_for_twenty_seconds(q2_disturbed):
+def test_disturbed_q2_stays_up_for_twenty_seconds(q2_disturbed) -> None:
     trajectory = run(replace(q2_disturbed, times=every(0.01, 20.0)))
     assert trajectory.ended is None
     assert trajectory.steps == 10_000
@@ -301,7 +301,7 @@ def test_disturbed_q2_stays_up_for_twenty_seconds(q2_disturbed):
     assert np.abs(ratio - 1).max() < 0.022 + 0.022 + FASTEST_MODE / 526
 
 
-def test_contact_forces_approach_the_multipliers(circle):
+def test_contact_forces_approach_the_multipliers(circle) -> None:
     """Friction and normal forces on the wheels, inertial axes: the reference's, to first order in the step."""
     difference = []
     for step in (0.002, 0.001):
@@ -322,7 +322,7 @@ def test_contact_forces_approach_the_multipliers(circle):
 # --------------------------------------------------------------------------------------- as an engine
 
 
-def test_repeats_bitwise_and_does_not_depend_on_output(q2_disturbed, circle):
+def test_repeats_bitwise_and_does_not_depend_on_output(q2_disturbed, circle) -> None:
     for problem in (q2_disturbed, circle):
         often, again = (run(replace(problem, times=every(0.002, 1.0))) for _ in range(2))
         seldom = run(replace(problem, times=every(0.1, 1.0)))
@@ -332,12 +332,12 @@ def test_repeats_bitwise_and_does_not_depend_on_output(q2_disturbed, circle):
             np.testing.assert_array_equal(getattr(often, name)[::50], getattr(seldom, name))
 
 
-def test_euler_is_implicitfast_without_damping(circle):
+def test_euler_is_implicitfast_without_damping(circle) -> None:
     # No force depends on velocity, so both solve the same; 1000 steps' round-off of coordinates of size 10.
     np.testing.assert_allclose(run(circle, integrator="Euler").q, run(circle).q, rtol=0, atol=1e-12)
 
 
-def test_times_between_steps_are_refused(q2):
+def test_times_between_steps_are_refused(q2) -> None:
     with pytest.raises(ValueError, match=r"step is 0\.003; it must divide the output interval of 0\.01 s, as 0\.0025"):
         run(q2, step=0.003)
     with pytest.raises(ValueError, match=r"as 0\.01 would"):
@@ -348,12 +348,12 @@ def test_times_between_steps_are_refused(q2):
     "settings",
     [{"step": 0.0}, {"integrator": "rk4"}, {"time_constant": 0.003}, {"impratio": -1.0}, {"noslip": 3}, {"cone": "x"}],
 )
-def test_settings_are_checked(settings):
+def test_settings_are_checked(settings) -> None:
     with pytest.raises(ValidationError):
         ENGINE.settings(**settings)
 
 
-def test_fall_ends_with_a_reason_whatever_the_output(q2):
+def test_fall_ends_with_a_reason_whatever_the_output(q2) -> None:
     q, qd = consistent_state(Bicycle(), Plane(), (0.1, 0.2), 0.05, 0.0, (0.0, 0.0, 3.0))
     problem = Problem(Bicycle(), Plane(), q, qd, every(0.01, 4.0))
     often, seldom = run(problem), run(replace(problem, times=every(0.05, 4.0)))
@@ -366,7 +366,7 @@ def test_fall_ends_with_a_reason_whatever_the_output(q2):
         assert np.all(np.isfinite(trajectory.q))
 
 
-def test_instability_ends_with_a_reason_and_no_litter(q2, tmp_path, monkeypatch):
+def test_instability_ends_with_a_reason_and_no_litter(q2, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     trajectory = run(replace(q2, qd=q2.qd * 1e11))
     assert trajectory.ended == "MuJoCo's state became infinite or huge at 0.002 s"
@@ -375,14 +375,14 @@ def test_instability_ends_with_a_reason_and_no_litter(q2, tmp_path, monkeypatch)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_start_without_contact_is_refused(q2):
+def test_start_without_contact_is_refused(q2) -> None:
     q = q2.q.copy()
     q[4] = np.pi / 2  # the rear wheel lies flat
     with pytest.raises(EngineError, match="no contact point"):
         run(replace(q2, q=q, surface=Plane()))
 
 
-def test_progress_and_interrupt(q2):
+def test_progress_and_interrupt(q2) -> None:
     seen: list[float] = []
     ENGINE.simulate(replace(q2, times=every(0.5, 2.0)), ENGINE.settings(), seen.append)
     assert np.all(np.diff(seen) >= 0.05 - 1e-12)
@@ -396,14 +396,14 @@ def test_progress_and_interrupt(q2):
     assert mujoco.get_mju_user_warning() is None
 
 
-def test_listing_does_not_load_mujoco():
+def test_listing_does_not_load_mujoco() -> None:
     code = "from velodrome.engines.mujoco.native import ENGINE; ENGINE.version; "
     code += "import sys; sys.exit('mujoco' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 @pytest.mark.slow
-def test_small_steps_approach_the_reference():
+def test_small_steps_approach_the_reference() -> None:
     """On the plane the error at 5 s is of first order down to 0.05 ms."""
     problem = Problem(Bicycle(), Plane(), *circular_start(Plane()), every(0.1, 5.0))
     # A circular motion of the reference is known in closed form: D goes around the axis.

@@ -28,7 +28,7 @@ def disc(xml: str = disc_mjcf(0.002)) -> tuple[mujoco.MjModel, mujoco.MjData]:
     return model, data
 
 
-def test_what_was_there_is_restored_however_the_block_ends():
+def test_what_was_there_is_restored_however_the_block_ends() -> None:
     model, data = disc()
     before = collision_slot().value
     for end in (None, ValueError, KeyboardInterrupt):
@@ -44,7 +44,7 @@ def test_what_was_there_is_restored_however_the_block_ends():
         assert mujoco.get_mjcb_control() is None
 
 
-def test_two_at_once_are_refused_and_the_first_goes_on():
+def test_two_at_once_are_refused_and_the_first_goes_on() -> None:
     model, data = disc()
     other = disc()
     with knife_edges(model, data, Plane(), TOUCHING):
@@ -62,7 +62,7 @@ def test_two_at_once_are_refused_and_the_first_goes_on():
         mujoco.set_mjcb_control(None)
 
 
-def test_other_models_and_states_keep_their_own_contacts():
+def test_other_models_and_states_keep_their_own_contacts() -> None:
     model, data = disc()
     for other_model, other in (disc(), (model, disc()[1])):
         other.qpos[2] -= 1e-3
@@ -75,7 +75,7 @@ def test_other_models_and_states_keep_their_own_contacts():
         np.testing.assert_allclose(again, expected, rtol=1e-12, atol=1e-9)
 
 
-def test_other_wheels_of_the_model_keep_their_own_contacts():
+def test_other_wheels_of_the_model_keep_their_own_contacts() -> None:
     """A second, unnamed cylinder lies on the plane: MuJoCo gives it its own contacts."""
     body = '<body pos="5 0 0.0999"><freejoint/><geom type="cylinder" size="0.2 0.1"/></body></worldbody>'
     model, data = disc(disc_mjcf(0.002).replace("</worldbody>", body))
@@ -99,7 +99,7 @@ def test_other_wheels_of_the_model_keep_their_own_contacts():
         (('<pair geom1="ground"', '<pair geom1="another"'), "one contact pair of 'ground' and 'wheel', not 0"),
     ],
 )
-def test_models_that_cannot_work_are_refused(change, message):
+def test_models_that_cannot_work_are_refused(change, message) -> None:
     xml = disc_mjcf(0.002).replace("<worldbody>", '<worldbody><geom name="another" type="plane" size="0 0 1"/>')
     assert change[0] in xml
     model, data = disc(xml.replace(*change))
@@ -108,7 +108,7 @@ def test_models_that_cannot_work_are_refused(change, message):
     assert mujoco.get_mjcb_control() is None
 
 
-def test_wheel_without_contact_is_seen_and_flies():
+def test_wheel_without_contact_is_seen_and_flies() -> None:
     model, data = disc()
     with knife_edges(model, data, Paraboloid(0.1), TOUCHING):
         mujoco.mj_forward(model, data)
@@ -119,13 +119,13 @@ def test_wheel_without_contact_is_seen_and_flies():
         assert not standing()
 
 
-def test_callbacks_that_are_not_called_are_no_ride():
+def test_callbacks_that_are_not_called_are_no_ride() -> None:
     model, data = disc()
     with knife_edges(model, data, Plane(), TOUCHING), pytest.raises(EngineError, match="did not call"):
         standing()
 
 
-def test_wheel_lifts_off():
+def test_wheel_lifts_off() -> None:
     """In the air, but within the contact's margin, a wheel falls freely."""
     model, data = disc()
     data.qpos[2] += 5e-4
@@ -151,7 +151,7 @@ def unknown_layout():
     layout._structure_layout.cache_clear()
 
 
-def test_places_are_those_of_the_views(unknown_layout):
+def test_places_are_those_of_the_views(unknown_layout) -> None:
     found = layout.find_layout()
     assert found.contact_size == mujoco.MjData(disc()[0]).contact.dist.itemsize * 76
 
@@ -160,7 +160,7 @@ def test_places_are_those_of_the_views(unknown_layout):
     ("structure", "field", "message"),
     [("mjData", "nefc", "nefc elsewhere"), ("mjData", "arena", "elsewhere"), ("mjContact", "mu", "elsewhere")],
 )
-def test_fields_that_moved_give_an_error(unknown_layout, monkeypatch, structure, field, message):
+def test_fields_that_moved_give_an_error(unknown_layout, monkeypatch, structure, field, message) -> None:
     """A field of the description is dropped, so the ones behind it are not where it says."""
     declared = structs.STRUCTS[structure]
     fields = tuple(f for f in declared.fields if f.name != field)
@@ -176,13 +176,13 @@ def test_fields_that_moved_give_an_error(unknown_layout, monkeypatch, structure,
     assert mujoco.get_mjcb_control() is None
 
 
-def test_another_function_gives_an_error(unknown_layout, monkeypatch):
+def test_another_function_gives_an_error(unknown_layout, monkeypatch) -> None:
     monkeypatch.setitem(layout._CALLED, "mj_jac", "const mjModel * | int")
     with pytest.raises(EngineError, match="another function mj_jac"):
         layout.find_layout()
 
 
-def test_listing_the_ladder_does_not_load_mujoco():
+def test_listing_the_ladder_does_not_load_mujoco() -> None:
     code = (
         "from velodrome.engines.mujoco import default, native, exact_contact, multipliers as m; m.ENGINE.version; "
         "import sys; "

@@ -70,14 +70,14 @@ def assert_right(name: str, duration: float, impratio: float) -> None:
 
 
 @pytest.mark.parametrize("impratio", [1.0, 10.0, 100.0])
-def test_straight_ride_is_right_at_any_impratio(impratio):
+def test_straight_ride_is_right_at_any_impratio(impratio) -> None:
     assert_right("1", 1.0, impratio)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("impratio", [1.0, 10.0, 100.0])
 @pytest.mark.parametrize("name", STRAIGHT)
-def test_straight_rides_are_right_at_any_impratio_for_ten_seconds(name, impratio):
+def test_straight_rides_are_right_at_any_impratio_for_ten_seconds(name, impratio) -> None:
     assert_right(name, 10.0, impratio)
 
 
@@ -97,7 +97,7 @@ def independent_residual(model: mujoco.MjModel, data: mujoco.MjData) -> float:
 
 
 @pytest.mark.parametrize("iterations", [1, 2, 4, 100])
-def test_residual_is_the_gradient_of_the_solver_s_cost(iterations):
+def test_residual_is_the_gradient_of_the_solver_s_cost(iterations) -> None:
     """A wheel that slides takes the solver some hundred iterations; stopped before, it is where it happens to be."""
     settings = ExactContactSettings(friction=0.5)
     rig = edges.build_contacts(circle(1.0), settings)
@@ -114,7 +114,7 @@ def test_residual_is_the_gradient_of_the_solver_s_cost(iterations):
 
 
 @pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast", "RK4"])
-def test_watch_sees_every_stage_and_changes_nothing(integrator):
+def test_watch_sees_every_stage_and_changes_nothing(integrator) -> None:
     problem, settings = circle(1.0), NativeSettings(integrator=integrator)
     model, data = set_start(problem, settings, "plane")
     other = mujoco.MjData(model)
@@ -131,7 +131,7 @@ def test_watch_sees_every_stage_and_changes_nothing(integrator):
     np.testing.assert_array_equal(data.qpos, other.qpos)
 
 
-def test_unconverged_steps_are_counted_as_steps():
+def test_unconverged_steps_are_counted_as_steps() -> None:
     """Whatever the stages: five steps of a solver that may not iterate are five, from where they begin."""
     settings = ExactContactSettings(friction=0.5)
     rig = edges.build_contacts(circle(1.0), settings)
@@ -153,7 +153,7 @@ def limit_iterations(monkeypatch: pytest.MonkeyPatch, kind: type[ContactSettings
     monkeypatch.setattr(kind, "solver_options", property(lambda self: options))
 
 
-def test_ride_ends_where_the_solver_fails(monkeypatch):
+def test_ride_ends_where_the_solver_fails(monkeypatch) -> None:
     """Its first sample is no sample; later on what was right before stays."""
     limit_iterations(monkeypatch, ExactContactSettings, 20)
     with pytest.raises(EngineError, match=r"MuJoCo's contact solver stopped unconverged at 0 s: its forces are off"):
@@ -171,7 +171,7 @@ def test_ride_ends_where_the_solver_fails(monkeypatch):
 
 
 @pytest.mark.parametrize("engine", [native, default])
-def test_own_contacts_are_watched_too(engine, monkeypatch):
+def test_own_contacts_are_watched_too(engine, monkeypatch) -> None:
     kind = NativeSettings if engine is native else DefaultSettings
     right = run(engine, circle(0.2))
     assert right.unconverged_steps == 0
@@ -183,7 +183,7 @@ def test_own_contacts_are_watched_too(engine, monkeypatch):
         run(engine, circle(0.2), friction=0.5)
 
 
-def test_what_nobody_can_tell_is_not_said():
+def test_what_nobody_can_tell_is_not_said() -> None:
     """After the noslip pass the gradient is zero whatever the forces; the multipliers have no solver."""
     hard = run(native, circle(0.1), noslip_iterations=5)
     assert (hard.unconverged_steps, hard.largest_residual) == (None, None)
@@ -196,7 +196,7 @@ def test_what_nobody_can_tell_is_not_said():
 
 @pytest.mark.parametrize("impratio", [1.0, 100.0])
 @pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
-def test_wheels_that_slide_converge(cone, impratio):
+def test_wheels_that_slide_converge(cone, impratio) -> None:
     trajectory = run(exact_contact, circle(0.1), friction=0.5, cone=cone, impratio=impratio)
     assert trajectory.ended is None
     assert trajectory.unconverged_steps == 0
@@ -204,7 +204,7 @@ def test_wheels_that_slide_converge(cone, impratio):
     assert np.linalg.norm(trajectory.slip[-1], axis=1).max() > 0.1
 
 
-def test_solver_s_start_changes_nothing_but_its_cost(monkeypatch):
+def test_solver_s_start_changes_nothing_but_its_cost(monkeypatch) -> None:
     """From the accelerations without contacts, MuJoCo's cold start, the solver finds the same to the step's noise."""
     problem = circle(0.5)
     warm = run(exact_contact, problem)
@@ -256,7 +256,7 @@ def tandem(friction: float, impratio: float) -> tuple[mujoco.MjModel, mujoco.MjD
 
 
 @pytest.mark.parametrize(("friction", "impratio"), [(2.0, 10.0), (1.0, 10.0), (2.0, 100.0), (1.0, 100.0)])
-def test_forces_in_a_stranger_s_model(friction, impratio):
+def test_forces_in_a_stranger_s_model(friction, impratio) -> None:
     """It rolls straight and falls over slowly: forces stay near the weight of 137 N."""
     model, data = tandem(friction, impratio)
     with knife_edges(model, data, Plane(), WHEELS):
@@ -267,7 +267,7 @@ def test_forces_in_a_stranger_s_model(friction, impratio):
         assert standing()
 
 
-def test_stranger_s_block_ends_with_an_error_where_the_solver_failed():
+def test_stranger_s_block_ends_with_an_error_where_the_solver_failed() -> None:
     model, data = tandem(1.0, 10.0)
     model.opt.iterations = 1
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_WARMSTART
@@ -275,7 +275,7 @@ def test_stranger_s_block_ends_with_an_error_where_the_solver_failed():
         mujoco.mj_step(model, data, 10)
 
 
-def test_tolerance_says_what_converged_means():
+def test_tolerance_says_what_converged_means() -> None:
     """Looser tolerances and stiffer rows allow more, up to what ends a ride."""
     limits = [ExactContactSettings(tolerance=tolerance).converged_below for tolerance in (1e-22, 1e-14, 1e-8)]
     assert limits[0] < 1e-5 < limits[1] < limits[2] == WRONG

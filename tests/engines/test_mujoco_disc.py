@@ -7,7 +7,7 @@ from velodrome.engines.mujoco.rolling_disc import ACROSS, AXIAL, GRAVITY, MASS, 
 from velodrome.reference.surface import Paraboloid, Plane
 
 
-def test_steady_state_balances_its_moments():
+def test_steady_state_balances_its_moments() -> None:
     """dL/dt = Omega x L equals the moment of the contact force about the centre."""
     for lean, circle in ((0.1, 2.0), (0.4, 1.0), (1.0, 0.2)):
         _, _, rate = steady_state(lean, circle)
@@ -19,7 +19,7 @@ def test_steady_state_balances_its_moments():
         np.testing.assert_allclose(np.cross(turn, momentum), np.cross(-RADIUS * up, force), rtol=0, atol=1e-14)
 
 
-def test_disc_stays_on_its_circle():
+def test_disc_stays_on_its_circle() -> None:
     """In ten seconds, 2.6 turns; the disc upon MuJoCo's own contact is off by a decimetre."""
     qpos, qvel, rate = steady_state(0.4, 1.0)
     rolled = roll(qpos, qvel, Plane(), 10.0)
@@ -36,7 +36,7 @@ def test_disc_stays_on_its_circle():
     assert np.abs(own.position[:, :2] - exact).max() > 0.05
 
 
-def test_order_on_a_bowl():
+def test_order_on_a_bowl() -> None:
     """Self-convergence of order 4 in a bowl, where no exact solution is at hand; energy is conserved alike."""
     bowl = Paraboloid(0.1)
     qpos, qvel, _ = steady_state(0.4, 1.0)
@@ -53,7 +53,7 @@ def test_order_on_a_bowl():
     assert drifts[2] < drifts[1] < drifts[0]
 
 
-def test_script_tells_both(capsys):
+def test_script_tells_both(capsys) -> None:
     main()
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 3
@@ -61,6 +61,6 @@ def test_script_tells_both(capsys):
 
 
 @pytest.mark.parametrize("lean", [0.2, 0.8])
-def test_energy_is_kept_on_the_plane(lean):
+def test_energy_is_kept_on_the_plane(lean) -> None:
     rolled = roll(*steady_state(lean, 0.6)[:2], Plane(), 2.0)
     assert np.ptp(rolled.energy) < 1e-8 * rolled.energy[0]

@@ -93,7 +93,7 @@ def gap(trajectory: Trajectory) -> float:
 # ----------------------------------------------------------------------------------------------- the tree
 
 
-def test_energies_of_the_tree_at_random_states():
+def test_energies_of_the_tree_at_random_states() -> None:
     rng = np.random.default_rng(5)
     model, data = set_start(upright(), MultiplierSettings(), "nothing")
     for _ in range(50):
@@ -112,14 +112,14 @@ def test_energies_of_the_tree_at_random_states():
 # ----------------------------------------------------------------------------------------- exact multipliers
 
 
-def test_multipliers_follow_the_reference_with_order_four():
+def test_multipliers_follow_the_reference_with_order_four() -> None:
     reference = exact(q2_plus)
     errors = [position_error(run(multipliers, q2_plus(), step=step), reference) for step in (0.005, 0.0025, 0.00125)]
     assert errors[1] < 1e-7
     assert min(np.log2(errors[0] / errors[1]), np.log2(errors[1] / errors[2])) > 3.5
 
 
-def test_multipliers_give_the_reference_s_forces():
+def test_multipliers_give_the_reference_s_forces() -> None:
     """In the first sample they differ by round-off of the two solves, later by the ride's own error."""
     reference, trajectory = exact(q2_plus), run(multipliers, q2_plus())
     assert trajectory.contact_force is not None
@@ -130,7 +130,7 @@ def test_multipliers_give_the_reference_s_forces():
     assert error.max() < 1e-4
 
 
-def test_stabilisation_adds_nothing_on_the_constraints():
+def test_stabilisation_adds_nothing_on_the_constraints() -> None:
     """Whatever its rate: what it acts on are the gaps and slips that the method leaves, of its own order."""
     reference = exact(q2_plus)
     for rate in (0.0, 5.0, 50.0):
@@ -140,21 +140,21 @@ def test_stabilisation_adds_nothing_on_the_constraints():
 # -------------------------------------------------------------------------------------------- exact contact
 
 
-def test_exact_contact_follows_the_reference():
+def test_exact_contact_follows_the_reference() -> None:
     trajectory = run(exact_contact, q2_plus())
     assert trajectory.ended is None
     assert position_error(trajectory, exact(q2_plus)) < 1e-6
     assert slip(trajectory) < 1e-6
 
 
-def test_order_of_exact_contact_is_that_of_the_integrator():
+def test_order_of_exact_contact_is_that_of_the_integrator() -> None:
     """Until it meets its floor: from 10 to 5 ms the error falls by 2^4, as that of the multipliers does."""
     reference = exact(q2_plus)
     errors = [position_error(run(exact_contact, q2_plus(), step=step), reference) for step in (0.01, 0.005)]
     assert np.log2(errors[0] / errors[1]) > 3.5
 
 
-def test_floor_is_the_softness_of_the_rows():
+def test_floor_is_the_softness_of_the_rows() -> None:
     """Slip = R F / b and gap = R F / k, with R = efc_R: what a rigid row would not need.
 
     The slip follows its force's changes at the rate b, and the bicycle those of the slip.
@@ -181,7 +181,7 @@ def test_floor_is_the_softness_of_the_rows():
         assert abs(trajectory.gap[-1, wheel] / -depth - 1) < 0.05 + settling
 
 
-def test_floor_moves_with_the_softness():
+def test_floor_moves_with_the_softness() -> None:
     """Error, slip and gap are linear in it; each power of ten moves the floor by one."""
     reference = exact(q2_plus)
     rides = [run(exact_contact, q2_plus(), softness=softness) for softness in (1.0, 1e-1, 1e-2)]
@@ -191,7 +191,7 @@ def test_floor_moves_with_the_softness():
         np.testing.assert_allclose([values[0] / values[1], values[1] / values[2]], 10, rtol=0.02)
 
 
-def test_floor_moves_with_friction_and_with_the_contacts_rate():
+def test_floor_moves_with_friction_and_with_the_contacts_rate() -> None:
     """Slip = R F / b with R by impratio and b by the time constant; gap = R F / k with k by its square.
 
     On a circle the slip turns with the bicycle at its yaw rate w while it follows at b: R F / sqrt(b^2 + w^2).
@@ -210,7 +210,7 @@ def test_floor_moves_with_friction_and_with_the_contacts_rate():
     np.testing.assert_allclose(depths[2] / depths[0], 4, rtol=1e-3)
 
 
-def test_below_the_floor_no_step_helps():
+def test_below_the_floor_no_step_helps() -> None:
     """With MuJoCo's own softness from 2 to 1 ms nothing changes; a hundredth of it, and the floor is a hundredth."""
     reference = exact(q2_plus, 5.0)
     errors = {
@@ -222,7 +222,7 @@ def test_below_the_floor_no_step_helps():
 
 
 @pytest.mark.parametrize(("softness", "impratio"), [(1.0, 1e6), (1e-3, 300.0), (1e-5, 100.0), (1e-5, 1e3)])
-def test_hard_friction_gives_no_spikes(softness, impratio):
+def test_hard_friction_gives_no_spikes(softness, impratio) -> None:
     """Forces are the reference's but for the softness, 0.07 N of MuJoCo's own, and round-off by the condition."""
     problem = replace(q2_plus(), times=every(0.01, 0.5))
     reference = REFERENCE.simulate(problem, REFERENCE.settings(), lambda t: None)
@@ -232,7 +232,7 @@ def test_hard_friction_gives_no_spikes(softness, impratio):
     assert error < 0.1 * softness + 1e3 * ROUND_OFF * settings.condition + 1e-4
 
 
-def test_exact_contact_repeats_bitwise_and_does_not_depend_on_output():
+def test_exact_contact_repeats_bitwise_and_does_not_depend_on_output() -> None:
     for engine in (exact_contact, multipliers):
         problem = q2_plus(1.0)
         often, again = (run(engine, replace(problem, times=every(0.01, 1.0))) for _ in range(2))
@@ -244,7 +244,7 @@ def test_exact_contact_repeats_bitwise_and_does_not_depend_on_output():
 
 
 @pytest.mark.parametrize("surface", [Plane(), Ripples(0.02)])
-def test_any_surface(surface: Surface):
+def test_any_surface(surface: Surface) -> None:
     """Two seconds of an uncontrolled ride: the same as the reference's to RK4's error and the rows' softness."""
     q, qd = consistent_state(Bicycle(), surface, (1.0, 0.5), 0.1, 0.05, (0.1, 0.0, 15.0), yaw=0.7)
     problem = Problem(Bicycle(), surface, q, qd, every(0.1, 2.0))
@@ -257,7 +257,7 @@ def test_any_surface(surface: Surface):
 
 
 @pytest.mark.parametrize("engine", [multipliers, exact_contact])
-def test_weave_eigenvalue(engine):
+def test_weave_eigenvalue(engine) -> None:
     """Meijaard et al. 2007, Table 2: -0.37797 + 3.87284i at 4.6 m/s (five digits)."""
     found = identify(engine.ENGINE, engine.ENGINE.settings(step=0.005), upright(), levels=2).eigenvalues
     weave = found[np.argmax(found.imag)]
@@ -269,7 +269,7 @@ def test_weave_eigenvalue(engine):
 # ------------------------------------------------------------------------------------ friction and falling
 
 
-def test_exact_contact_slides_where_the_cone_is_left():
+def test_exact_contact_slides_where_the_cone_is_left() -> None:
     """Q2 needs 0.959 on the front wheel, at any time; a thousandth less and it slides, as much more and it rolls."""
     problem, reference = motion("1/200"), exact(motion, "1/200")
     needed = required_friction(reference, problem.surface)
@@ -283,7 +283,7 @@ def test_exact_contact_slides_where_the_cone_is_left():
     assert slip(run(exact_contact, problem, friction=short)) > 1e-3
 
 
-def test_required_friction_counts_pull_as_impossible():
+def test_required_friction_counts_pull_as_impossible() -> None:
     trajectory = exact(motion, "1/200")
     pulled = replace(trajectory, contact_force=-np.asarray(trajectory.contact_force))
     assert np.all(np.isinf(required_friction(pulled, motion("1/200").surface)))
@@ -293,7 +293,7 @@ def test_required_friction_counts_pull_as_impossible():
         required_friction(replace(trajectory, contact_force=None), motion("1/200").surface)
 
 
-def test_default_slides_for_want_of_friction_then_falls_by_creep():
+def test_default_slides_for_want_of_friction_then_falls_by_creep() -> None:
     """On Q2: with a coefficient of 1 in a pyramid the front wheel slides at once; with 2 it still creeps and falls."""
     problem = replace(motion("1/200"), times=every(0.02, 1.0))
     sliding, creeping, careful = (
@@ -313,7 +313,7 @@ def test_default_slides_for_want_of_friction_then_falls_by_creep():
 
 @pytest.mark.parametrize("name", MOTIONS)
 @pytest.mark.parametrize("engine", [multipliers, exact_contact])
-def test_deviation_is_what_the_slip_left_can_grow_to(engine, name):
+def test_deviation_is_what_the_slip_left_can_grow_to(engine, name) -> None:
     """On stable and unstable circles: error <= slip (exp(growth t) - 1) / growth, in two seconds."""
     problem = motion(name)
     trajectory = run(engine, problem)
@@ -329,7 +329,7 @@ def test_deviation_is_what_the_slip_left_can_grow_to(engine, name):
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-def test_every_model_starts(name):
+def test_every_model_starts(name) -> None:
     problem = replace(motion(name), times=every(0.1, 0.2))
     for engine in LADDER:
         trajectory = engine.simulate(problem, engine.settings(), lambda t: None)
@@ -337,7 +337,7 @@ def test_every_model_starts(name):
         np.testing.assert_allclose(trajectory.q[0], problem.q, rtol=0, atol=1e-14)
 
 
-def test_fall():
+def test_fall() -> None:
     """The multipliers end where the rim comes to lie flat; a contact lets go, and the bicycle drops on."""
     q, qd = consistent_state(Bicycle(), Plane(), (0.1, 0.2), 0.05, 0.0, (0.0, 0.0, 3.0))
     for engine in (multipliers, exact_contact):
@@ -352,7 +352,7 @@ def test_fall():
 
 
 @pytest.mark.parametrize("engine", [multipliers, exact_contact])
-def test_start_without_contact_is_refused_and_an_interrupt_leaves_nothing(engine):
+def test_start_without_contact_is_refused_and_an_interrupt_leaves_nothing(engine) -> None:
     problem = q2_plus(1.0)
     q = problem.q.copy()
     q[4] = np.pi / 2  # the rear wheel lies flat
@@ -380,7 +380,7 @@ def test_start_without_contact_is_refused_and_an_interrupt_leaves_nothing(engine
         ({"softness": 1e-9, "impratio": 100.0}, "forces drown in round-off"),
     ],
 )
-def test_settings_are_checked(settings, message):
+def test_settings_are_checked(settings, message) -> None:
     with pytest.raises(ValidationError, match=message):
         ExactContactSettings.model_validate(settings)
 
@@ -389,7 +389,7 @@ def test_settings_are_checked(settings, message):
 
 
 @pytest.mark.slow
-def test_cost_of_a_step():
+def test_cost_of_a_step() -> None:
     """Compiled callbacks: within a small factor of MuJoCo's own step of the same tree, in one run."""
     problem = replace(motion("1/200"), times=every(1.0, 10.0))
     budget = {"mujoco-native": 40e-6, "mujoco-exact-contact": 150e-6, "mujoco-multipliers": 80e-6}
@@ -403,7 +403,7 @@ def test_cost_of_a_step():
 
 
 @pytest.mark.slow
-def test_two_minutes():
+def test_two_minutes() -> None:
     """Q2 for 120 s: the exact models stay on the circle, the native one loses height until it falls."""
     problem = replace(motion("1/200"), times=every(0.02, 120.0))
     rows = {row.engine: row for row in drift_study(problem)}
@@ -421,7 +421,7 @@ def test_two_minutes():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MOTIONS)
 @pytest.mark.parametrize("engine", [native, exact_contact, multipliers])
-def test_verdict_on_stability(engine, name):
+def test_verdict_on_stability(engine, name) -> None:
     """The growth rate that each model has itself, extrapolated to a step of zero, against the linearisation.
 
     At a step of 2 ms the native model has Q2's weave unstable: its verdict is right for small steps only.

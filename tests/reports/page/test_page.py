@@ -166,7 +166,7 @@ def parsed(text: str) -> Parsed:
     return Parsed(text)
 
 
-def test_the_table_has_the_summarys_figures(parsed: Parsed):
+def test_the_table_has_the_summarys_figures(parsed: Parsed) -> None:
     values = measured(RUNS)
     cells = [found for _, found in parsed.all("td")]
     for name in RUNS:
@@ -177,7 +177,7 @@ def test_the_table_has_the_summarys_figures(parsed: Parsed):
     assert {metric for _, _, metric, _ in COLUMNS} == set(COLUMN_MEANINGS)
 
 
-def test_input_is_text_and_never_markup():
+def test_input_is_text_and_never_markup() -> None:
     name = '"><img src=x onerror=alert(1)>'
     reason = "</script><b>{{ 7 * 7 }}</b>"
     runs = {REFERENCE: RUNS[REFERENCE], name: replace(RUNS["one"], engine=name, settings={"a</table>": "<i>&"})}
@@ -198,7 +198,7 @@ def test_input_is_text_and_never_markup():
     assert any(reason in found for _, found in parsed.all("li"))
 
 
-def test_the_page_needs_nothing_from_elsewhere(text: str, parsed: Parsed):
+def test_the_page_needs_nothing_from_elsewhere(text: str, parsed: Parsed) -> None:
     assert set(re.findall(r"https?://[^\s\"'<)]+", text)) == {"http://www.w3.org/2000/svg"}  # a name, not an address
     addresses = [value for _, attrs, _ in parsed.elements for key, value in attrs.items() if key in ("href", "src")]
     assert all(a == "comparison.rrd" or (a or "").startswith(("#", "data:")) for a in addresses)
@@ -209,7 +209,7 @@ def test_the_page_needs_nothing_from_elsewhere(text: str, parsed: Parsed):
     assert "default-src 'none'" in policy
 
 
-def test_the_page_can_be_read_without_eyes(parsed: Parsed):
+def test_the_page_can_be_read_without_eyes(parsed: Parsed) -> None:
     levels = [int(tag[1]) for tag, _, _ in parsed.elements if re.fullmatch("h[1-6]", tag)]
     assert levels[0] == 1
     assert levels.count(1) == 1
@@ -227,7 +227,7 @@ def test_the_page_can_be_read_without_eyes(parsed: Parsed):
     assert next(attrs for tag, attrs, _ in parsed.elements if tag == "html").get("lang") == "en"
 
 
-def test_what_went_wrong_is_said():
+def test_what_went_wrong_is_said() -> None:
     verdicts = [
         {"engine": "one", "quantity": "energy_variation", "value": 2.0, "limit": 1.0, "holds": False},
         {"engine": REFERENCE, "quantity": "energy_variation", "value": 1e-9, "limit": 1.0, "holds": True},
@@ -248,13 +248,13 @@ def test_what_went_wrong_is_said():
     assert any("interrupted" in found for _, found in parsed.all("dd"))
 
 
-def test_a_run_without_a_trajectory_has_a_page():
+def test_a_run_without_a_trajectory_has_a_page() -> None:
     parsed = Parsed(made({}, engines={"broken": {"version": "9", "settings": {"step": 1.0}, "failed": "no luck"}}))
     assert parsed.data() == {"duration": 3.0, "engines": [], "panels": [], "plan": None}
     assert not parsed.all("figure")
 
 
-def test_what_the_scenario_lacks_is_not_shown():
+def test_what_the_scenario_lacks_is_not_shown() -> None:
     straight = {"motion": {"kind": "upright", "speed": 4.6}, "criterion": {"energy_variation": 1.0}}
     waves = HeightField(tuple((0.01 * (i % 2),) * 40 for i in range(40)), 1.0, (-20.0, -20.0))
     shown = made(tables=straight, surface=waves)
@@ -266,7 +266,7 @@ def test_what_the_scenario_lacks_is_not_shown():
     assert "Nothing is steady on this ground" not in plain
 
 
-def test_every_panel_has_a_plot_and_what_an_engine_lacks_is_absent(parsed: Parsed):
+def test_every_panel_has_a_plot_and_what_an_engine_lacks_is_absent(parsed: Parsed) -> None:
     keys = {panel.key for _, panels in GROUPS for panel in panels}
     assert keys <= {plot.key for plot in PLOTS}
     panels = {panel["key"]: panel for panel in parsed.data()["panels"]}
@@ -278,7 +278,7 @@ def test_every_panel_has_a_plot_and_what_an_engine_lacks_is_absent(parsed: Parse
     assert len(parsed.all("figure")) == len(keys) + 1  # and the ride from above
 
 
-def test_a_curve_in_the_page_is_the_trajectorys(parsed: Parsed):
+def test_a_curve_in_the_page_is_the_trajectorys(parsed: Parsed) -> None:
     data = parsed.data()
     lean = next(panel for panel in data["panels"] if panel["key"] == "lean")["curves"]["1"]
     # Seven digits are kept.
@@ -288,7 +288,7 @@ def test_a_curve_in_the_page_is_the_trajectorys(parsed: Parsed):
     np.testing.assert_allclose(np.hypot(trail["x"], trail["y"]), 2.4, rtol=1e-4)  # five digits of each
 
 
-def test_the_horizon_is_marked_on_the_error(parsed: Parsed):
+def test_the_horizon_is_marked_on_the_error(parsed: Parsed) -> None:
     error = next(panel for panel in parsed.data()["panels"] if panel["key"] == "log_position_error")
     horizons = [values["horizon"] for values in measured(RUNS).values()]
     assert {mark["engine"]: mark["t"] for mark in error["marks"]} == {
@@ -300,7 +300,7 @@ def test_the_horizon_is_marked_on_the_error(parsed: Parsed):
     st.lists(st.one_of(st.floats(-1e3, 1e3), st.just(float("nan"))), max_size=200).map(np.array),
     st.integers(4, 60),
 )
-def test_no_extreme_is_lost(values: np.ndarray, most: int):
+def test_no_extreme_is_lost(values: np.ndarray, most: int) -> None:
     values = values.astype(float)
     chosen = choose_samples(values, most)
     finite = np.flatnonzero(np.isfinite(values))
@@ -313,12 +313,12 @@ def test_no_extreme_is_lost(values: np.ndarray, most: int):
         assert len(chosen) == 0
 
 
-def test_a_gap_in_a_curve_stays_a_gap():
+def test_a_gap_in_a_curve_stays_a_gap() -> None:
     values = np.array([1.0, 2.0, np.nan, np.nan, 3.0, 4.0])
     assert make_curve(np.arange(6.0), values, 10) == {"t": [0, 1, 4, 4, 5], "v": [1, 2, None, 3, 4]}
 
 
-def test_the_page_stays_under_two_megabytes():
+def test_the_page_stays_under_two_megabytes() -> None:
     # Noise with holes: as many points as can be, and a break between each two.
     runs = {name: ride(name, 2001, 1e-3 * k, k) for k, name in enumerate([REFERENCE, *"abcdefghij"])}
     for run in runs.values():
@@ -327,7 +327,7 @@ def test_the_page_stays_under_two_megabytes():
     assert len(made(runs).encode()) < 2e6
 
 
-def test_engines_are_told_apart_on_paper():
+def test_engines_are_told_apart_on_paper() -> None:
     names = [REFERENCE, *"abcdefgh"]
     for name, colour in assign_colours(names).items():
         assert 1.05 / (luminance(paper_colour(name, colour)) + 0.05) >= CONTRAST
@@ -338,7 +338,7 @@ def test_engines_are_told_apart_on_paper():
     assert [patterns[name] for name in "abcdefgh"] == list(DASHES)
 
 
-def test_what_ran_is_said_in_words():
+def test_what_ran_is_said_in_words() -> None:
     assert describe_ground({"kind": "plane"}) == "level plane"
     assert describe_ground({"kind": "sphere", "radius": 20.0}) == "sphere, radius 20.0"
     assert len(describe_ground({"kind": "height-field", "heights": [[0.0] * 100] * 100})) < 120
@@ -362,7 +362,7 @@ def test_what_ran_is_said_in_words():
         (0.4, None, None, "no reference in this run"),
     ],
 )
-def test_trust_follows_from_the_metrics(growth: float, horizon: float | None, error: Any, says: str):
+def test_trust_follows_from_the_metrics(growth: float, horizon: float | None, error: Any, says: str) -> None:
     assert says in explain_columns("one", {"horizon": horizon, "position_error": error}, growth, 20.0)
 
 
@@ -380,12 +380,12 @@ def test_trust_follows_from_the_metrics(growth: float, horizon: float | None, er
 )
 def test_trust_goes_no_further_than_the_ride(
     growth: float, horizon: float | None, changes: dict[str, Any], end: float | None, says: str
-):
+) -> None:
     values = {"horizon": horizon, "position_error": {"max": 1.0}, "fell_at": None, "ended": None} | changes
     assert says in explain_columns("one", values, growth, 20.0, end)
 
 
-def test_bounds_of_the_reference_are_rounded_up():
+def test_bounds_of_the_reference_are_rounded_up() -> None:
     values = {"energy_drift": 5.01e-13, "max_gap": 1.3004e-14, "max_slip": 9.91e-12}
     said = explain_columns(REFERENCE, values, 0.4, 20.0)
     for words in ("at most 5.1e-13 of itself", "within 1.4e-14 m", "within 1e-11 m/s"):
@@ -394,7 +394,7 @@ def test_bounds_of_the_reference_are_rounded_up():
     assert "at most 0 of itself, its gaps stay within 1.3e-14 m." in said
 
 
-def test_a_fall_is_said_where_the_figures_count_a_sample_more():
+def test_a_fall_is_said_where_the_figures_count_a_sample_more() -> None:
     lying = RUNS["one"].q.copy()
     lying[200:, 2] -= 1.0
     fallen = made({REFERENCE: RUNS[REFERENCE], "one": replace(RUNS["one"], q=lying)})
@@ -424,7 +424,7 @@ def pixels(path: Path) -> dict[str, int]:
 
 @needs_browser
 @pytest.mark.parametrize("dark", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["light", "dark"])
-def test_an_engine_that_is_switched_off_is_not_seen(address: str, dark: bool, tmp_path: Path):
+def test_an_engine_that_is_switched_off_is_not_seen(address: str, dark: bool, tmp_path: Path) -> None:
     paint = assign_colours(RUNS)
     ink = {name: make_css(paint[name] if dark else paper_colour(name, paint[name])) for name in RUNS}
     size = (1280, 7000 if dark else 4600)  # the tables, the toolbar, the ride from above and some curves; or all
@@ -440,7 +440,7 @@ def test_an_engine_that_is_switched_off_is_not_seen(address: str, dark: bool, tm
 
 
 @needs_browser
-def test_a_view_can_be_passed_on_by_its_address(address: str):
+def test_a_view_can_be_passed_on_by_its_address(address: str) -> None:
     parsed = Parsed(headless.document(f"{address}#hide=short&t=1.5"))
     assert [attrs["aria-pressed"] for attrs, _ in parsed.all("button")] == ["true", "true", "false", "true"]
     assert [found for _, found in parsed.all("output")] == ["1.50 s"]
@@ -453,7 +453,7 @@ def test_a_view_can_be_passed_on_by_its_address(address: str):
 
 
 @needs_browser
-def test_complaints_of_a_page_are_heard(tmp_path: Path, text: str):
+def test_complaints_of_a_page_are_heard(tmp_path: Path, text: str) -> None:
     broken = tmp_path / "broken.html"
 
     def said() -> str:

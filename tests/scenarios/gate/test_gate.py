@@ -222,7 +222,7 @@ def test_a_dropped_acceleration_of_the_contacts_fails(monkeypatch: pytest.Monkey
 
 
 @cfunc(compiled.CONTROL, error_model="numpy")
-def uncorrected(_model, _data):
+def uncorrected(_model, _data) -> None:
     """A control callback that does nothing."""
 
 

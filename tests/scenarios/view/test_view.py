@@ -88,14 +88,14 @@ def ask(server: RunPageServer, path: str, method: str = "GET", host: str | None 
     return answer, body
 
 
-def test_the_page_of_a_stored_run_has_its_engines_and_title(folder: Path):
+def test_the_page_of_a_stored_run_has_its_engines_and_title(folder: Path) -> None:
     text = view.stored_page(folder)
     assert json.loads((folder / "manifest.json").read_text())["title"] in text
     start = text.index('id="data">') + len('id="data">')
     assert json.loads(text[start : text.index("</script>", start)])["engines"] == ["reference", "mujoco-native"]
 
 
-def test_the_server_gives_the_runs_files_and_the_viewer(copy: Path, monkeypatch: pytest.MonkeyPatch):
+def test_the_server_gives_the_runs_files_and_the_viewer(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with serving(copy, monkeypatch) as server:
         page = (copy / view.REPORT).read_bytes()
         assert ask(server, "/report.html?replay")[1] == page
@@ -114,7 +114,7 @@ def test_the_server_gives_the_runs_files_and_the_viewer(copy: Path, monkeypatch:
 @pytest.mark.parametrize(
     "path", ["/../../etc/passwd", "/..%2f..%2fetc/passwd", "//etc/passwd", "/.secret", "/sub/inner", "/viewer/nothing"]
 )
-def test_nothing_else_is_given(path: str, copy: Path, monkeypatch: pytest.MonkeyPatch):
+def test_nothing_else_is_given(path: str, copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (copy / ".secret").write_text("secret")
     (copy / "sub").mkdir()
     (copy / "sub" / "inner").write_text("inner")
@@ -123,24 +123,24 @@ def test_nothing_else_is_given(path: str, copy: Path, monkeypatch: pytest.Monkey
         assert ask(server, "/report.html", "POST")[0].status == 501
 
 
-def test_a_name_that_another_site_gives_this_machine_is_refused(copy: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_name_that_another_site_gives_this_machine_is_refused(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with serving(copy, monkeypatch) as server:
         port = server.server_port
         assert ask(server, "/report.html", host=f"evil.example:{port}")[0].status == 403
         assert ask(server, "/report.html", host=f"localhost:{port}")[0].status == 200
 
 
-def test_the_server_listens_on_the_loopback_interface_only(copy: Path, monkeypatch: pytest.MonkeyPatch):
+def test_the_server_listens_on_the_loopback_interface_only(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with serving(copy, monkeypatch) as server:
         assert server.socket.getsockname()[0] == LOOPBACK
 
 
-def test_a_taken_port_is_said(copy: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_taken_port_is_said(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with serving(copy, monkeypatch) as server, pytest.raises(ScenarioError, match="cannot listen"):
         view.page_server(copy, server.server_port)
 
 
-def test_serving_ends_with_an_interrupt(copy: Path, monkeypatch: pytest.MonkeyPatch):
+def test_serving_ends_with_an_interrupt(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(_: RunPageServer) -> None:
         raise KeyboardInterrupt
 
@@ -152,7 +152,9 @@ def test_serving_ends_with_an_interrupt(copy: Path, monkeypatch: pytest.MonkeyPa
 
 
 @needs_proc
-def test_the_viewers_files_come_over_the_loopback_interface_and_ask_for_nothing_else(monkeypatch: pytest.MonkeyPatch):
+def test_the_viewers_files_come_over_the_loopback_interface_and_ask_for_nothing_else(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     seen: list[tuple[int, set[str]]] = []
 
     def watched(program: subprocess.Popen[bytes], port: int) -> None:
@@ -176,7 +178,7 @@ def test_the_viewers_files_come_over_the_loopback_interface_and_ask_for_nothing_
 
 @needs_proc
 @pytest.mark.slow
-def test_the_native_viewer_listens_on_the_loopback_interface_only(folder: Path, tmp_path: Path):
+def test_the_native_viewer_listens_on_the_loopback_interface_only(folder: Path, tmp_path: Path) -> None:
     if not any(Path("/usr/share/vulkan/icd.d").glob("*.json")):
         pytest.skip("no Vulkan driver; Debian's mesa-vulkan-drivers has one that needs no graphics card")
     command = [*view.native_command(folder / view.RECORDING), "--headless"]
@@ -194,7 +196,7 @@ def test_the_native_viewer_listens_on_the_loopback_interface_only(folder: Path, 
         program.wait()
 
 
-def test_a_viewer_that_fails_is_said_in_a_line(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_viewer_that_fails_is_said_in_a_line(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(view, "rerun", lambda: "/nowhere/rerun")
     with pytest.raises(ScenarioError, match="cannot be started"):
         view.open_native(folder)
@@ -207,7 +209,7 @@ def test_a_viewer_that_fails_is_said_in_a_line(folder: Path, monkeypatch: pytest
 
 
 @pytest.mark.parametrize("name", ["manifest.json", "metrics.json", "scenario.toml", "mujoco-native.parquet"])
-def test_a_folder_that_is_no_run_is_refused_with_what_is_missing(name: str, copy: Path):
+def test_a_folder_that_is_no_run_is_refused_with_what_is_missing(name: str, copy: Path) -> None:
     (copy / name).unlink()
     with pytest.raises(ScenarioError, match=name) as caught:
         view.stored_page(copy)
@@ -226,20 +228,20 @@ def test_a_folder_that_is_no_run_is_refused_with_what_is_missing(name: str, copy
         ("reference.parquet", "no table"),
     ],
 )
-def test_broken_files_are_refused_in_one_line(name: str, content: str, copy: Path):
+def test_broken_files_are_refused_in_one_line(name: str, content: str, copy: Path) -> None:
     (copy / name).write_text(content)
     with pytest.raises(ScenarioError) as caught:
         view.stored_page(copy)
     assert "\n" not in str(caught.value)
 
 
-def test_a_manifest_without_versions_is_refused(copy: Path):
+def test_a_manifest_without_versions_is_refused(copy: Path) -> None:
     change_document(copy / "manifest.json", lambda manifest: manifest.pop("libraries"))
     with pytest.raises(ScenarioError, match="libraries"):
         view.stored_page(copy)
 
 
-def test_the_page_of_a_folder_of_before_there_were_versions(copy: Path):
+def test_the_page_of_a_folder_of_before_there_were_versions(copy: Path) -> None:
     page = view.stored_page(copy)
     assert page == (copy / "report.html").read_text(encoding="utf-8")
     age_folder(copy)
@@ -249,7 +251,7 @@ def test_the_page_of_a_folder_of_before_there_were_versions(copy: Path):
     assert all(re.search(r'<th scope="row">(processor|blas_\w+|openblas_coretype)</th>', row) for row in rows)
 
 
-def test_what_is_asked_of_a_folder_without_a_recording(tmp_path: Path):
+def test_what_is_asked_of_a_folder_without_a_recording(tmp_path: Path) -> None:
     calls: list[Any] = [view.open_native, lambda folder: view.page_server(folder, 0)]
     for call in calls:
         with pytest.raises(ScenarioError, match=r"comparison\.rrd"):
