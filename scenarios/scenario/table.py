@@ -12,10 +12,10 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    ModelWrapValidatorHandler,
     ValidationError,
     model_validator,
 )
-from pydantic.functional_validators import ModelWrapValidatorHandler  # pydantic 2.8 has it there only
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from ...engines.names import closest_name, suggest_name
