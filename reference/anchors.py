@@ -102,8 +102,13 @@ class Anchor:
 
     def is_same_as(self, unknowns: np.ndarray) -> bool:
         """Return whether another solution is the anchor itself, with its wheels running either way."""
-        change = np.abs(unknowns - self.unknowns) / (1 + np.abs(self.unknowns))
-        return bool(max(change[: STEER + 1].max(), change[SIGMA]) < _SAME)
+        return are_same_solution(unknowns, self.unknowns)
+
+
+def are_same_solution(unknowns: np.ndarray, other: np.ndarray) -> bool:
+    """Return whether two solutions (22,) of one condition are the same, with the wheels running either way."""
+    change = np.abs(unknowns - other) / (1 + np.abs(other))
+    return bool(max(change[: STEER + 1].max(), change[SIGMA]) < _SAME)
 
 
 def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:

@@ -44,7 +44,7 @@ from .continuation import (
 )
 from .curve import sample_curve
 from .kernels.steady import STANDING, direction
-from .search import FoundStart, describe_search, guesses_at, is_on_curve, search_starts
+from .search import describe_search, guesses_at, is_on_curve, search_starts
 from .standing import require_standing, stands
 from .surface import SurfaceOfRevolution, has_tip
 
@@ -179,9 +179,31 @@ def trace_all(
     Returns
     -------
     curves : list of Family
+        Each once: the curves of `trace_families`, then those of `search_curves`.
+    absent : dict
+        Reasons why families have no curve, by the family's number.
+    """
+    curves, absent = trace_families(bicycle, surface, longest)
+    return [*curves, *search_curves(bicycle, surface, curves, longest)], absent
+
+
+def trace_families(
+    bicycle: Bicycle, surface: SurfaceOfRevolution, longest: float = LONGEST_STEP
+) -> tuple[list[Family], dict[int, str]]:
+    """Follow every curve that holds a family or a part of one.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    surface : SurfaceOfRevolution
+    longest : float
+        Longest step of the arc.
+
+    Returns
+    -------
+    curves : list of Family
         Each once: first the curves of the families' last anchors, by their smallest number, then curves of further
-        anchors, under the number of the family that each was a part of, then curves without a number on which
-        both wheels are pushed somewhere, see `velodrome.reference.search`.
+        anchors, under the number of the family that each was a part of.
     absent : dict
         Reasons why families have no curve, by the family's number.
     """
@@ -201,28 +223,50 @@ def trace_all(
     for start in further_anchors(bicycle, surface):
         if not any(_passes_through(curve, start) for curve in curves):
             curves.append(trace_from(start, longest))
-    for found in search_starts(bicycle, surface):
-        if not any(is_on_curve(curve.equations, curve.points, found) for curve in curves):
-            curve = trace_from(_searched_anchor(Steady(bicycle, surface), found), longest)
-            # A followed curve may have ended a step before a motion that lies on it.
-            known = any(_is_part_of(other, curve) for other in curves)
-            if not known and _is_ridden_somewhere(curve):
-                curves.append(curve)
     numbers = {number for curve in curves for number in curve.numbers}
     return curves, {number: why for number, why in absent.items() if number not in numbers}
 
 
+def search_curves(
+    bicycle: Bicycle, surface: SurfaceOfRevolution, families: Sequence[Family], longest: float = LONGEST_STEP
+) -> list[Family]:
+    """Search for the curves without a number on which both wheels are pushed somewhere.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    surface : SurfaceOfRevolution
+    families : sequence of Family
+        The curves of `trace_families`.
+    longest : float
+        Longest step of the arc.
+
+    Returns
+    -------
+    list of Family
+        Each once, in the order of `velodrome.reference.search.search_starts`.
+    """
+    found: list[Family] = []
+    for start in search_starts(bicycle, surface):
+        known = [*families, *found]
+        if not any(is_on_curve(curve.equations, curve.points, start) for curve in known):
+            curve = trace_from(_searched_anchor(Steady(bicycle, surface), start), longest)
+            # A followed curve may have ended a step before a motion that lies on it.
+            if not any(_is_part_of(other, curve) for other in known) and _is_ridden_somewhere(curve):
+                found.append(curve)
+    return found
+
+
 def _is_part_of(other: Family, curve: Family) -> bool:
     """Return whether a curve passes through the middle of another."""
-    middle = other.points[len(other.points) // 2]
-    return is_on_curve(curve.equations, curve.points, FoundStart(middle.unknowns, middle.tangent))
+    return is_on_curve(curve.equations, curve.points, other.points[len(other.points) // 2])
 
 
-def _searched_anchor(equations: Steady, found: FoundStart) -> Anchor:
+def _searched_anchor(equations: Steady, found: Point) -> Anchor:
     """Make an anchor, without a family, of a motion that the search has found."""
-    covector = metric(found.unknowns) * found.along
+    covector = metric(found.unknowns) * found.tangent
     condition = plane_condition(found.unknowns, covector, 0.0)
-    return Anchor(None, equations, found.unknowns, (found.along, -found.along), condition)
+    return Anchor(None, equations, found.unknowns, (found.tangent, -found.tangent), condition)
 
 
 def _is_ridden_somewhere(curve: Family) -> bool:
@@ -287,10 +331,15 @@ def _replace_last_by_end(equations: Steady, points: list[Point]) -> list[Point]:
     return points
 
 
+# Both are cached, since motions of many rates are searched for on the same ground.
 @lru_cache(maxsize=8)
-def _follow_all_curves(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Sequence[Family]:
-    """Follow all curves. Cached, since motions of many rates are searched for on the same ground."""
-    return trace_all(bicycle, surface)[0]
+def _follow_families(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Sequence[Family]:
+    return trace_families(bicycle, surface)[0]
+
+
+@lru_cache(maxsize=8)
+def _follow_other_curves(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Sequence[Family]:
+    return search_curves(bicycle, surface, _follow_families(bicycle, surface))  # type: ignore[arg-type]
 
 
 def find_motions(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float) -> list[CircularMotion]:
@@ -321,7 +370,7 @@ def find_motions(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, re
 def _yield_motions(
     bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float
 ) -> Iterator[CircularMotion]:
-    """Yield the motions as they are found; all curves are followed only after those of the family's anchors."""
+    """Yield the motions as they are found; other families are followed only after the family's own anchors."""
     found: list[CircularMotion] = []
     anchors, failures = [], []
     for anchor_rate in ANCHORS[family]:
@@ -334,7 +383,7 @@ def _yield_motions(
         for towards in start.directions:
             points = _up_to_end(follow_curve(start.equations, start.unknowns, towards))
             yield from _append_new_motions(found, start.equations, points, rear_rate)
-    every = _follow_all_curves(bicycle, surface)  # type: ignore[arg-type]
+    every = _follow_families(bicycle, surface)  # type: ignore[arg-type]
     others = [c for c in every if family in c.numbers and not any(_passes_through(c, start) for start in anchors)]
     for curve in others:
         yield from _append_new_motions(found, curve.equations, curve.points, rear_rate)
@@ -454,10 +503,9 @@ def _motions_without_number(
     bicycle: Bicycle, surface: SurfaceOfRevolution, rear_rate: float
 ) -> Iterator[tuple[None, CircularMotion]]:
     """Yield motions of a rear rate on the curves without a number."""
-    for curve in _follow_all_curves(bicycle, surface):  # type: ignore[arg-type]
-        if curve.number is None:
-            for motion in _append_new_motions([], curve.equations, curve.points, rear_rate):
-                yield None, motion
+    for curve in _follow_other_curves(bicycle, surface):  # type: ignore[arg-type]
+        for motion in _append_new_motions([], curve.equations, curve.points, rear_rate):
+            yield None, motion
 
 
 def _same_angles(one: CircularMotion, other: CircularMotion) -> bool:

@@ -13,12 +13,12 @@ spacing may be missed.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
-from .anchors import above_ground, start_on_plane
+from .anchors import above_ground, are_same_solution, start_on_plane
 from .bicycle import Bicycle
 from .circular import (
     CONTACT,
@@ -44,22 +44,6 @@ LEANS, STEERS = np.linspace(-1.5, 1.5, 16), np.pi * (np.arange(12) + 0.5) / 12
 _STATIC = 1e-12  # squared speed, of order one, of a static equilibrium: round-off
 _MOST = 15  # Gauss-Newton steps: from the grid, what converges takes six or so
 _NEAR = 0.4  # distance, in the arclength's metric, within which a start may lie on a segment of a followed curve
-_SAME = 1e-6  # two solutions in one plane across a curve: round-off, 1e-14, and a double root's square root of it
-
-
-@dataclass(frozen=True)
-class FoundStart:
-    """A circular motion that the search has found.
-
-    Attributes
-    ----------
-    unknowns : ndarray, shape (22,)
-    along : ndarray, shape (22,)
-        Unit tangent of its curve.
-    """
-
-    unknowns: np.ndarray
-    along: np.ndarray
 
 
 def describe_search() -> str:
@@ -71,7 +55,7 @@ def describe_search() -> str:
     )
 
 
-def search_starts(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Iterator[FoundStart]:
+def search_starts(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Iterator[Point]:
     """Find circular motions from the grid of angles, turning to the left, many of them on the same curve.
 
     Parameters
@@ -81,8 +65,8 @@ def search_starts(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Iterator[Fo
 
     Yields
     ------
-    Start
-        In the order of the grid, steers outermost.
+    Point
+        In the order of the grid, steers outermost; the tangents have either sign.
     """
     equations = Steady(bicycle, surface)
     for steer in STEERS:
@@ -91,7 +75,7 @@ def search_starts(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Iterator[Fo
                 for condition in (nearest_condition(), unknown_condition(SIGMA, 0.0)):
                     found = _solve(equations, guess, condition)
                     if found is not None:
-                        yield FoundStart(found, tangent(equations, found))
+                        yield Point(found, tangent(equations, found))
 
 
 def guesses_at(bicycle: Bicycle, surface: SurfaceOfRevolution, lean: float, steer: float) -> Iterator[np.ndarray]:
@@ -111,38 +95,32 @@ def guesses_at(bicycle: Bicycle, surface: SurfaceOfRevolution, lean: float, stee
     rear = level[CONTACT][:2]
     curvature = 1 / float(np.hypot(*rear))
     for radius in _radii_of_curvature(surface, curvature):
-        yield _tilted(bicycle, surface, level, radius)
+        yield _tilted(surface, level, radius)
 
 
 def _radii_of_curvature(surface: SurfaceOfRevolution, curvature: float) -> Iterator[float]:
     """Yield the radii of circles around the axis that have a geodesic curvature, cos(slope) / radius."""
 
-    def excess(radius: float) -> float:
-        slope = _slope(surface, radius)
+    def excess(radius: Any) -> Any:
+        slope = evaluate(surface, radius, 0.0)[..., 1]
         return 1 / (radius * np.hypot(1.0, slope)) - curvature
 
     inner, outer = surface.extent
     inner, outer = max(inner, 1e-3) * (1 + 1e-9), min(outer, 1e3) * (1 - 1e-9)
     radii = np.geomspace(inner, outer, 60)
-    values = np.array([excess(float(radius)) for radius in radii])
+    values = excess(radii)
     for k in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0):
         root: float = brentq(excess, radii[k], radii[k + 1])  # type: ignore[assignment]
         yield root
 
 
-def _slope(surface: SurfaceOfRevolution, radius: float) -> float:
-    """Return the slope of the ground outwards at a distance from the axis."""
-    return float(evaluate(surface, np.array([radius]), np.array([0.0]))[0, 1])
-
-
-def _tilted(bicycle: Bicycle, surface: SurfaceOfRevolution, level: np.ndarray, radius: float) -> np.ndarray:
+def _tilted(surface: SurfaceOfRevolution, level: np.ndarray, radius: float) -> np.ndarray:
     """Turn a solution on the plane into the tangent plane of a bowl, at a radius of the rear contact."""
     u = level.copy()
-    slope = float(np.arctan(_slope(surface, radius)))
+    height, slope = evaluate(surface, radius, 0.0)[:2]  # the slope outwards
     side = np.sign(level[CONTACT][1])  # of the axis the rear contact is on; it heads along its circle
-    height = float(evaluate(surface, np.array([radius]), np.array([0.0]))[0, 0])
     # The ground rises outwards: the bicycle is turned about its heading, away from the outside.
-    turn = side * slope
+    turn = side * np.arctan(slope)
     cosine, sine = np.cos(turn), np.sin(turn)
     contact = np.array([0.0, side * radius, height])
     rear = np.array([*level[CONTACT][:2], 0.0])
@@ -167,7 +145,7 @@ def _solve(equations: Steady, guess: np.ndarray, condition: Callable[[np.ndarray
     return as_solved(found) if possible else None
 
 
-def is_on_curve(equations: Steady, points: Sequence[Point], start: FoundStart) -> bool:
+def is_on_curve(equations: Steady, points: Sequence[Point], start: Point) -> bool:
     """Return whether a followed curve passes through a motion.
 
     Near the motion, the curve's point in the plane through the motion and across its tangent is solved for; it must be
@@ -178,12 +156,12 @@ def is_on_curve(equations: Steady, points: Sequence[Point], start: FoundStart) -
     equations : Steady
     points : sequence of Point
         In the order followed.
-    start : Start
+    start : Point
     """
     chosen = kernel.CHOSEN
     weights = metric(start.unknowns)
     covector = np.zeros_like(weights)
-    covector[chosen] = (weights * start.along)[chosen]
+    covector[chosen] = (weights * start.tangent)[chosen]
     unknowns = np.array([point.unknowns for point in points])
     apart = unknowns - start.unknowns
     near = np.sqrt((apart[:, chosen] ** 2 * weights[chosen]).sum(axis=1)) < _NEAR
@@ -196,12 +174,7 @@ def is_on_curve(equations: Steady, points: Sequence[Point], start: FoundStart) -
             met, _ = newton(equations, unknowns[k] + share * (unknowns[k + 1] - unknowns[k]), condition)
         except ValueError:
             continue
-        if _is_same(met, start.unknowns):
+        if are_same_solution(met, start.unknowns):
             return True
     # A motion at the very end of a curve has no segment on one of its sides.
-    return any(_is_same(unknowns[k], start.unknowns) for k in (0, -1))
-
-
-def _is_same(one: np.ndarray, other: np.ndarray) -> bool:
-    change = np.abs(one - other) / (1 + np.abs(other))
-    return bool(max(change[: STEER + 1].max(), change[SIGMA]) < _SAME)
+    return any(are_same_solution(unknowns[k], start.unknowns) for k in (0, -1))

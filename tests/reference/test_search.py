@@ -11,10 +11,10 @@ from velodrome.reference.anchors import above_ground
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.bowls import Cone, Sphere, Torus
 from velodrome.reference.circular import LEAN, PITCH, SIGMA, STEER, Steady, as_solved, newton, rear_rate_condition
-from velodrome.reference.continuation import tangent
+from velodrome.reference.continuation import Point, tangent
 from velodrome.reference.curve import sample_curve
 from velodrome.reference.families import find_motion, trace_all
-from velodrome.reference.search import FoundStart, guesses_at, is_on_curve
+from velodrome.reference.search import guesses_at, is_on_curve
 from velodrome.reference.sections import stable_sections
 from velodrome.reference.standing import stands
 from velodrome.reference.surface import Paraboloid, Plane, SurfaceOfRevolution
@@ -87,7 +87,7 @@ def count_missed(bicycle: Bicycle, surface: SurfaceOfRevolution, starts: int) ->
     missed = [
         u
         for u in motions
-        if not any(is_on_curve(equations, curve.points, FoundStart(u, tangent(equations, u))) for curve in curves)
+        if not any(is_on_curve(equations, curve.points, Point(u, tangent(equations, u))) for curve in curves)
     ]
     return len(motions), missed
 
@@ -133,9 +133,7 @@ def test_every_curve_is_listed_once(surface: SurfaceOfRevolution) -> None:
     for k, curve in enumerate(curves):
         middle = curve.points[len(curve.points) // 2]
         others = [other for n, other in enumerate(curves) if n != k]
-        assert not any(
-            is_on_curve(curve.equations, o.points, FoundStart(middle.unknowns, middle.tangent)) for o in others
-        )
+        assert not any(is_on_curve(curve.equations, o.points, middle) for o in others)
 
 
 def test_a_family_that_a_bicycle_does_not_have_ends_in_a_fold() -> None:
