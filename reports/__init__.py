@@ -1,1 +1,1 @@
-"""What a run shows: metrics, the drift gate, the recording."""
+"""Measurements of rides, and their presentation: drawings, figures, recordings, report pages, conformance reports."""

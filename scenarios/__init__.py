@@ -1,1 +1,1 @@
-"""What to run: declared scenarios, the runner and the command."""
+"""Scenarios, what is done with them, and the command."""

@@ -79,14 +79,8 @@ class SolutionCurve:
 
 
 def make_curves(families: Sequence[Mapping[str, Any]], front_radius: float) -> list[SolutionCurve]:
-    """Make the curves of a document's families, each once even where two families share one."""
-    found: dict[tuple, SolutionCurve] = {}
-    for family in families:
-        curve = _make_curve(family, front_radius)
-        # Two families share a curve that belongs to both and has the same ends.
-        key = (curve.families, *family["ends"]) if len(curve.families) > 1 else (len(found),)
-        found.setdefault(key, curve)
-    return list(found.values())
+    """Make the curves of a document's families."""
+    return [_make_curve(family, front_radius) for family in families]
 
 
 def _make_curve(family: Mapping[str, Any], front_radius: float) -> SolutionCurve:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from numbers import Real
 from pathlib import Path
 from typing import Any, cast
@@ -121,16 +121,23 @@ def plain_value(value: Any) -> Any:
     return given.tolist() if isinstance(value, np.generic | np.ndarray) else value
 
 
-def require_callable(name: str, value: Any) -> None:
-    """Refuse an argument that can neither be called nor is None.
+def read_progress(value: Any) -> Callable[..., None]:
+    """Return the function that is called with progress; one that ignores it if the argument is None.
 
     Raises
     ------
     ScenarioError
-        If it is such.
+        If the argument can neither be called nor is None.
     """
-    if value is not None and not callable(value):
-        raise _refuse(name, value, "it must be a function, or None")
+    if value is None:
+        return ignore_progress
+    if not callable(value):
+        raise _refuse("progress", value, "it must be a function, or None")
+    return cast("Callable[..., None]", value)
+
+
+def ignore_progress(*_: object) -> None:
+    """Ignore progress and notes."""
 
 
 def read_number(name: str, value: Any, unit: str) -> float:

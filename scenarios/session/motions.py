@@ -15,7 +15,7 @@ from ..motions import (
     solve_circular,
 )
 from ..scenario import make_bowl
-from .arguments import read_bicycle, read_family, read_ground, read_near, read_number, require_callable
+from .arguments import read_bicycle, read_family, read_ground, read_near, read_number, read_progress
 
 
 def circular(
@@ -128,9 +128,5 @@ def critical(
     ScenarioError
         If an argument has a wrong type.
     """
-    require_callable("progress", progress)
-    return find_critical_shapes(read_bicycle(bicycle), progress or _ignore_progress)
-
-
-def _ignore_progress(*_: object) -> None:
-    """Ignore the progress of a computation."""
+    watch = read_progress(progress)
+    return find_critical_shapes(read_bicycle(bicycle), watch)

@@ -9,7 +9,15 @@ from typing import Any
 from ...engines.engine import Settings
 from ..run import RunPlan, RunResult, measure_run, plan_run, ride_plan, store_run, write_run_recording
 from ..scenario import Scenario, load_scenario
-from .arguments import plain_value, read_changes, read_engines, read_path, read_settings, require_callable
+from .arguments import (
+    ignore_progress,
+    plain_value,
+    read_changes,
+    read_engines,
+    read_path,
+    read_progress,
+    read_settings,
+)
 from .result import Run
 from .table import MetricsTable
 
@@ -71,24 +79,19 @@ def run(
     read_path("scenario", scenario)
     wanted, given = read_engines(engines), read_settings(settings)
     into = None if out is None else read_path("out", out)
-    require_callable("progress", progress)
+    watch = read_progress(progress)
     fields = read_changes(changes)
     if duration is not None:
         fields["simulation.duration"] = plain_value(duration)
     name, resolved = load_scenario(str(scenario), fields)
     plan = plan_run(name, _with_settings(resolved, given), wanted)
-    watch = progress if progress is not None else _ignore_progress
     if into is None:
-        folder, result = None, measure_run(plan, ride_plan(plan, watch, _ignore_progress))
+        folder, result = None, measure_run(plan, ride_plan(plan, watch, ignore_progress))
     else:
-        folder, result = store_run(plan, into, watch, _ignore_progress)
+        folder, result = store_run(plan, into, watch, ignore_progress)
     if result.interrupted:
         raise KeyboardInterrupt
     return _make_run(plan, result, folder)
-
-
-def _ignore_progress(*_: Any) -> None:
-    """Ignore progress and notes; failures are reported in the result."""
 
 
 def _with_settings(scenario: Scenario, settings: Mapping[str, Mapping[str, Any]]) -> Scenario:
