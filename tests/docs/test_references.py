@@ -8,6 +8,7 @@ import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -23,6 +24,7 @@ from velodrome.engines.engine import load_engine
 from velodrome.engines.storage import trajectory_columns
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reports.measure import QUANTITIES
+from velodrome.scenarios.run.machine import describe_machine
 from velodrome.scenarios.scenario.schema import Scenario
 from velodrome.scenarios.sweep.file import Hypercube, SweepFile
 
@@ -135,6 +137,17 @@ SOMETIMES = ("absent", "the reason", "Verdicts", "As in", "that differ", "criter
 
 def test_every_document_is_looked_at() -> None:
     assert set(DOCUMENTS) == set(documented())
+
+
+def test_what_a_manifest_may_say_of_the_platform_is_in_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some of it depends on the environment: all of it is made to be there."""
+    blas = {"user_api": "blas", "internal_api": "openblas", "version": "0.3", "architecture": "Haswell"}
+    monkeypatch.setitem(sys.modules, "threadpoolctl", SimpleNamespace(threadpool_info=lambda: [blas]))
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Haswell")
+    found = describe_machine.__wrapped__()
+    assert {"blas_loaded", "openblas_coretype"} <= set(found)
+    keys = list(documented()["manifest"]["keys"])
+    assert [name for name in found if find_key(f"platform.{name}", keys) is None] == []
 
 
 @pytest.mark.parametrize(
