@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from velodrome.engines.engine import Engine, Problem, Progress, Settings, Trajectory
+from tests.wrapped import WrappedEngine
+from velodrome.engines.engine import Problem, Progress, Trajectory
 from velodrome.reference.kinematics import REAR_ANGLE
 
 
 @dataclass(frozen=True)
-class Altered:
+class Altered(WrappedEngine):
     """Another engine behind two functions.
 
     Attributes
@@ -29,7 +30,6 @@ class Altered:
         Another name, to ride beside the engine itself.
     """
 
-    inner: Engine
     before: Callable[[Problem], Problem] = lambda problem: problem
     after: Callable[[Trajectory], Trajectory] = lambda trajectory: trajectory
     called: str = ""
@@ -37,24 +37,6 @@ class Altered:
     @property
     def name(self) -> str:
         return self.called or self.inner.name
-
-    @property
-    def version(self) -> str:
-        return self.inner.version
-
-    @property
-    def gives(self) -> tuple[str, ...]:
-        return self.inner.gives
-
-    @property
-    def settings(self) -> type[Settings]:
-        return self.inner.settings
-
-    def check(self, problem: Problem, settings: Any) -> None:
-        self.inner.check(problem, settings)
-
-    def step_noise(self, settings: Any) -> float:
-        return self.inner.step_noise(settings)
 
     def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
         trajectory = self.after(self.inner.simulate(self.before(problem), settings, progress))

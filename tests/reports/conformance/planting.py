@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from velodrome.engines.engine import Engine, Problem, Progress, Settings, Trajectory, load_engine
+from tests.wrapped import WrappedEngine
+from velodrome.engines.engine import Problem, Progress, Trajectory, load_engine
 from velodrome.reference.kinematics import COORDINATES
 from velodrome.reports.measure import evaluate_ride
 
@@ -17,7 +18,7 @@ After = Callable[[Trajectory, Problem, float], Trajectory]
 
 
 @dataclass(frozen=True)
-class Planted:
+class Planted(WrappedEngine):
     """An engine whose problems and trajectories are changed on the way.
 
     Attributes
@@ -29,31 +30,8 @@ class Planted:
         Of what is given, with the problem and the mean step [s].
     """
 
-    inner: Engine
     before: Before
     after: After
-
-    @property
-    def name(self) -> str:
-        return self.inner.name
-
-    @property
-    def version(self) -> str:
-        return self.inner.version
-
-    @property
-    def gives(self) -> tuple[str, ...]:
-        return self.inner.gives
-
-    @property
-    def settings(self) -> type[Settings]:
-        return self.inner.settings
-
-    def check(self, problem: Problem, settings: Any) -> None:
-        self.inner.check(problem, settings)
-
-    def step_noise(self, settings: Any) -> float:
-        return self.inner.step_noise(settings)
 
     def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
         """Run the changed problem and change what comes of it."""
