@@ -1,8 +1,8 @@
 """Pictures of a report page, taken in Chromium without a display.
 
-``python -m tests.reports.headless_page PAGE PICTURE [light|dark [WIDTH HEIGHT]]`` takes one; PAGE is a path or
+``python -m tests.reports.page.headless_page PAGE PICTURE [light|dark [WIDTH HEIGHT]]`` takes one; PAGE is a path or
 an address, with ``#hide=ENGINE,ENGINE&t=SECONDS`` to choose what it shows.
-``python -m tests.reports.headless_page install`` installs Chromium from Debian's packages.
+``python -m tests.reports.page.headless_page install`` installs Chromium from Debian's packages.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def browser() -> str | None:
 def missing() -> str | None:
     """Why no picture can be taken here; None if one can."""
     if browser() is None:
-        return "no Chromium; python -m tests.reports.headless_page install gets Debian's, as root"
+        return "no Chromium; python -m tests.reports.page.headless_page install gets Debian's, as root"
     return None
 
 

@@ -1,6 +1,6 @@
 """Pictures of a recording, taken in the viewer without a display.
 
-``python -m tests.reports.headless_viewer RECORDING PICTURE [SECONDS [TAB…]]`` takes one of the whole window.
+``python -m tests.reports.recording.headless_viewer RECORDING PICTURE [SECONDS [TAB…]]`` takes one of the whole window.
 """
 
 from __future__ import annotations
