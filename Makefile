@@ -34,7 +34,8 @@ test-machines-short: $(STAMP)
 test-wheel: $(STAMP)
 	$(BIN)/python -m tests.wheel
 
-lint: $(STAMP)
+# The linters read the documentation's extensions too, hence its packages.
+lint: $(DOCS_STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
