@@ -30,7 +30,7 @@ class Samples:
         Normal force of the ground on the rear and the front wheel [N].
     eigenvalues : ndarray, shape (n, 7), complex
         In the order of `velodrome.reference.stability.eigenvalue_order` [1/s].
-    Largest real part among the eigenvalues that symmetry does not fix [1/s].
+    growth_rate : ndarray, shape (n,)
         Largest real part among those that symmetry does not fix [1/s].
     """
 
