@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import velodrome
+from velodrome.engines.engine import REFERENCE
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.families import trace_all
 from velodrome.reference.sections import sample_family
@@ -92,8 +93,8 @@ def measured_errors(name: str, motion: str, halved: bool, folder: Path) -> tuple
     if motion == "circle":
         engines.remove("exudyn-builtin")  # the plane alone
     found = velodrome.run(path, engines=engines, settings=steps, changes=changes)
-    errors = found.metrics.to_pandas()["position_error_max"].drop("reference")
-    return {str(engine): float(error) for engine, error in errors.items() if engine in found.trajectories}, {
+    errors = found.metrics.column("position_error_max")
+    return {engine: errors[engine] for engine in found.trajectories if engine != REFERENCE}, {
         engine: str(reason) for engine, reason in found.failures.items()
     }
 
