@@ -21,6 +21,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from ..reference.bicycle import Bicycle
+from ..reference.inputs import NO_INPUTS, Inputs
 from ..reference.kinematics import COORDINATES
 from ..reference.surface import Surface
 from .format_version import VERSION_KEY
@@ -50,6 +51,8 @@ class Problem:
         Generalised coordinates and rates at the start, including wheel angles and yaw.
     times : ndarray, shape (n,)
         Output times, rising from 0 [s]; at least two.
+    inputs : Inputs
+        Torques and steer damping, constant during the ride; by default there are none.
 
     Raises
     ------
@@ -66,6 +69,7 @@ class Problem:
     q: np.ndarray
     qd: np.ndarray
     times: np.ndarray
+    inputs: Inputs = NO_INPUTS
 
     def __post_init__(self) -> None:
         for name in ("q", "qd", "times"):
@@ -75,6 +79,8 @@ class Problem:
             except (TypeError, ValueError) as error:
                 raise ValueError(f"{name} is {reprlib.repr(given)}; it must be an array of numbers") from error
             object.__setattr__(self, name, values)
+        if not isinstance(self.inputs, Inputs):
+            raise ValueError(f"inputs is {reprlib.repr(self.inputs)}; it must be an Inputs")
         for name in ("q", "qd"):
             values = getattr(self, name)
             if values.shape != (9,) or not np.all(np.isfinite(values)):
@@ -91,6 +97,7 @@ class Problem:
             f"Problem: {len(self.times)} output times from 0 to {self.times[-1]:g} s",
             f"  bicycle: {_shorten(self.bicycle)}",
             f"  surface: {_shorten(self.surface)}",
+            *([f"  inputs: {self.inputs.describe()}"] if self.inputs != NO_INPUTS else []),
         ]
         for name, values in (("q", self.q), ("qd", self.qd)):
             named = (f"{key} {value:.6g}" for key, value in zip(COORDINATES, values, strict=True))
