@@ -316,7 +316,9 @@ class Engine(Protocol):
 
     ``examples/velodrome-symbrim`` is a complete package with an engine.
 
-    An engine may also have a ``description``, one line of text, which `velodrome show` prints.
+    An engine may also have a ``description``, one line of text, which `velodrome show` prints, and ``takes_inputs``. An
+    engine that applies the torques and the steer damping in `Problem.inputs` sets it to True; without it the engine is
+    never given a problem with inputs.
     """
 
     @property
@@ -454,7 +456,8 @@ def load_engine(name: str) -> Engine:
         raise ValueError(f"{where} cannot be loaded: {why_failed(error)}") from error
     if members["name"] != name:
         raise ValueError(f"{where} calls itself {members['name']!r}; both names must be the same")
-    return GuardedEngine(engine, **{fact: members[fact] for fact in _FACTS})
+    takes = call_engine(getattr, engine, "takes_inputs", False)
+    return GuardedEngine(engine, **{fact: members[fact] for fact in _FACTS}, takes_inputs=takes is True)
 
 
 def describe_engine(engine: Engine) -> str:
@@ -464,6 +467,13 @@ def describe_engine(engine: Engine) -> str:
     if not isinstance(text, str) or not text.strip():
         text = next(iter((type(own).__doc__ or "").strip().splitlines()), "")
     return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+
+
+def find_ignored_inputs(engine: Engine, problem: Problem) -> str | None:
+    """Return one line that says which inputs of a problem an engine would ignore; None if it applies all of them."""
+    if problem.inputs == NO_INPUTS or getattr(engine, "takes_inputs", False) is True:
+        return None
+    return f"it applies no inputs, and the problem has {problem.inputs.describe()}; without inputs it rides"
 
 
 def why_failed(error: Exception) -> str:

@@ -52,9 +52,7 @@ def contact_parameters(bicycle: Bicycle, surface: Surface, q: np.ndarray) -> np.
     return p
 
 
-def dynamics(
-    bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, inputs: Inputs = NO_INPUTS
-) -> Dynamics:
+def dynamics(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, inputs: Inputs = NO_INPUTS) -> Dynamics:
     """Compute the accelerations and contact forces of a state that satisfies the constraints.
 
     Parameters

@@ -6,7 +6,7 @@ They enter the equations of motion M qdd + h = J^T F + Q (Xiong et al. 2020, Eq.
 
 Both act between two bodies, so that they do the work of the coordinate between them and no other:
 
-    d(kinetic + potential energy)/dt = steer_torque steer_rate + rear_wheel_torque rear_rate - steer_damping steer_rate^2
+    d(energy)/dt = steer_torque steer_rate + rear_wheel_torque rear_rate - steer_damping steer_rate^2
 """
 
 from __future__ import annotations

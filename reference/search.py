@@ -53,14 +53,13 @@ def describe_search(inputs: Inputs = NO_INPUTS) -> str:
     least = "0" if inputs.steer_torque == 0 else "-pi"
     return (
         f"Gauss-Newton steps, to the nearest motion and to a static equilibrium, from {len(LEANS)} leans of "
-        f"{LEANS[0]:g} to {LEANS[-1]:g} rad against the ground and {_starting_steers(inputs).size} steers between {least} and pi, and the "
+        f"{LEANS[0]:g} to {LEANS[-1]:g} rad against the ground and {len(_starting_steers(inputs))} steers "
+        f"between {least} and pi, and the "
         "whole curves through what they lead to"
     )
 
 
-def search_starts(
-    bicycle: Bicycle, surface: SurfaceOfRevolution, inputs: Inputs = NO_INPUTS
-) -> Iterator[Point]:
+def search_starts(bicycle: Bicycle, surface: SurfaceOfRevolution, inputs: Inputs = NO_INPUTS) -> Iterator[Point]:
     """Find circular motions from the grid of angles, turning to the left, many of them on the same curve.
 
     A motion that turns to the left with its rear wheel rolling backward is, run the other way, one that turns to the

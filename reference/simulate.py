@@ -217,7 +217,8 @@ def simulate_modified_euler(
         ended = second_touch(_TOUCHING_WHEEL[status], reached)
     elif status != kernel.DONE:
         ended = f"the state is no longer finite after t = {times[rows - 1]:.6g} s"
-    return _make_motion(bicycle, surface, inputs, times, out[:rows], (rows - 1) * stride, 2 * (rows - 1) * stride, ended)
+    steps = (rows - 1) * stride
+    return _make_motion(bicycle, surface, inputs, times, out[:rows], steps, 2 * steps, ended)
 
 
 def steps_per_output(times: np.ndarray, step: float) -> int:

@@ -13,7 +13,8 @@ contact rows prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were ze
 
     Jp M^-1 Jp^T F = -(Jp a + gamma + s^2 gap n + 2 s v),    M a = passive - bias + held
 
-and applies Jp^T F + held, with the constant forces held that were applied when the callback was installed. The stabilisation rate s contributes nothing where the constraints hold.
+and applies Jp^T F + held, with ``held`` the generalised forces that were applied when the callback was installed. The
+stabilisation rate s contributes nothing where the constraints hold.
 
 `watch_iterations` only observes: it assesses the solution of MuJoCo's solver when the next evaluation begins, the first
 moment after the solution at which a callback is called (the criterion is in `convergence`). `correct_reference` does

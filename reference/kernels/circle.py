@@ -17,7 +17,7 @@ enough:
 
     rows            rim point (2), (2) | no side slip (2) | lean'', steer''
 
-A torque on the rear wheel works where that wheel rolls: the rows with it are necessary, and sufficient only where b = 0.
+A torque on the rear wheel does work where that wheel rolls: with it the rows are sufficient only where b = 0.
 
 Nothing here divides by a speed: static equilibria (sigma = 0, and sigma < 0 beyond) and pivoting motions
 (b = 0) are regular points.

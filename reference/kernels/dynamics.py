@@ -11,8 +11,9 @@ The material velocity of both contact points, v_D + w x rho + spin_rate axle x d
 rows per wheel), combines the four rolling constraints and the time derivatives of the two gaps. Its own
 time derivative, J qdd + gamma = 0, contains the contact's motion along the rim, ddot = w x d + r adot t.
 
-With the inputs -Q (`velodrome.reference.inputs`) in h, the equations of motion are  M qdd + h = J^T F,  J qdd + gamma = 0,  with F the force of the ground on
-each wheel in inertial axes: the six Lagrange multipliers.
+The equations of motion are  M qdd + h = J^T F,  J qdd + gamma = 0,  with F the force of the ground on
+each wheel in inertial axes: the six Lagrange multipliers. The generalised forces Q of the inputs
+(`velodrome.reference.inputs`) are part of h as -Q.
 """
 
 from __future__ import annotations
