@@ -10,7 +10,17 @@ from typing import Any
 import numpy as np
 
 from ..reference.rim import find_second_touch, require_clear_rims
-from .engine import REQUIRED, SHAPES, Engine, EngineError, Problem, Progress, Settings, Trajectory
+from .engine import (
+    REQUIRED,
+    SHAPES,
+    Engine,
+    EngineError,
+    Problem,
+    Progress,
+    Settings,
+    Trajectory,
+    find_ignored_inputs,
+)
 from .guard import simulate_guarded
 
 # Largest relative error of a sample's time, the same as `velodrome.reference.simulate.steps_per_output` allows for a
@@ -41,11 +51,15 @@ def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progr
     Raises
     ------
     EngineError
-        If a rim lies inside the ground at the start, or the engine returns no trajectory, or one that does not fit the
+        If the engine does not apply the problem's inputs, a rim lies inside the ground at the start, or the engine
+        returns no trajectory, or one that does not fit the
         problem. The message states the fault.
     Exception
         Any exception that the engine raises.
     """
+    ignored = find_ignored_inputs(engine, problem)
+    if ignored is not None:
+        raise EngineError(ignored)
     try:
         require_clear_rims(problem.bicycle, problem.surface, problem.q, may_sink=True)
     except ValueError as error:

@@ -21,6 +21,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from ..reference.bicycle import Bicycle
+from ..reference.inputs import NO_INPUTS, Inputs
 from ..reference.kinematics import COORDINATES
 from ..reference.surface import Surface
 from .format_version import VERSION_KEY
@@ -50,6 +51,8 @@ class Problem:
         Generalised coordinates and rates at the start, including wheel angles and yaw.
     times : ndarray, shape (n,)
         Output times, rising from 0 [s]; at least two.
+    inputs : Inputs
+        Torques and steer damping, constant during the ride; by default there are none.
 
     Raises
     ------
@@ -66,6 +69,7 @@ class Problem:
     q: np.ndarray
     qd: np.ndarray
     times: np.ndarray
+    inputs: Inputs = NO_INPUTS
 
     def __post_init__(self) -> None:
         for name in ("q", "qd", "times"):
@@ -75,6 +79,8 @@ class Problem:
             except (TypeError, ValueError) as error:
                 raise ValueError(f"{name} is {reprlib.repr(given)}; it must be an array of numbers") from error
             object.__setattr__(self, name, values)
+        if not isinstance(self.inputs, Inputs):
+            raise ValueError(f"inputs is {reprlib.repr(self.inputs)}; it must be an Inputs")
         for name in ("q", "qd"):
             values = getattr(self, name)
             if values.shape != (9,) or not np.all(np.isfinite(values)):
@@ -91,6 +97,7 @@ class Problem:
             f"Problem: {len(self.times)} output times from 0 to {self.times[-1]:g} s",
             f"  bicycle: {_shorten(self.bicycle)}",
             f"  surface: {_shorten(self.surface)}",
+            *([f"  inputs: {self.inputs.describe()}"] if self.inputs != NO_INPUTS else []),
         ]
         for name, values in (("q", self.q), ("qd", self.qd)):
             named = (f"{key} {value:.6g}" for key, value in zip(COORDINATES, values, strict=True))
@@ -309,7 +316,9 @@ class Engine(Protocol):
 
     ``examples/velodrome-symbrim`` is a complete package with an engine.
 
-    An engine may also have a ``description``, one line of text, which `velodrome show` prints.
+    An engine may also have a ``description``, one line of text, which `velodrome show` prints, and ``takes_inputs``. An
+    engine that applies the torques and the steer damping in `Problem.inputs` sets it to True; without it the engine is
+    never given a problem with inputs.
     """
 
     @property
@@ -447,7 +456,8 @@ def load_engine(name: str) -> Engine:
         raise ValueError(f"{where} cannot be loaded: {why_failed(error)}") from error
     if members["name"] != name:
         raise ValueError(f"{where} calls itself {members['name']!r}; both names must be the same")
-    return GuardedEngine(engine, **{fact: members[fact] for fact in _FACTS})
+    takes = call_engine(getattr, engine, "takes_inputs", False)
+    return GuardedEngine(engine, **{fact: members[fact] for fact in _FACTS}, takes_inputs=takes is True)
 
 
 def describe_engine(engine: Engine) -> str:
@@ -457,6 +467,13 @@ def describe_engine(engine: Engine) -> str:
     if not isinstance(text, str) or not text.strip():
         text = next(iter((type(own).__doc__ or "").strip().splitlines()), "")
     return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+
+
+def find_ignored_inputs(engine: Engine, problem: Problem) -> str | None:
+    """Return one line that says which inputs of a problem an engine would ignore; None if it applies all of them."""
+    if problem.inputs == NO_INPUTS or getattr(engine, "takes_inputs", False) is True:
+        return None
+    return f"it applies no inputs, and the problem has {problem.inputs.describe()}; without inputs it rides"
 
 
 def why_failed(error: Exception) -> str:

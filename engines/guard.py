@@ -196,6 +196,8 @@ class GuardedEngine:
     name, version : str
     gives : tuple of str
     settings : type of Settings
+    takes_inputs : bool
+        Whether the engine says that it applies a problem's inputs.
     """
 
     inner: Engine
@@ -203,9 +205,15 @@ class GuardedEngine:
     version: str
     gives: tuple[str, ...]
     settings: type[Settings]
+    takes_inputs: bool = False
 
     def check(self, problem: Problem, settings: Any) -> None:
-        """Refuse a problem that the engine cannot run."""
+        """Refuse a problem that the engine cannot run, and inputs that it does not apply."""
+        from .engine import UnsuitableProblem, find_ignored_inputs  # that module imports this one
+
+        ignored = find_ignored_inputs(self, problem)
+        if ignored is not None:
+            raise UnsuitableProblem(ignored)
         call_engine(self.inner.check, _copy_problem(problem), settings)
 
     def step_noise(self, settings: Any) -> float:

@@ -47,6 +47,7 @@ class LagrangeEngine:
     description = "Lagrange's equations of the first kind with exact rolling, integrated to round-off: the reference"
     gives = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
     settings = LagrangeSettings
+    takes_inputs = True
 
     @property
     def version(self) -> str:
@@ -70,10 +71,10 @@ class LagrangeEngine:
         simulate(*where, problem.q, problem.qd, problem.times[:1])
         begin = time.process_time()
         if settings.integrator == "dop853":
-            motion = simulate(*where, *state, tolerance=settings.tolerance, progress=progress)
+            motion = simulate(*where, *state, tolerance=settings.tolerance, progress=progress, inputs=problem.inputs)
             clock = motion.time
         else:
-            motion = simulate_modified_euler(*where, *state, step=settings.step)
+            motion = simulate_modified_euler(*where, *state, step=settings.step, inputs=problem.inputs)
             stride = steps_per_output(problem.times, settings.step)
             clock = settings.step * (stride * np.arange(len(motion.time)))
         cpu_time = time.process_time() - begin

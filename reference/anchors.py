@@ -55,6 +55,7 @@ from .circular import (
     unknown_condition,
 )
 from .continuation import LARGEST_LEAN, crossings, follow_curve, tangent
+from .inputs import NO_INPUTS, Inputs
 from .kernels import dynamics as kernel
 from .kernels.curve import CHOSEN
 from .kernels.steady import STANDING, UNKNOWNS
@@ -111,7 +112,7 @@ def are_same_solution(unknowns: np.ndarray, other: np.ndarray) -> bool:
     return bool(max(change[: STEER + 1].max(), change[SIGMA]) < _SAME)
 
 
-def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
+def start_on_plane(bicycle: Bicycle, lean: float, steer: float, inputs: Inputs = NO_INPUTS) -> np.ndarray:
     """Guess the 22 unknowns on the level plane from two angles alone.
 
     At fixed lean and steer the bicycle can roll in exactly one circle: the null vector of the rolling
@@ -123,6 +124,7 @@ def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
     bicycle : Bicycle
     lean, steer : float
         Angles [rad].
+    inputs : Inputs
 
     Returns
     -------
@@ -149,7 +151,7 @@ def start_on_plane(bicycle: Bicycle, lean: float, steer: float) -> np.ndarray:
     u[:6] = *centre, q[2], lean, q[5], steer
     u[6:9] = speeds[3:]
     u[CONTACT] = p + np.array([*centre, 0, *centre, 0])
-    equations, linear = Steady(bicycle, surface), [SIGMA, *range(16, 22)]
+    equations, linear = Steady(bicycle, surface, inputs), [SIGMA, *range(16, 22)]
     u[linear] = np.linalg.lstsq(equations.jacobian(u)[:9, linear], -equations.residual(u)[:9], rcond=None)[0]
     return u
 

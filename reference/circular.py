@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .bicycle import Bicycle
+from .inputs import NO_INPUTS, Inputs
 from .kernels import curve
 from .kernels import steady as kernel
 from .kernels.pose import aligned
@@ -28,7 +29,7 @@ LARGEST_RESIDUAL = 1e-12
 
 @dataclass(frozen=True)
 class CircularMotion:
-    """A hands-free circular motion in the heading frame.
+    """A circular motion, hands-free or under constant inputs, in the heading frame.
 
     Attributes
     ----------
@@ -89,16 +90,39 @@ class Expansion(NamedTuple):
 
 @dataclass(frozen=True)
 class Steady:
-    """The equations of circular motions of one bicycle on one surface of revolution."""
+    """The equations of circular motions of one bicycle on one surface of revolution, under constant inputs.
+
+    Attributes
+    ----------
+    bicycle : Bicycle
+    surface : SurfaceOfRevolution
+    inputs : Inputs
+        Steer damping changes the eigenvalues of circular motions, not the motions.
+
+    Raises
+    ------
+    ValueError
+        If there is a torque on the rear wheel, with which no wheel rolls steadily.
+    """
 
     bicycle: Bicycle
     surface: SurfaceOfRevolution
+    inputs: Inputs = NO_INPUTS
+
+    def __post_init__(self) -> None:
+        torque = self.inputs.rear_wheel_torque
+        if torque != 0:
+            raise ValueError(
+                f"no circular motion exists with a rear-wheel torque of {torque!r} N m: a rolling wheel would gain the "
+                "power torque x rear rate, and nothing takes it up; it would be steady only where the rear wheel "
+                "stands. rear_wheel_torque = 0 has circular motions"
+            )
 
     @cached_property
     def where(self) -> tuple[Any, Any, np.ndarray, Any]:
         """Arguments of compiled kernels: the surface for real and for complex numbers, its parameters, the bicycle."""
         function = self.surface.function
-        return function.real, function.complex, self.surface.parameters, aligned(constants(self.bicycle))
+        return function.real, function.complex, self.surface.parameters, aligned(constants(self.bicycle, self.inputs))
 
     def expand(self, chosen: np.ndarray) -> Expansion:
         """Evaluate the eight equations and all 22 unknowns at the nine, shape (9,), with their Jacobians."""
@@ -109,14 +133,14 @@ class Steady:
     def residual(self, unknowns: np.ndarray) -> np.ndarray:
         """Evaluate the 21 equations and the normalisation of the speeds, shape (22,)."""
         out, function = np.empty(kernel.UNKNOWNS), self.surface.function.real
-        kernel.steady_residual(unknowns, function, self.surface.parameters, constants(self.bicycle), out)
+        kernel.steady_residual(unknowns, function, self.surface.parameters, constants(self.bicycle, self.inputs), out)
         return out
 
     def jacobian(self, unknowns: np.ndarray) -> np.ndarray:
         """Evaluate the Jacobian of `residual`, shape (22, 22), rank 21: power balance makes one equation redundant."""
         out = np.empty((kernel.UNKNOWNS, kernel.UNKNOWNS))
         function = self.surface.function.complex
-        kernel.steady_jacobian(unknowns, function, self.surface.parameters, constants(self.bicycle), out)
+        kernel.steady_jacobian(unknowns, function, self.surface.parameters, constants(self.bicycle, self.inputs), out)
         return out
 
     def motion(self, unknowns: np.ndarray) -> CircularMotion:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .bicycle import Bicycle
+from .inputs import NO_INPUTS, Inputs
 from .kernels import dynamics as kernel
 from .kinematics import LEAN, REAR_ANGLE, STEER, constants
 from .surface import Surface, evaluate
@@ -51,7 +52,7 @@ def contact_parameters(bicycle: Bicycle, surface: Surface, q: np.ndarray) -> np.
     return p
 
 
-def dynamics(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> Dynamics:
+def dynamics(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, inputs: Inputs = NO_INPUTS) -> Dynamics:
     """Compute the accelerations and contact forces of a state that satisfies the constraints.
 
     Parameters
@@ -60,6 +61,7 @@ def dynamics(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) 
     surface : Surface
     q, qd : ndarray, shape (9,)
         Generalised coordinates and rates.
+    inputs : Inputs
 
     Returns
     -------
@@ -73,7 +75,7 @@ def dynamics(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) 
     p = contact_parameters(bicycle, surface, q)
     qdd, force, rate = np.empty(9), np.empty(6), np.empty(6)
     function, parameters = surface.function.real, surface.parameters
-    kernel.accelerations(q, qd, p, function, parameters, constants(bicycle), qdd, force, rate)
+    kernel.accelerations(q, qd, p, function, parameters, constants(bicycle, inputs), qdd, force, rate)
     return Dynamics(qdd, force.reshape(2, 3), p.reshape(2, 3), rate.reshape(2, 3))
 
 
@@ -85,7 +87,14 @@ def mass_matrix(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
 
 
 def residual(
-    bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, p: np.ndarray, force: np.ndarray
+    bicycle: Bicycle,
+    surface: Surface,
+    q: np.ndarray,
+    qd: np.ndarray,
+    qdd: np.ndarray,
+    p: np.ndarray,
+    force: np.ndarray,
+    inputs: Inputs = NO_INPUTS,
 ) -> np.ndarray:
     """Compute the residual of all 21 equations (Eq. 8).
 
@@ -99,6 +108,7 @@ def residual(
         Contact parameters of the rear wheel, then of the front wheel.
     force : ndarray, shape (6,)
         Contact forces on the rear wheel, then on the front wheel, in inertial axes [N].
+    inputs : Inputs
 
     Returns
     -------
@@ -108,7 +118,7 @@ def residual(
     """
     out = np.empty(21, q.dtype)
     function = surface.function.complex if np.iscomplexobj(q) else surface.function.real
-    kernel.residual(q, qd, qdd, p, force, function, surface.parameters, constants(bicycle), out)
+    kernel.residual(q, qd, qdd, p, force, function, surface.parameters, constants(bicycle, inputs), out)
     return out
 
 

@@ -43,6 +43,7 @@ from .continuation import (
     roots_along,
 )
 from .curve import sample_curve
+from .inputs import NO_INPUTS, Inputs
 from .kernels.steady import STANDING, direction
 from .search import describe_search, guesses_at, is_on_curve, search_starts
 from .standing import require_standing, stands
@@ -165,7 +166,7 @@ def trace_from(start: Anchor, longest: float = LONGEST_STEP) -> Family:
 
 
 def trace_all(
-    bicycle: Bicycle, surface: SurfaceOfRevolution, longest: float = LONGEST_STEP
+    bicycle: Bicycle, surface: SurfaceOfRevolution, longest: float = LONGEST_STEP, inputs: Inputs = NO_INPUTS
 ) -> tuple[list[Family], dict[int, str]]:
     """Follow every curve of circular motions that is found: those of the families, and those without a number.
 
@@ -175,6 +176,8 @@ def trace_all(
     surface : SurfaceOfRevolution
     longest : float
         Longest step of the arc.
+    inputs : Inputs
+        With a steer torque no curve has a number: the families are numbered by hands-free motions.
 
     Returns
     -------
@@ -182,9 +185,25 @@ def trace_all(
         Each once: the curves of `trace_families`, then those of `search_curves`.
     absent : dict
         Reasons why families have no curve, by the family's number.
+
+    Raises
+    ------
+    ValueError
+        If there is a torque on the rear wheel, with which there is no circular motion.
     """
+    equations = Steady(bicycle, surface, inputs)
+    if inputs.steer_torque != 0:
+        absent = dict.fromkeys(FAMILIES, _explain_numbers(inputs))
+        return search_curves(bicycle, surface, [], longest, inputs), absent
     curves, absent = trace_families(bicycle, surface, longest)
-    return [*curves, *search_curves(bicycle, surface, curves, longest)], absent
+    curves += search_curves(bicycle, surface, curves, longest)
+    # Damping changes the eigenvalues of the motions, not the curves.
+    return [replace(curve, equations=equations) for curve in curves], absent
+
+
+def _explain_numbers(inputs: Inputs) -> str:
+    """Explain why no family of motions under a steer torque has a number."""
+    return f"families are numbered by their hands-free motions; with {inputs.describe()} no curve has a number"
 
 
 def trace_families(
@@ -228,7 +247,11 @@ def trace_families(
 
 
 def search_curves(
-    bicycle: Bicycle, surface: SurfaceOfRevolution, families: Sequence[Family], longest: float = LONGEST_STEP
+    bicycle: Bicycle,
+    surface: SurfaceOfRevolution,
+    families: Sequence[Family],
+    longest: float = LONGEST_STEP,
+    inputs: Inputs = NO_INPUTS,
 ) -> list[Family]:
     """Search for the curves without a number on which both wheels are pushed somewhere.
 
@@ -237,9 +260,10 @@ def search_curves(
     bicycle : Bicycle
     surface : SurfaceOfRevolution
     families : sequence of Family
-        The curves of `trace_families`.
+        The curves of `trace_families`; with a steer torque there are none.
     longest : float
         Longest step of the arc.
+    inputs : Inputs
 
     Returns
     -------
@@ -247,10 +271,10 @@ def search_curves(
         Each once, in the order of `velodrome.reference.search.search_starts`.
     """
     found: list[Family] = []
-    for start in search_starts(bicycle, surface):
+    for start in search_starts(bicycle, surface, inputs):
         known = [*families, *found]
         if not any(is_on_curve(curve.equations, curve.points, start) for curve in known):
-            curve = trace_from(_searched_anchor(Steady(bicycle, surface), start), longest)
+            curve = trace_from(_searched_anchor(Steady(bicycle, surface, inputs), start), longest)
             # A followed curve may have ended a step before a motion that lies on it.
             if not any(_is_part_of(other, curve) for other in known) and _is_ridden_somewhere(curve):
                 found.append(curve)
@@ -338,8 +362,9 @@ def _follow_families(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Sequence
 
 
 @lru_cache(maxsize=8)
-def _follow_other_curves(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Sequence[Family]:
-    return search_curves(bicycle, surface, _follow_families(bicycle, surface))  # type: ignore[arg-type]
+def _follow_other_curves(bicycle: Bicycle, surface: SurfaceOfRevolution, inputs: Inputs) -> Sequence[Family]:
+    families = _follow_families(bicycle, surface) if inputs == NO_INPUTS else []  # type: ignore[arg-type]
+    return search_curves(bicycle, surface, families, inputs=inputs)
 
 
 def find_motions(bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, rear_rate: float) -> list[CircularMotion]:
@@ -408,6 +433,7 @@ def find_motion(
     rear_rate: float,
     family: int | None = None,
     near: tuple[float, float] | None = None,
+    inputs: Inputs = NO_INPUTS,
 ) -> tuple[int | None, CircularMotion]:
     """Find one circular motion by its family, by angles near to it, or by both.
 
@@ -422,6 +448,8 @@ def find_motion(
     near : tuple of float, optional
         Lean and steer [rad]. The nearest of all solutions (of the family, if given) is returned. Without ``family``
         it may be on a curve that has no number.
+    inputs : Inputs
+        Held constant. With a steer torque no curve has a number.
 
     Returns
     -------
@@ -434,6 +462,8 @@ def find_motion(
     ValueError
         If there is no such motion, an argument is invalid, or a rim of the motion lies inside the ground.
     """
+    Steady(bicycle, surface, inputs)  # refuses inputs with which there is no circular motion
+    held = Inputs(steer_torque=inputs.steer_torque)  # damping acts in no circular motion
     if not (np.isfinite(rear_rate) and rear_rate > 0):
         raise ValueError(f"rear rate is {rear_rate!r}; it must be a positive number of rad/s")
     if family is None and near is None:
@@ -442,15 +472,20 @@ def find_motion(
         raise ValueError(f"family is {family!r}; it must be 1, 2, 3 or 4")
     if near is not None and not np.all(np.isfinite(near)):
         raise ValueError(f"near is {near!r}; it must be two finite angles, lean and steer in rad")
+    if family is not None and held != NO_INPUTS:
+        raise ValueError(f"{_explain_numbers(held)}; give the lean and steer that the motion is near to, and no family")
     found: list[tuple[int | None, CircularMotion]] = []
     failures = []
-    for number in FAMILIES if family is None else (family,):
+    numbers = FAMILIES if held == NO_INPUTS else ()
+    for number in numbers if family is None else (family,):
         try:
             met = _yield_motions(bicycle, surface, number, rear_rate)
             found += [(number, motion) for motion in (islice(met, 1) if near is None else met)]
         except ValueError as error:
             failures.append(f"family {number}: {error}")
     wanted = f"rear rate {rear_rate!r} rad/s on {surface}"
+    if held != NO_INPUTS:
+        wanted += f" under {held.describe()}"
     if near is None:
         if not found:
             reason = "; ".join(failures) or "its curves, as followed from their anchors, do not reach it"
@@ -462,12 +497,13 @@ def find_motion(
         return float(np.hypot(item[1].lean - near[0], item[1].steer - near[1]))
 
     if family is None:
-        found += _motions_from(bicycle, surface, rear_rate, near, [motion for _, motion in found])
+        found += _motions_from(Steady(bicycle, surface, held), rear_rate, near, [motion for _, motion in found])
         if all(distance(item) > _MEANT for item in found):
-            found += _motions_without_number(bicycle, surface, rear_rate)
+            found += _motions_without_number(Steady(bicycle, surface, held), rear_rate)
     nearest = min(found, key=distance, default=None)
     if nearest is None or distance(nearest) > _NEAR_ENOUGH:
-        searched = "Newton's method from there, the curves of the families, and " + describe_search()
+        curves = "the curves of the families, and " if numbers else "and "
+        searched = f"Newton's method from there, {curves}{describe_search(held)}"
         if family is not None:
             searched = f"the curves of family {family}"
         place = "" if nearest is None else f"; the nearest is at {nearest[1].lean:.6g}, {nearest[1].steer:.6g}"
@@ -481,15 +517,11 @@ def find_motion(
 
 
 def _motions_from(
-    bicycle: Bicycle,
-    surface: SurfaceOfRevolution,
-    rear_rate: float,
-    near: tuple[float, float],
-    known: Sequence[CircularMotion],
+    equations: Steady, rear_rate: float, near: tuple[float, float], known: Sequence[CircularMotion]
 ) -> Iterator[tuple[None, CircularMotion]]:
     """Yield motions of a rear rate that Newton's method finds from two angles, other than the known ones."""
-    equations, condition = Steady(bicycle, surface), rear_rate_condition(rear_rate)
-    for guess in guesses_at(bicycle, surface, *near):
+    condition = rear_rate_condition(rear_rate)
+    for guess in guesses_at(equations.bicycle, equations.surface, *near, equations.inputs):
         try:
             unknowns, _ = newton(equations, guess, condition, most=25)
             motion = equations.motion(unknowns)
@@ -499,11 +531,10 @@ def _motions_from(
             yield None, motion
 
 
-def _motions_without_number(
-    bicycle: Bicycle, surface: SurfaceOfRevolution, rear_rate: float
-) -> Iterator[tuple[None, CircularMotion]]:
+def _motions_without_number(equations: Steady, rear_rate: float) -> Iterator[tuple[None, CircularMotion]]:
     """Yield motions of a rear rate on the curves without a number."""
-    for curve in _follow_other_curves(bicycle, surface):  # type: ignore[arg-type]
+    where = equations.bicycle, equations.surface, equations.inputs
+    for curve in _follow_other_curves(*where):  # type: ignore[arg-type]
         for motion in _append_new_motions([], curve.equations, curve.points, rear_rate):
             yield None, motion
 

@@ -9,6 +9,7 @@ from typing import TypeVar, cast
 import numpy as np
 
 from .bicycle import BODIES, Bicycle
+from .inputs import NO_INPUTS, Inputs
 from .kernels import kinematics as kernel
 
 COORDINATES = ("x", "y", "z", "yaw", "lean", "pitch", "steer", "rear_angle", "front_angle")
@@ -17,8 +18,8 @@ WHEELS = ("rear", "front")
 
 
 @lru_cache(maxsize=64)
-def constants(bicycle: Bicycle) -> kernel.Constants:
-    """Combine the bodies into a rear and a front assembly about D and return the kernels' constants."""
+def constants(bicycle: Bicycle, inputs: Inputs = NO_INPUTS) -> kernel.Constants:
+    """Combine the bodies into a rear and a front assembly about D; return the kernels' constants with the inputs."""
     origin = bicycle.reference_point
 
     def assembly(frame: str, wheel: str) -> tuple[float, np.ndarray, np.ndarray]:
@@ -58,6 +59,9 @@ def constants(bicycle: Bicycle) -> kernel.Constants:
         "front_radius": bicycle.front_wheel_radius,
         "sin_tilt": np.sin(bicycle.steer_axis_tilt),
         "cos_tilt": np.cos(bicycle.steer_axis_tilt),
+        "steer_torque": inputs.steer_torque,
+        "rear_wheel_torque": inputs.rear_wheel_torque,
+        "steer_damping": inputs.steer_damping,
     }
     return kernel.Constants(**{name: float(value) for name, value in parameters.items()})
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -61,7 +62,7 @@ def _identify_at_anchor(family: Family) -> tuple[int, np.ndarray] | None:
     bicycle, surface = equations.bicycle, equations.surface
     try:
         here = anchor(bicycle, Plane(), family.number, rate)
-        named = _identify_modes(*_sample_anchor(here))
+        named = _identify_modes(*_sample_anchor(here, equations))
         for k in range(0 if is_level(surface) else _STEPS):
             between = [k / _STEPS, (k + 1) / _STEPS]
             here = next_anchor(
@@ -70,15 +71,16 @@ def _identify_at_anchor(family: Family) -> tuple[int, np.ndarray] | None:
                 rate,
                 here.unknowns,
             )
-            named = _order_like(named, _sample_anchor(here)[0])
+            named = _order_like(named, _sample_anchor(here, equations)[0])
     except ValueError:
         return None
     met = [k for k, point in enumerate(family.points) if here.is_same_as(point.unknowns)]
     return (met[0], named) if met else None
 
 
-def _sample_anchor(here: Anchor) -> tuple[np.ndarray, float]:
-    seen = sample_curve(here.equations, here.unknowns[None])
+def _sample_anchor(here: Anchor, equations: Steady) -> tuple[np.ndarray, float]:
+    """Return the eigenvalues and the yaw rate at an anchor, with the inputs of a family's equations."""
+    seen = sample_curve(replace(here.equations, inputs=equations.inputs), here.unknowns[None])
     return seen.eigenvalues[0], float(seen.yaw_rate[0])
 
 

@@ -35,57 +35,71 @@ from .circular import (
     unknown_condition,
 )
 from .continuation import Point, metric, tangent
+from .inputs import NO_INPUTS, Inputs
 from .kernels import curve as kernel
 from .surface import SurfaceOfRevolution, evaluate, is_level
 
-# Leans against the ground and steers of the starts [rad]. With left and right exchanged a motion has a steer in
-# (0, pi); a steer of 0 or pi belongs to straight motion.
+# Leans against the ground and steers of the starts [rad]. With left and right exchanged a hands-free motion has a steer
+# in (0, pi); a steer of 0 or pi belongs to straight motion. A steer torque tells left from right: with it, the starts
+# have steers of either sign.
 LEANS, STEERS = np.linspace(-1.5, 1.5, 16), np.pi * (np.arange(12) + 0.5) / 12
 _STATIC = 1e-12  # squared speed, of order one, of a static equilibrium: round-off
 _MOST = 15  # Gauss-Newton steps: from the grid, what converges takes six or so
 _NEAR = 0.4  # distance, in the arclength's metric, within which a start may lie on a segment of a followed curve
 
 
-def describe_search() -> str:
+def describe_search(inputs: Inputs = NO_INPUTS) -> str:
     """Describe the starts in words."""
+    least = "0" if inputs.steer_torque == 0 else "-pi"
     return (
         f"Gauss-Newton steps, to the nearest motion and to a static equilibrium, from {len(LEANS)} leans of "
-        f"{LEANS[0]:g} to {LEANS[-1]:g} rad against the ground and {len(STEERS)} steers between 0 and pi, and the "
+        f"{LEANS[0]:g} to {LEANS[-1]:g} rad against the ground and {len(_starting_steers(inputs))} steers "
+        f"between {least} and pi, and the "
         "whole curves through what they lead to"
     )
 
 
-def search_starts(bicycle: Bicycle, surface: SurfaceOfRevolution) -> Iterator[Point]:
+def search_starts(bicycle: Bicycle, surface: SurfaceOfRevolution, inputs: Inputs = NO_INPUTS) -> Iterator[Point]:
     """Find circular motions from the grid of angles, turning to the left, many of them on the same curve.
+
+    A motion that turns to the left with its rear wheel rolling backward is, run the other way, one that turns to the
+    right and rolls forward.
 
     Parameters
     ----------
     bicycle : Bicycle
     surface : SurfaceOfRevolution
+    inputs : Inputs
 
     Yields
     ------
     Point
         In the order of the grid, steers outermost; the tangents have either sign.
     """
-    equations = Steady(bicycle, surface)
-    for steer in STEERS:
+    equations = Steady(bicycle, surface, inputs)
+    for steer in _starting_steers(inputs):
         for lean in LEANS:
-            for guess in guesses_at(bicycle, surface, float(lean), float(steer)):
+            for guess in guesses_at(bicycle, surface, float(lean), float(steer), inputs):
                 for condition in (nearest_condition(), unknown_condition(SIGMA, 0.0)):
                     found = _solve(equations, guess, condition)
                     if found is not None:
                         yield Point(found, tangent(equations, found))
 
 
-def guesses_at(bicycle: Bicycle, surface: SurfaceOfRevolution, lean: float, steer: float) -> Iterator[np.ndarray]:
+def _starting_steers(inputs: Inputs) -> np.ndarray:
+    return STEERS if inputs.steer_torque == 0 else np.concatenate([-STEERS[::-1], STEERS])
+
+
+def guesses_at(
+    bicycle: Bicycle, surface: SurfaceOfRevolution, lean: float, steer: float, inputs: Inputs = NO_INPUTS
+) -> Iterator[np.ndarray]:
     """Guess the unknowns (22,) of circular motions at a lean against the ground and a steer.
 
     On a bowl the plane's solution is turned into the tangent plane at every radius where the circle around the axis
     has the curvature of the plane's circle.
     """
     try:
-        level = start_on_plane(bicycle, lean, steer)
+        level = start_on_plane(bicycle, lean, steer, inputs)
     except ValueError:
         return
     level = as_solved(level)
@@ -141,7 +155,8 @@ def _solve(equations: Steady, guess: np.ndarray, condition: Callable[[np.ndarray
     except ValueError:
         return None
     found[[LEAN, PITCH, STEER]] = (found[[LEAN, PITCH, STEER]] + np.pi) % (2 * np.pi) - np.pi
-    possible = found[SIGMA] > -_STATIC and 0 < found[STEER] < np.pi and above_ground(equations, found)
+    least = 0.0 if equations.inputs.steer_torque == 0 else -np.pi
+    possible = found[SIGMA] > -_STATIC and least < found[STEER] < np.pi and above_ground(equations, found)
     return as_solved(found) if possible else None
 
 

@@ -35,7 +35,7 @@ class SectionEnd:
 def linearise_point(equations: Steady, point: Point) -> tuple[CircularMotion, Linearisation]:
     """Return the motion and the reduced linear system at a point of a family."""
     motion = equations.motion(point.unknowns)
-    return motion, linearise(equations.bicycle, equations.surface, *motion.state())
+    return motion, linearise(equations.bicycle, equations.surface, *motion.state(), equations.inputs)
 
 
 def growth_along(equations: Steady, point: Point) -> float:

@@ -10,6 +10,7 @@ from scipy.integrate import DOP853
 
 from .bicycle import Bicycle
 from .dae import contact_parameters
+from .inputs import NO_INPUTS, Inputs
 from .kernels import integrate as kernel
 from .kinematics import WHEELS, constants
 from .rim import bicycle_rim_search, require_clear_rims, second_touch
@@ -59,6 +60,7 @@ class PreciseMotion:
 def _make_motion(
     bicycle: Bicycle,
     surface: Surface,
+    inputs: Inputs,
     times: np.ndarray,
     rows: np.ndarray,
     steps: int,
@@ -68,7 +70,7 @@ def _make_motion(
     n = len(rows)
     q, qd, p = (np.ascontiguousarray(part) for part in (rows[:, :9], rows[:, 9:18], rows[:, 18:]))
     force = np.empty((n, 6))
-    kernel.contact_forces(rows, surface.function.real, surface.parameters, constants(bicycle), force)
+    kernel.contact_forces(rows, surface.function.real, surface.parameters, constants(bicycle, inputs), force)
     return PreciseMotion(times[:n].copy(), q, qd, p.reshape(n, 2, 3), force.reshape(n, 2, 3), steps, evaluations, ended)
 
 
@@ -80,6 +82,7 @@ def simulate(
     times: np.ndarray,
     tolerance: float = 1e-13,
     progress: Callable[[float], None] | None = None,
+    inputs: Inputs = NO_INPUTS,
 ) -> PreciseMotion:
     """Integrate precisely: Dormand-Prince 8(5,3), adaptive, projected onto all constraints.
 
@@ -98,6 +101,8 @@ def simulate(
         Tolerance of a step's error, relative to 1 + |state|.
     progress : callable, optional
         Called with the time reached.
+    inputs : Inputs
+        Held constant.
 
     Returns
     -------
@@ -128,7 +133,7 @@ def simulate(
             rims,
             surface.function.real,
             surface.parameters,
-            constants(bicycle),
+            constants(bicycle, inputs),
             out,
         )
         steps, evaluations = steps + more, evaluations + count
@@ -140,7 +145,7 @@ def simulate(
     elif status != kernel.DONE:
         why = _describe_edge_of_ground(surface, y[18:]) or "the equations of motion become singular"
         ended = f"no solution beyond t = {t:.6g} s: {why}"
-    return _make_motion(bicycle, surface, times, out[:index], steps, evaluations, ended)
+    return _make_motion(bicycle, surface, inputs, times, out[:index], steps, evaluations, ended)
 
 
 def _describe_edge_of_ground(surface: Surface, contact: np.ndarray) -> str | None:
@@ -154,7 +159,13 @@ def _describe_edge_of_ground(surface: Surface, contact: np.ndarray) -> str | Non
 
 
 def simulate_modified_euler(
-    bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, times: np.ndarray, step: float = 1e-3
+    bicycle: Bicycle,
+    surface: Surface,
+    q: np.ndarray,
+    qd: np.ndarray,
+    times: np.ndarray,
+    step: float = 1e-3,
+    inputs: Inputs = NO_INPUTS,
 ) -> PreciseMotion:
     """Integrate as the paper does (section 4.2): modified Euler method with a fixed step, without projection.
 
@@ -170,6 +181,8 @@ def simulate_modified_euler(
         Output times, a uniform grid from 0 whose spacing is a multiple of ``step`` [s].
     step : float
         Step [s]; the paper's is 1 ms.
+    inputs : Inputs
+        Held constant.
 
     Returns
     -------
@@ -195,7 +208,7 @@ def simulate_modified_euler(
         bicycle_rim_search(bicycle, surface),
         surface.function.real,
         surface.parameters,
-        constants(bicycle),
+        constants(bicycle, inputs),
         out[1:],
     )
     rows += 1
@@ -204,7 +217,8 @@ def simulate_modified_euler(
         ended = second_touch(_TOUCHING_WHEEL[status], reached)
     elif status != kernel.DONE:
         ended = f"the state is no longer finite after t = {times[rows - 1]:.6g} s"
-    return _make_motion(bicycle, surface, times, out[:rows], (rows - 1) * stride, 2 * (rows - 1) * stride, ended)
+    steps = (rows - 1) * stride
+    return _make_motion(bicycle, surface, inputs, times, out[:rows], steps, 2 * steps, ended)
 
 
 def steps_per_output(times: np.ndarray, step: float) -> int:

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 from .bicycle import Bicycle
 from .circular import REAR_SPEED, CircularMotion, Steady
+from .circular import STEER as STEER_UNKNOWN
 from .continuation import Point, metric, roots_along, sign_changes
 from .dae import consistent_state
 from .families import Family, front_rate_slope, rear_rate_slope
@@ -53,11 +54,15 @@ class SpecialPoint:
 
 
 def energy_slope(equations: Steady) -> Callable[[Point], float]:
-    """Make the derivative of the energy along a family of these equations, by the complex step."""
-    c = constants(equations.bicycle)
+    """Make the derivative of the energy along a family of these equations, by the complex step.
+
+    The potential -torque x steer of a steer torque is part of it, as it is of what a ride conserves.
+    """
+    c, torque = constants(equations.bicycle), equations.inputs.steer_torque
 
     def slope(point: Point) -> float:
-        return float(steady_energy(point.unknowns + 1j * STEP * point.tangent, c).imag / STEP)
+        change = float(steady_energy(point.unknowns + 1j * STEP * point.tangent, c).imag / STEP)
+        return change - torque * float(point.tangent[STEER_UNKNOWN])
 
     return slope
 

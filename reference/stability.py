@@ -8,6 +8,7 @@ import numpy as np
 
 from .bicycle import Bicycle
 from .dae import contact_parameters
+from .inputs import NO_INPUTS, Inputs
 from .kernels import reduced as kernel
 from .kernels.dynamics import settle
 from .kernels.pose import aligned
@@ -56,7 +57,9 @@ def independent(q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     return np.stack([*columns, qd[..., LEAN], qd[..., STEER], qd[..., REAR_ANGLE]], axis=-1)
 
 
-def linearise(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> Linearisation:
+def linearise(
+    bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, inputs: Inputs = NO_INPUTS
+) -> Linearisation:
     """Linearise the reduced equations at a state on the constraints.
 
     Derivatives are taken by the complex step and are exact to round-off.
@@ -68,6 +71,8 @@ def linearise(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray)
         A surface of revolution about z, or a plane: X does not depend on the heading.
     q, qd : ndarray, shape (9,)
         Coordinates and rates.
+    inputs : Inputs
+        Held constant.
 
     Returns
     -------
@@ -80,7 +85,7 @@ def linearise(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray)
     """
     x, y = independent(q, qd)[:2]
     turned = np.concatenate([[x, y, q[2], 0.0], q[LEAN:]])
-    p, c, parameters = contact_parameters(bicycle, surface, turned), constants(bicycle), surface.parameters
+    p, c, parameters = contact_parameters(bicycle, surface, turned), constants(bicycle, inputs), surface.parameters
     found = settle(turned, p, surface.function.real, parameters, c)
     state, field, jacobian = np.concatenate([turned, qd, p]), np.empty(7), np.empty((7, 7))
     spin = kernel.telling_spin(qd[REAR_ANGLE], qd[FRONT_ANGLE])

@@ -2,14 +2,14 @@
 
 With lean to the right phi, steer to the right delta and forward speed v they read
 
-    M q'' + v C1 q' + (g K0 + v^2 K2) q = f,    q = (phi, delta),
+    M q'' + (v C1 + diag(0, c)) q' + (g K0 + v^2 K2) q = f,    q = (phi, delta),
 
 with the canonical matrices of Meijaard, Papadopoulos, Ruina and Schwab (2007), "Linearized dynamics equations for the
-balance and steer of a bicycle: a benchmark and review", Eq. (5.3) and Appendix A.
+balance and steer of a bicycle: a benchmark and review", Eq. (5.3) and Appendix A, and steer damping c.
 
 The characteristic polynomial a4 s^4 + a3 s^3 + a2 s^2 + a1 s + a0 has coefficients that are polynomials of the speed.
 A real eigenvalue is zero where a0 = 0, and a pair lies on the imaginary axis where
-a1 a2 a3 - a4 a1^2 - a0 a3^2 = 0 with a1 / a3 > 0. Both are quadratic equations in v^2, so the speeds at which
+a1 a2 a3 - a4 a1^2 - a0 a3^2 = 0 with a1 / a3 > 0. Both are polynomial equations in v, so the speeds at which
 stability changes are solved and not sampled.
 """
 
@@ -49,6 +49,8 @@ class CanonicalMatrices:
         Stiffness matrix divided by the squared speed [kg].
     gravity : float
         [m/s^2].
+    steer_damping : float
+        Coefficient c of the torque -c times the steer rate [N m s/rad]; no part of the published matrices.
     """
 
     M: np.ndarray
@@ -56,6 +58,7 @@ class CanonicalMatrices:
     K0: np.ndarray
     K2: np.ndarray
     gravity: float
+    steer_damping: float = 0.0
 
     def eigenvalues(self, speeds: Any) -> np.ndarray:
         """Return the four eigenvalues at forward speeds.
@@ -81,7 +84,7 @@ class CanonicalMatrices:
         blocks = np.zeros((speeds.shape[0], 4, 4))
         blocks[:, :2, 2:] = np.eye(2)
         blocks[:, 2:, :2] = -np.linalg.solve(self.M, self.gravity * self.K0 + speeds**2 * self.K2)
-        blocks[:, 2:, 2:] = -np.linalg.solve(self.M, speeds * self.C1)
+        blocks[:, 2:, 2:] = -np.linalg.solve(self.M, speeds * self.C1 + np.diag([0.0, self.steer_damping]))
         values = np.linalg.eigvals(blocks).astype(complex)
         return np.take_along_axis(values, np.lexsort((np.imag(values), np.real(values)), axis=-1), axis=-1)
 
@@ -105,18 +108,20 @@ class StabilityChange:
     stabilises: bool
 
 
-def canonical_matrices(bicycle: Bicycle) -> CanonicalMatrices:
+def canonical_matrices(bicycle: Bicycle, steer_damping: float = 0.0) -> CanonicalMatrices:
     """Compute the canonical matrices of a bicycle (Meijaard et al. 2007, Eqs. A1-A20).
 
     Parameters
     ----------
     bicycle : Bicycle
+    steer_damping : float
+        [N m s/rad].
 
     Returns
     -------
     CanonicalMatrices
     """
-    return CanonicalMatrices(*_matrices(_values(bicycle)), gravity=bicycle.gravity)
+    return CanonicalMatrices(*_matrices(_values(bicycle)), gravity=bicycle.gravity, steer_damping=steer_damping)
 
 
 def stability_changes(matrices: CanonicalMatrices) -> list[StabilityChange]:
@@ -176,7 +181,9 @@ def _first(matrices: CanonicalMatrices, mode: str, stabilises: bool) -> float | 
     return speeds[0] if speeds else None
 
 
-def speed_deviations(bicycle: Bicycle, uncertainties: Mapping[str, float]) -> dict[str, float | None]:
+def speed_deviations(
+    bicycle: Bicycle, uncertainties: Mapping[str, float], steer_damping: float = 0.0
+) -> dict[str, float | None]:
     """Compute the standard deviations of weave and capsize speed from those of the parameters, to first order.
 
     Parameters
@@ -184,13 +191,15 @@ def speed_deviations(bicycle: Bicycle, uncertainties: Mapping[str, float]) -> di
     bicycle : Bicycle
     uncertainties : mapping
         Name of a parameter to its standard deviation; parameters are taken as independent.
+    steer_damping : float
+        [N m s/rad].
 
     Returns
     -------
     dict
         ``weave`` and ``capsize`` to the deviation [m/s], None where there is no such speed.
     """
-    values, matrices = _values(bicycle), canonical_matrices(bicycle)
+    values, matrices = _values(bicycle), canonical_matrices(bicycle, steer_damping)
     found: dict[str, float | None] = {}
     for mode, place, speed in (("capsize", 0, capsize_speed(matrices)), ("weave", 1, weave_speed(matrices))):
         if speed is None:
@@ -199,11 +208,11 @@ def speed_deviations(bicycle: Bicycle, uncertainties: Mapping[str, float]) -> di
         variance = 0.0
         for name, deviation in uncertainties.items():
             moved = values | {name: values[name] + 1j * _COMPLEX_STEP}
-            perturbed = CanonicalMatrices(*_matrices(moved), gravity=moved["gravity"])
+            perturbed = CanonicalMatrices(*_matrices(moved), moved["gravity"], steer_damping)
             polynomial = _boundary_polynomials(perturbed)[place]
-            # d(v^2) = -(dP/dp) / (dP/d(v^2)), at the root.
-            change = np.polyval(polynomial, speed**2).imag / _COMPLEX_STEP
-            slope = -change / np.polyval(np.polyder(np.real(polynomial)), speed**2) / (2 * speed)
+            # dv = -(dP/dp) / (dP/dv), at the root.
+            change = np.polyval(polynomial, speed).imag / _COMPLEX_STEP
+            slope = -change / np.polyval(np.polyder(np.real(polynomial)), speed)
             variance += float(slope * deviation) ** 2
         found[mode] = variance**0.5
     return found
@@ -313,38 +322,41 @@ def _mixed(a: np.ndarray, b: np.ndarray) -> Any:
     return a[0, 0] * b[1, 1] + a[1, 1] * b[0, 0] - a[0, 1] * b[1, 0] - a[1, 0] * b[0, 1]
 
 
-def _coefficients(m: CanonicalMatrices) -> tuple[Any, Any, np.ndarray, np.ndarray, np.ndarray]:
-    """Return a4, a3 / v, a2, a1 / v and a0 of the characteristic polynomial; arrays are polynomials of v^2.
+def _coefficients(m: CanonicalMatrices) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return a4, a3, a2, a1 and a0 of the characteristic polynomial; arrays are polynomials of the speed.
 
     Their highest power comes first.
     """
-    stiff = m.gravity * m.K0
-    a2 = np.array([_mixed(m.M, m.K2) + _mixed(m.C1, m.C1) / 2, _mixed(m.M, stiff)])
-    a1 = np.array([_mixed(m.C1, m.K2), _mixed(m.C1, stiff)])
-    a0 = np.array([_mixed(m.K2, m.K2) / 2, _mixed(m.K2, stiff), _mixed(stiff, stiff) / 2])
-    return _mixed(m.M, m.M) / 2, _mixed(m.M, m.C1), a2, a1, a0
+    stiff, damped = m.gravity * m.K0, np.diag([0.0, m.steer_damping])
+    a3 = np.array([_mixed(m.M, m.C1), _mixed(m.M, damped)])
+    a2 = np.array([_mixed(m.M, m.K2) + _mixed(m.C1, m.C1) / 2, _mixed(m.C1, damped), _mixed(m.M, stiff)])
+    a1 = np.array([_mixed(m.C1, m.K2), _mixed(damped, m.K2), _mixed(m.C1, stiff), _mixed(damped, stiff)])
+    zero = 0 * a3[0]
+    a0 = np.array([_mixed(m.K2, m.K2) / 2, zero, _mixed(m.K2, stiff), zero, _mixed(stiff, stiff) / 2])
+    return _mixed(m.M, m.M) / 2, a3, a2, a1, a0
 
 
 def _boundary_polynomials(m: CanonicalMatrices) -> tuple[np.ndarray, np.ndarray]:
-    """Return the polynomials of v^2 that vanish with an eigenvalue and with the sum of a pair of eigenvalues.
+    """Return the polynomials of the speed that vanish with an eigenvalue and with the sum of a pair of eigenvalues.
 
-    They are a0 and (a1 a2 a3 - a4 a1^2 - a0 a3^2) / v^2.
+    They are a0 and a1 a2 a3 - a4 a1^2 - a0 a3^2.
     """
     a4, a3, a2, a1, a0 = _coefficients(m)
-    return a0, np.polysub(np.polysub(a3 * np.polymul(a2, a1), a4 * np.polymul(a1, a1)), a3**2 * a0)
+    sum_of_pair = np.polysub(np.polymul(a3, np.polymul(a2, a1)), a4 * np.polymul(a1, a1))
+    return a0, np.polysub(sum_of_pair, np.polymul(np.polymul(a3, a3), a0))
 
 
 def _crossings(polynomial: np.ndarray) -> list[float]:
-    """Return the speeds at which a polynomial of v^2 changes its sign."""
+    """Return the positive speeds at which a polynomial of the speed changes its sign."""
     found = []
     for root in np.roots(polynomial):
-        square = float(root.real)
-        if square <= 0 or abs(root.imag) > _REAL * abs(root):
+        speed = float(root.real)
+        if speed <= 0 or abs(root.imag) > _REAL * abs(root):
             continue
         # At a double root the sign does not change: the slope is round-off of its terms.
-        slope = np.polyval(np.polyder(polynomial), square)
-        if abs(slope) * square > _REAL * np.polyval(np.abs(polynomial), square):
-            found.append(square**0.5)
+        slope = np.polyval(np.polyder(polynomial), speed)
+        if abs(slope) * speed > _REAL * np.polyval(np.abs(polynomial), speed):
+            found.append(speed)
     return found
 
 
@@ -353,18 +365,15 @@ def _growth_slope(m: CanonicalMatrices, mode: str, speed: float) -> float | None
 
     None if the pair whose sum vanishes is not on the imaginary axis but real, of opposite signs.
     """
-    a4, a3, a2, a1, a0 = _coefficients(m)
-    square = speed**2
+    a4, *lower = _coefficients(m)
+    a3, a2, a1, _ = (float(np.polyval(a, speed)) for a in lower)
     root: complex = 0.0
     if mode == "weave":
-        squared_frequency = np.polyval(a1, square) / a3
+        squared_frequency = a1 / a3
         if squared_frequency <= 0:
             return None
         root = 1j * squared_frequency**0.5
-    # Of p(s, v) = a4 s^4 + a3 v s^3 + a2 s^2 + a1 v s + a0: ds/dv = -(dp/dv) / (dp/ds).
-    by_root = 4 * a4 * root**3 + 3 * a3 * speed * root**2 + 2 * np.polyval(a2, square) * root
-    by_root += np.polyval(a1, square) * speed
-    by_speed = a3 * root**3 + np.polyval(np.polyder(a2), square) * 2 * speed * root**2
-    by_speed += (np.polyval(a1, square) + np.polyval(np.polyder(a1), square) * 2 * square) * root
-    by_speed += np.polyval(np.polyder(a0), square) * 2 * speed
+    # Of p(s, v) = a4 s^4 + a3 s^3 + a2 s^2 + a1 s + a0: ds/dv = -(dp/dv) / (dp/ds).
+    by_root = 4 * a4 * root**3 + 3 * a3 * root**2 + 2 * a2 * root + a1
+    by_speed = sum(np.polyval(np.polyder(a), speed) * root**k for a, k in zip(lower, (3, 2, 1, 0), strict=True))
     return float((-by_speed / by_root).real)

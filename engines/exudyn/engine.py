@@ -46,6 +46,7 @@ class ExudynEngine:
     description: str
     put_on_ground: Callable[[], PutOnGround]
     level_only: bool = False
+    takes_inputs = True
     gives = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
 
     @property

@@ -48,7 +48,9 @@ def build_model(problem: Problem, settings: SolverSettings, put_on_ground: PutOn
     container = exu.SystemContainer()
     system = container.AddSystem()
     bodies = _add_bodies(system, problem)
-    _connect_bodies(system, problem.bicycle, problem.q, [body["bodyNumber"] for body in bodies])
+    numbers = [body["bodyNumber"] for body in bodies]
+    _connect_bodies(system, problem.bicycle, problem.q, numbers)
+    _apply_inputs(system, problem, numbers)
     rolling = put_on_ground(system, bodies[2:], problem, settings)
     sensors = tuple(_add_sensors(system, body["bodyNumber"]) for body in bodies)
     system.Assemble()
@@ -91,6 +93,35 @@ def _connect_bodies(system: exu.MainSystem, bicycle: Bicycle, q: np.ndarray, bod
         ([rear_frame, front_frame], q[:3], rotation[0] @ bicycle.steer_axis),
     ):
         system.CreateRevoluteJoint(itemNumbers=pair, position=point, axis=axis, show=False)
+
+
+def _apply_inputs(system: exu.MainSystem, problem: Problem, bodies: list[Any]) -> None:
+    """Add the torques and the steer damping that are not zero, about the hinges' axes at the start."""
+    rear_frame, front_frame, rear_wheel, _ = bodies
+    bicycle, q, inputs = problem.bicycle, problem.q, problem.inputs
+    rotation, position = rotations(bicycle, q[None])[0], body_positions(bicycle, q[None])[0]
+    for pair, point, axis, torque, damping in (
+        (
+            [rear_frame, front_frame],
+            q[:3],
+            rotation[0] @ bicycle.steer_axis,
+            inputs.steer_torque,
+            inputs.steer_damping,
+        ),
+        ([rear_frame, rear_wheel], position[2], rotation[0] @ LEFT_AXIS, inputs.rear_wheel_torque, 0.0),
+    ):
+        if torque == damping == 0:
+            continue
+        system.CreateTorsionalSpringDamper(
+            itemNumbers=pair,
+            position=point,
+            axis=axis,
+            damping=damping / MASS_UNIT,
+            # Like the spring's, the connector's torque resists the rotation of the second body.
+            torque=-torque / MASS_UNIT,
+            unlimitedRotations=False,  # without stiffness the angle itself does not matter
+            show=False,
+        )
 
 
 def _add_sensors(system: exu.MainSystem, body: Any) -> dict[str, Any]:

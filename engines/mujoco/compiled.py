@@ -11,9 +11,10 @@ contact rows prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were ze
 
 `press` does not use MuJoCo's contacts. It solves, for the six force components on two wheels,
 
-    Jp M^-1 Jp^T F = -(Jp a + gamma + s^2 gap n + 2 s v),    M a = passive - bias
+    Jp M^-1 Jp^T F = -(Jp a + gamma + s^2 gap n + 2 s v),    M a = passive - bias + held
 
-and applies Jp^T F. The stabilisation rate s contributes nothing where the constraints hold.
+and applies Jp^T F + held, with ``held`` the generalised forces that were applied when the callback was installed. The
+stabilisation rate s contributes nothing where the constraints hold.
 
 `watch_iterations` only observes: it assesses the solution of MuJoCo's solver when the next evaluation begins, the first
 moment after the solution at which a callback is called (the criterion is in `convergence`). `correct_reference` does
@@ -77,6 +78,7 @@ BLACKBOARD = np.dtype(
         ("qfrc_bias", _ADDRESS),
         ("qfrc_passive", _ADDRESS),
         ("qfrc_applied", _ADDRESS),
+        ("held", _ADDRESS),  # applied forces that `press` adds to those of rolling
         ("qfrc_smooth", _ADDRESS),
         ("qfrc_constraint", _ADDRESS),
         ("M", _ADDRESS),
@@ -527,12 +529,13 @@ def press(model, data):
         return
     n, size = board.speeds, 3 * board.wheels
     applied = _real_array(board.qfrc_applied, n)
-    applied[:] = 0
+    held = _real_array(board.held, n)
+    applied[:] = held
     rows, spread, turning = np.empty((size, n)), np.empty((size, n)), np.empty((3, n))
     force, free, smooth = np.empty(size), np.empty(n), np.empty(n)
     bias, passive = _real_array(board.qfrc_bias, n), _real_array(board.qfrc_passive, n)
     for j in range(n):
-        smooth[j] = passive[j] - bias[j]
+        smooth[j] = passive[j] - bias[j] + held[j]
     _solve_mass(model, data, free.ctypes, smooth.ctypes, types.int32(1))
     s = board.stabilisation
     for k in range(board.wheels):

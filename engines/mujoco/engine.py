@@ -62,6 +62,7 @@ class MujocoEngine(Generic[S]):
     builder: str
     description: str
     gives: tuple[str, ...] = GIVES
+    takes_inputs = True
 
     @property
     def version(self) -> str:

@@ -112,7 +112,8 @@ def rolling_forces(
     """Apply the exact forces of rolling without slip to wheels, in place of MuJoCo's contacts.
 
     The forces are solved from MuJoCo's own mass matrix and bias forces in every evaluation of the dynamics and
-    stored in ``qfrc_applied``. The constraints are bilateral: wheels neither lift off nor slide. Nothing is iterated.
+    stored in ``qfrc_applied``, together with the generalised forces that were there when the block began. The
+    constraints are bilateral: wheels neither lift off nor slide. Nothing is iterated.
 
     Parameters
     ----------
@@ -126,6 +127,8 @@ def rolling_forces(
         _write_blackboard(model, surface, wheels, stabilisation),
         judge_solver(model, data, WRONG) as convergence,
     ):
+        held = data.qfrc_applied.copy()
+        compiled.board[0]["held"] = held.ctypes.data
         yield convergence
 
 

@@ -50,8 +50,10 @@ def _add_body(parent: Element, bicycle: Bicycle, name: str, carrier: np.ndarray,
     return body
 
 
-def _add_hinge(body: Element, name: str, axis: np.ndarray) -> None:
-    SubElement(body, "joint", name=name, type="hinge", axis=_number_text(*axis))
+def _add_hinge(body: Element, name: str, axis: np.ndarray, damping: float = 0.0) -> None:
+    joint = SubElement(body, "joint", name=name, type="hinge", axis=_number_text(*axis))
+    if damping != 0:
+        joint.set("damping", _number_text(damping))
 
 
 def _add_wheel(parent: Element, bicycle: Bicycle, wheel: str, carrier: np.ndarray, touching: Touching) -> None:
@@ -114,7 +116,7 @@ def _add_contact_pairs(root: Element, settings: ContactSettings, planes: dict[st
         )
 
 
-def mjcf(bicycle: Bicycle, settings: StepSettings, touching: Touching) -> str:
+def mjcf(bicycle: Bicycle, settings: StepSettings, touching: Touching, steer_damping: float = 0.0) -> str:
     """Return the model's XML.
 
     Parameters
@@ -123,6 +125,8 @@ def mjcf(bicycle: Bicycle, settings: StepSettings, touching: Touching) -> str:
     settings : StepSettings
         `ContactSettings` where there is contact.
     touching : {"plane", "planes", "edges", "nothing"}
+    steer_damping : float
+        [N m s/rad].
 
     Returns
     -------
@@ -140,7 +144,7 @@ def mjcf(bicycle: Bicycle, settings: StepSettings, touching: Touching) -> str:
     SubElement(rear, "freejoint", name="frame")
     _add_wheel(rear, bicycle, "rear", origin, touching)
     front = _add_body(rear, bicycle, "front_frame", origin, origin)
-    _add_hinge(front, "steer", bicycle.steer_axis)
+    _add_hinge(front, "steer", bicycle.steer_axis, steer_damping)
     _add_wheel(front, bicycle, "front", origin, touching)
     if isinstance(settings, ContactSettings):
         _add_contact_pairs(root, settings, planes, touching)

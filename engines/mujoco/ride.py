@@ -141,7 +141,7 @@ class RideState:
 
 
 def set_start(problem: Problem, settings: StepSettings, touching: Touching) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """Return the model and its state at the start of a problem.
+    """Return the model and its state at the start of a problem, with the problem's torques as applied forces.
 
     Raises
     ------
@@ -149,11 +149,13 @@ def set_start(problem: Problem, settings: StepSettings, touching: Touching) -> t
         If MuJoCo refuses the model.
     """
     try:
-        model = mujoco.MjModel.from_xml_string(mjcf(problem.bicycle, settings, touching))
+        model = mujoco.MjModel.from_xml_string(mjcf(problem.bicycle, settings, touching, problem.inputs.steer_damping))
     except ValueError as error:
         raise EngineError(f"MuJoCo refuses the bicycle: {error}") from error
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = to_mujoco(problem.q, problem.qd)
+    for joint, torque in (("steer", problem.inputs.steer_torque), ("rear_angle", problem.inputs.rear_wheel_torque)):
+        data.qfrc_applied[model.joint(joint).dofadr[0]] = torque
     return model, data
 
 

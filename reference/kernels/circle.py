@@ -11,10 +11,13 @@ z x P, and its material point is at rest there if
 This gives the spins b and c of both wheels for unit yaw rate, and with sigma = w^2 (1 + b^2 + c^2) the
 square of the yaw rate w. At constant rates a_D = -w^2 (x, y, 0), and `reduction` gives the accelerations
 of the bicycle beyond those; they must be zero. They are always orthogonal to the motion itself, in the
-mass matrix's metric, since gravity, inertia and contact forces of a steady turn do no work in it. So two of
-the three independent ones, lean'' and steer'', are enough:
+mass matrix's metric, since gravity, inertia and contact forces of a steady turn do no work in it; nor do a steer
+torque and steer damping, as the steer rate is zero. So two of the three independent ones, lean'' and steer'', are
+enough:
 
     rows            rim point (2), (2) | no side slip (2) | lean'', steer''
+
+A torque on the rear wheel does work where that wheel rolls: with it the rows are sufficient only where b = 0.
 
 Nothing here divides by a speed: static equilibria (sigma = 0, and sigma < 0 beyond) and pivoting motions
 (b = 0) are regular points.
@@ -105,7 +108,8 @@ def _build_turn(u, function, parameters, a):
     moment = combine(square, turned, 1.0, cross(s1, fall))
     moment2 = combine(square, cross(w, spun2), 1.0, cross(s2, fall))
     b = combine(square, cross(w, roll2), -1.0, beta)
-    system = build(here, a, force, add(moment, moment2), moment2[2], 0 * square, b)
+    steer_load = moment2[2] - a.steer_torque
+    system = build(here, a, force, add(moment, moment2), steer_load, a.rear_wheel_torque, 0 * square, b)
     return Turn(here, rear, front, size, force, system)
 
 

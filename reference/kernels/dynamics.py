@@ -12,7 +12,8 @@ rows per wheel), combines the four rolling constraints and the time derivatives 
 time derivative, J qdd + gamma = 0, contains the contact's motion along the rim, ddot = w x d + r adot t.
 
 The equations of motion are  M qdd + h = J^T F,  J qdd + gamma = 0,  with F the force of the ground on
-each wheel in inertial axes: the six Lagrange multipliers.
+each wheel in inertial axes: the six Lagrange multipliers. The generalised forces Q of the inputs
+(`velodrome.reference.inputs`) are part of h as -Q.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def inertia_times(ixx, iyy, izz, ixz, x, y, z, v):
 
 @jit
 def mass_and_bias(q, qd, c, mass, bias):
-    """Fill the mass matrix (9, 9) and the bias forces (9,) of M qdd + h = forces."""
+    """Fill the mass matrix (9, 9) and the bias forces (9,) of M qdd + h = forces; h includes the inputs."""
     a_lean, x_r, y_r, z_r, s, x_h, y_h, z_h = frames(q[3], q[4], q[5], q[6], c)
     w1, w2, b1, b2 = angular_velocities(a_lean, y_r, s, qd[3], qd[4], qd[5], qd[6])
     zero = 0 * q[3]
@@ -88,8 +89,8 @@ def mass_and_bias(q, qd, c, mass, bias):
         bias[i] = force[i]
         bias[3 + i] = dot(axes[i], moment)
     bias[2] += (c.m1 + c.m2) * c.gravity
-    bias[6] = dot(s, t2)
-    bias[7] = c.spin_rear * dot(y_r, b1)
+    bias[6] = dot(s, t2) - (c.steer_torque - c.steer_damping * qd[6])
+    bias[7] = c.spin_rear * dot(y_r, b1) - c.rear_wheel_torque
     bias[8] = c.spin_front * dot(y_h, b2)
 
 

@@ -20,7 +20,7 @@ from .vector import add, combine, cross, scale
 
 
 class Constants(NamedTuple):
-    """The bicycle's constants for the kernels: rear and front assemblies about D, wheels as spins.
+    """The constants of the bicycle and its inputs: rear and front assemblies about D, wheels as spins.
 
     A wheel is symmetric about its axle, so it belongs to its frame as a rigid part (a gyrostat) and
     only its spin relative to the frame is a motion of its own. Suffix 1 is the rear assembly (frame
@@ -53,6 +53,9 @@ class Constants(NamedTuple):
     front_radius: float
     sin_tilt: float
     cos_tilt: float
+    steer_torque: float = 0.0  # inputs, see `velodrome.reference.inputs`
+    rear_wheel_torque: float = 0.0
+    steer_damping: float = 0.0
 
 
 @jit

@@ -19,6 +19,7 @@ contact     the contact point on the surface moves with the rim point, V = v_D +
 
 loads       force    w x (w x S) + mass (g z - beta), S of both assemblies, the front one's + j x S
             moment   w x (I w + spin J axle) + S x (g z - beta), of both, the front one's + I j
+            minus the inputs, steer_torque - steer_damping steer_rate about s and rear_wheel_torque on the rear spin
 
 `reduction` solves for the accelerations.
 """
@@ -89,7 +90,9 @@ def _build_motion(y, function, parameters, a):
     moment = add(cross(w, (spun[0], spun[1] + a.spin_rear * rear_spin, spun[2])), cross(here.s1, fall))
     moment2 = add(add(times(here.i2, j), cross(w2, spun2)), cross(here.s2, fall))
     front_load = a.spin_front * dot(here.left, j)
-    system = build(here, a, force, add(moment, moment2), moment2[2], front_load, subtract(beta2, beta))
+    steer_load = moment2[2] - (a.steer_torque - a.steer_damping * steer)
+    b = subtract(beta2, beta)
+    system = build(here, a, force, add(moment, moment2), steer_load, a.rear_wheel_torque, front_load, b)
     return Motion(here, w, rates, rates2, beta, force, system)
 
 

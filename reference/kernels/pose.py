@@ -37,6 +37,9 @@ class Aligned(NamedTuple):
     front_radius: float
     sin_tilt: float
     cos_tilt: float
+    steer_torque: float
+    rear_wheel_torque: float
+    steer_damping: float
 
 
 @jit
@@ -74,6 +77,9 @@ def aligned(c):
         c.front_radius,
         c.sin_tilt,
         c.cos_tilt,
+        c.steer_torque,
+        c.rear_wheel_torque,
+        c.steer_damping,
     )
 
 

@@ -77,7 +77,7 @@ def _project_rates(y, a):
     slip2 = add(velocity, combine(1.0, cross(w2, front.rho), front.radius * y[17], front.t))
     moment2 = cross(slip, here.s2)
     moment = add(cross(slip, here.s1), moment2)
-    system = build(here, a, scale(-a.mass, slip), moment, moment2[2], zero, subtract(slip2, slip))
+    system = build(here, a, scale(-a.mass, slip), moment, moment2[2], zero, zero, subtract(slip2, slip))
     turn, steer, rear_spin, front_spin = solve(system)
     origin = add(slip, combine(1.0, cross(turn, rear.rho), rear.radius * rear_spin, rear.t))
     change, angles = to_inertial(here, origin), angle_rates(here, turn)

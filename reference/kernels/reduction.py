@@ -53,11 +53,12 @@ class System(NamedTuple):
 
 
 @jit_inline
-def build(here, a, force, moment, steer_load, front_load, b):
+def build(here, a, force, moment, steer_load, rear_torque, front_load, b):
     """Build the `System`.
 
     Loads are those of inertia and weight, at alpha = 0, z = 0 and a_D = -beta: ``force`` and ``moment``
-    about D of the whole bicycle, ``steer_load`` about the steering axis, ``front_load`` about the front axle.
+    about D of the whole bicycle, ``steer_load`` about the steering axis, ``front_load`` about the front axle. The
+    input on the steering is part of ``steer_load``, that on the rear wheel is ``rear_torque``.
     """
     rho, s2, i1, i2 = here.rear.rho, here.s2, here.i1, here.i2
     total = add(here.s1, s2)
@@ -87,7 +88,7 @@ def build(here, a, force, moment, steer_load, front_load, b):
         with_alpha=(with_alpha[0], with_alpha[1] + a.spin_rear, with_alpha[2]),
         with_steer=-dot(swing, roll),
         inertia=a.spin_rear + a.mass * a.rear_radius * a.rear_radius,
-        load=-dot(roll, force),
+        load=-dot(roll, force) - rear_torque,
     )
     front = Unknown(
         c=scale(a.front_radius, here.front.t),

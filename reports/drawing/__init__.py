@@ -21,7 +21,15 @@ from .plots import (
     mode_plots,
     to_nanoseconds,
 )
-from .summary import COLUMNS, describe_stability, format_cell, format_verdict, make_remarks, make_summary
+from .summary import (
+    COLUMNS,
+    describe_stability,
+    find_unsteadiness,
+    format_cell,
+    format_verdict,
+    make_remarks,
+    make_summary,
+)
 
 __all__ = [
     "CHANGE",
@@ -48,6 +56,7 @@ __all__ = [
     "describe_stability",
     "drawable_values",
     "escape_markdown",
+    "find_unsteadiness",
     "format_cell",
     "format_verdict",
     "ground_disc",

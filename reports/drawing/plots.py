@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...engines.engine import REFERENCE, Trajectory
+from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.kinematics import FRONT_ANGLE, LEAN, REAR_ANGLE, STEER, WHEELS, YAW
 from ...reference.surface import Surface
-from ..measure import START_ERROR, Mode, Modes, normal_force, required_friction
+from ..measure import START_ERROR, Mode, Modes, conserved_energy, normal_force, required_friction
 
 # Smaller magnitudes are round-off of quantities of order one, and their logarithms are not drawn.
 SMALLEST_SIZE = 1e-16
@@ -31,12 +32,15 @@ class RideData:
         For two runs shown together: the name of the earlier trajectory that each trajectory is compared with.
     modes : Modes or None
         Modes of the motion that all rides started from.
+    inputs : Inputs
+        Inputs of all rides.
     """
 
     surface: Surface
     trajectories: Mapping[str, Trajectory]
     before: Mapping[str, str] = field(default_factory=dict)
     modes: Modes | None = None
+    inputs: Inputs = NO_INPUTS
 
     @property
     def reference(self) -> Trajectory | None:
@@ -119,12 +123,10 @@ def _distance_between(trajectory: Trajectory, other: Trajectory | None) -> np.nd
     return out
 
 
-def energy_change(_: RideData, trajectory: Trajectory) -> np.ndarray | None:
-    """Return the change of kinetic plus potential energy since the start, relative to the start's magnitude [-]."""
-    if trajectory.kinetic_energy is None or trajectory.potential_energy is None:
-        return None
-    energy = trajectory.kinetic_energy + trajectory.potential_energy
-    return (energy - energy[0]) / abs(energy[0]) if energy[0] != 0 else None
+def energy_change(ride: RideData, trajectory: Trajectory) -> np.ndarray | None:
+    """Return the change of the energy less the work of the inputs, relative to the energy at the start [-]."""
+    energy = conserved_energy(trajectory, ride.inputs)
+    return None if energy is None or energy[0] == 0 else (energy - energy[0]) / abs(energy[0])
 
 
 def pushing_force(ride: RideData, trajectory: Trajectory) -> np.ndarray | None:

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...engines.engine import REFERENCE
+from ...reference.inputs import Inputs
+from ...reference.surface import Surface, SurfaceOfRevolution
 from ..measure import describe_mismatch
 from .markdown import escape_markdown
 
@@ -86,7 +88,7 @@ def make_summary(
     verdicts: Sequence[Mapping[str, Any]],
     growth_rate: float,
     duration: float,
-    steady: bool = True,
+    unsteady: str | None = None,
 ) -> str:
     """Write the Markdown summary of a run.
 
@@ -103,14 +105,14 @@ def make_summary(
         Growth rate of the motion's own disturbances [1/s].
     duration : float
         Duration of the run [s].
-    steady : bool
+    unsteady : str, optional
         See `describe_stability`.
 
     Returns
     -------
     str
     """
-    lines = [f"# {escape_markdown(title)}", "", describe_stability(growth_rate, steady), ""]
+    lines = [f"# {escape_markdown(title)}", "", describe_stability(growth_rate, unsteady), ""]
     # Engines are columns: there are fewer of them than quantities, and the recording's tab is narrow.
     lines += ["| | " + " | ".join(escape_markdown(name) for name in measured) + " |", "|---|" + "---:|" * len(measured)]
     for name, unit, metric, part in COLUMNS:
@@ -135,18 +137,37 @@ def format_verdict(verdict: Mapping[str, Any]) -> str:
     return f"{verdict['engine']}: {verdict['quantity']} {value}, limit {verdict['limit']:.3g}: {word}"
 
 
-def describe_stability(growth_rate: float, steady: bool = True) -> str:
+def find_unsteadiness(surface: Surface, inputs: Inputs, circular: bool) -> str | None:
+    """Return what makes a ride's undisturbed motion unsteady, as `describe_stability` takes it; None if it is steady.
+
+    Parameters
+    ----------
+    surface : Surface
+    inputs : Inputs
+    circular : bool
+        Whether the motion is a circular one, which its inputs hold, or a straight and upright one.
+    """
+    if not isinstance(surface, SurfaceOfRevolution):
+        return "ground"
+    return None if circular or inputs.steer_torque == inputs.rear_wheel_torque == 0 else "torques"
+
+
+def describe_stability(growth_rate: float, unsteady: str | None = None) -> str:
     """Describe the fate of a motion's disturbances in one sentence.
 
     Parameters
     ----------
     growth_rate : float
-        Growth rate of the motion [1/s]; that of the same start on the level plane if it is not ``steady``.
-    steady : bool
-        Whether the motion is steady; no motion is on ground without symmetry about the z axis.
+        Growth rate of the motion [1/s]; that of the same start on the level plane if the ground makes the motion
+        unsteady, and that of the equations frozen at the start if torques do.
+    unsteady : {"ground", "torques"}, optional
+        What makes the motion unsteady, if it is: ground without symmetry about the z axis, or torques on a straight
+        start.
     """
-    if not steady:
+    if unsteady is not None:
         fate = f"decay at {-growth_rate:.4g} 1/s" if growth_rate < 0 else f"grow like exp({growth_rate:.4g} t / s)"
+        if unsteady == "torques":
+            return f"With its torques this start is no steady motion; frozen there, disturbances would {fate}."
         return f"On this ground no motion is steady; on the level plane disturbances of this start would {fate}."
     if growth_rate < 0:
         return f"The motion is Lyapunov stable: its slowest disturbance decays at {-growth_rate:.4g} 1/s."

@@ -1,5 +1,6 @@
 """Measure rides: errors, drift, falls, friction, modes, orders, and the differences that round-off allows."""
 
+from .balance import InputWork, conserved_energy, measure_work
 from .consistency import LARGEST_NOISE, TURNING, Mismatch, describe_mismatch, evaluate_ride, find_mismatches
 from .convergence import extrapolate, observed_orders
 from .fall import cut_at_fall, fell_at, until_fall
@@ -32,6 +33,7 @@ __all__ = [
     "STENCIL_WEIGHT",
     "TURNING",
     "Identified",
+    "InputWork",
     "Level",
     "Mismatch",
     "Mode",
@@ -41,6 +43,7 @@ __all__ = [
     "compared_time",
     "comparison_horizon",
     "compute_metrics",
+    "conserved_energy",
     "cut_at_fall",
     "describe_mismatch",
     "eigenvalue_document",
@@ -56,6 +59,7 @@ __all__ = [
     "identify",
     "interval_of",
     "jacobian_at",
+    "measure_work",
     "noise",
     "normal_force",
     "observed_orders",

@@ -13,8 +13,10 @@ import numpy as np
 
 from ...engines.engine import Trajectory
 from ...reference.bicycle import Bicycle
+from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.kinematics import REAR_ANGLE, YAW
 from ...reference.surface import Surface
+from .balance import measure_work
 from .consistency import evaluate_ride, find_mismatches, largest_speed
 from .fall import fell_at, until_fall
 from .friction import cone_is_left, normal_force, required_friction
@@ -33,6 +35,7 @@ def compute_metrics(
     size: float,
     circular: bool,
     *,
+    inputs: Inputs = NO_INPUTS,
     step_noise: float = ROUND_OFF,
     followed: Trajectory | None = None,
 ) -> dict[str, Any]:
@@ -52,6 +55,8 @@ def compute_metrics(
         Radius of the circle, or the wheelbase for a straight motion [m].
     Whether the motion circles the z axis, so that radius and phase are defined.
         Whether the motion circles the z axis, so that radius and phase mean something.
+    inputs : Inputs
+        Those of the ride, whose work is no drift of the energy.
     step_noise : float
         Relative error that a step of the engine may add beyond its method.
     followed : Trajectory, optional
@@ -72,7 +77,7 @@ def compute_metrics(
     reference = None if reference is None else until_fall(reference, bicycle, surface)
     result = _error_metrics(trajectory, reference)
     result |= _drift_metrics(trajectory, reference, circular)
-    result |= _energy_metrics(trajectory)
+    result |= _energy_metrics(trajectory, inputs)
     result |= _constraint_metrics(trajectory)
     result["not_finite"] = reported.not_finite()
     found = find_mismatches(reported, trajectory, reference, size, step_noise)
@@ -248,15 +253,22 @@ def _drift_metrics(trajectory: Trajectory, reference: Trajectory | None, circula
     return result
 
 
-def _energy_metrics(trajectory: Trajectory) -> dict[str, float | None]:
+def _energy_metrics(trajectory: Trajectory, inputs: Inputs) -> dict[str, float | None]:
+    """Return the changes of the energy less the work of the inputs, none smaller than the error of that work."""
     assert trajectory.kinetic_energy is not None
     assert trajectory.potential_energy is not None
-    energy = trajectory.kinetic_energy + trajectory.potential_energy
+    done = measure_work(trajectory, inputs)
+    energy = trajectory.kinetic_energy + trajectory.potential_energy - done.work
     size = abs(energy[0])
+    slope = _slope(trajectory.time, energy) if len(energy) > 1 else None
+    if slope is not None and done.error > 0:
+        # A disturbance within +-b over a duration T changes the slope of a least-squares line by at most 3 b / T.
+        known = abs(slope) > 3 * done.error / float(trajectory.time[-1] - trajectory.time[0])
+        slope = slope if known else None
     return {
-        "energy_drift": float(np.abs(energy - energy[0]).max() / size) if size > 0 else None,
-        "energy_drift_rate": _slope(trajectory.time, energy) if len(energy) > 1 else None,
-        "energy_variation": float(100 * np.ptp(energy) / size) if size > 0 else None,
+        "energy_drift": max(float(np.abs(energy - energy[0]).max()), done.error) / size if size > 0 else None,
+        "energy_drift_rate": slope,
+        "energy_variation": 100 * max(float(np.ptp(energy)), done.error) / size if size > 0 else None,
     }
 
 

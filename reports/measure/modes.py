@@ -20,6 +20,7 @@ import numpy as np
 
 from ...engines.engine import Trajectory
 from ...reference.bicycle import Bicycle
+from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.kinematics import YAW
 from ...reference.stability import are_zero, eigenvalue_order, independent, linearise
 from ...reference.surface import Surface, is_level
@@ -80,7 +81,7 @@ class Modes:
         return np.abs((independent(ride.q, ride.qd) - self.motion) @ mode.left)
 
 
-def find_modes(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> Modes:
+def find_modes(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, inputs: Inputs = NO_INPUTS) -> Modes:
     """Return the modes of a circular motion, or of a straight upright one.
 
     Parameters
@@ -90,13 +91,15 @@ def find_modes(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray
         A surface of revolution about z, or a plane.
     q, qd : ndarray, shape (9,)
         The undisturbed motion.
+    inputs : Inputs
+        Held constant.
 
     Returns
     -------
     Modes
         Modes whose eigenvalues are too close to be told apart are left out.
     """
-    jacobian = linearise(bicycle, surface, q, qd).jacobian
+    jacobian = linearise(bicycle, surface, q, qd, inputs).jacobian
     first = _POSITION if is_level(surface) else 0
     values, right = np.linalg.eig(jacobian[first:, first:])
     left = np.zeros((len(values), 7), complex)

@@ -83,15 +83,18 @@ QUANTITIES: dict[str, Quantity] = {
         absent=f"{_NO_REFERENCE}; with fewer than two samples",
     ),
     "energy_drift": Quantity(
-        "Largest change of the total energy, relative to the start's. Nothing here dissipates.",
+        "Largest change of the total energy less the work of the inputs, relative to the start's energy: zero in an "
+        "exact ride. With steer damping at least the error of its work, which is integrated over the samples.",
         "1",
         absent="where the energy at the start is zero",
     ),
     "energy_drift_rate": Quantity(
-        "Slope of the line through the total energy.", "W", absent="with fewer than two samples"
+        "Slope of the line through the total energy less the work of the inputs.",
+        "W",
+        absent="with fewer than two samples; where the error of the damping's work is larger",
     ),
     "energy_variation": Quantity(
-        "100 (Emax - Emin) / |E(0)|, which the IFToMM benchmark limits.",
+        "100 (Emax - Emin) / |E(0)|, which the IFToMM benchmark limits; E less the work of the inputs.",
         "percent",
         absent="where the energy at the start is zero",
     ),

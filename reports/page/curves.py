@@ -62,8 +62,8 @@ GROUPS: tuple[tuple[str, tuple[Panel, ...]], ...] = (
                 "log_energy_change",
                 "Energy change",
                 "1",
-                "Size of the change of kinetic and potential energy since the start, relative to the start's. Nothing "
-                f"here dissipates: whatever is seen is the engine's own. {_ROUND_OFF}",
+                "Size of the change of kinetic and potential energy since the start, less the work of the inputs, "
+                f"relative to the start's: whatever is seen is the engine's own. {_ROUND_OFF}",
                 True,
             ),
         ),

@@ -12,8 +12,18 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from ...engines.engine import Trajectory
-from ...reference.surface import Surface, SurfaceOfRevolution
-from ..drawing import COLUMNS, RideData, assign_colours, describe_stability, format_cell, format_verdict, make_remarks
+from ...reference.inputs import Inputs
+from ...reference.surface import Surface
+from ..drawing import (
+    COLUMNS,
+    RideData,
+    assign_colours,
+    describe_stability,
+    find_unsteadiness,
+    format_cell,
+    format_verdict,
+    make_remarks,
+)
 from . import curves, plan, trust, words
 from .ink import line_dashes, make_css, paper_colour
 
@@ -50,23 +60,24 @@ def make_page(
         A self-contained HTML document with style, script and data. All text from the run is escaped.
     """
     names, script = list(trajectories), _read_part("page.js")
-    ride = RideData(surface, trajectories)
-    groups = curves.draw_curves(ride, scenario["motion"].get("kind") != "upright") if names else []
+    inputs = Inputs(**scenario.get("inputs") or {})
+    ride = RideData(surface, trajectories, inputs=inputs)
+    circular = scenario["motion"].get("kind") != "upright"
+    groups = curves.draw_curves(ride, circular) if names else []
     trails = plan.draw_plan(ride, names) if names else None
-    steady = isinstance(surface, SurfaceOfRevolution)
+    unsteady = find_unsteadiness(surface, inputs, circular)
     duration, rate = scenario["simulation"]["duration"], manifest["start"]["growth_rate"]
     ends = {name: float(run.time[-1]) for name, run in trajectories.items()}
     return _load_template().render(
         _result_values(measured, rate, duration, ends),
         manifest=manifest,
         facts=words.list_facts(manifest, scenario),
-        stability=describe_stability(rate, steady),
+        stability=describe_stability(rate, unsteady),
         engines=_engine_styles(names),
         failures={name: entry["failed"] for name, entry in manifest["engines"].items() if "failed" in entry},
         left_out=manifest.get("left_out", {}),
         verdicts=[{"holds": verdict["holds"], "line": format_verdict(verdict)} for verdict in verdicts],
         criterion=scenario.get("criterion") is not None,
-        steady=steady,
         duration=duration,
         groups=groups,
         has_plan=trails is not None,

@@ -7,6 +7,7 @@ from datetime import datetime
 from typing import Any
 
 from ...reference.bicycle import Bicycle
+from ...reference.inputs import NO_INPUTS, Inputs
 
 _LONGEST = 80  # largest number of characters for a field with a list of numbers
 _UNITS = {
@@ -44,6 +45,7 @@ def list_facts(manifest: Mapping[str, Any], scenario: Mapping[str, Any]) -> list
         rows.append(("Family", f"{start['family']} of the circular motions"))
     return [
         *rows,
+        *_list_inputs(scenario.get("inputs") or {}),
         ("Disturbed by", describe_disturbance(scenario.get("perturbation", {}))),
         ("Growth rate", f"{start['growth_rate']:.4g} 1/s"),
         ("Duration", f"{simulation['duration']:g} s, {simulation['output_rate']:g} samples a second"),
@@ -51,6 +53,12 @@ def list_facts(manifest: Mapping[str, Any], scenario: Mapping[str, Any]) -> list
         ("Run on", f"{datetime.fromisoformat(manifest['created']):%Y-%m-%d, %H:%M:%S %Z}"),
         ("State", "complete" if manifest["complete"] else "interrupted: the engines that had finished are shown"),
     ]
+
+
+def _list_inputs(table: Mapping[str, float]) -> list[tuple[str, str]]:
+    """List the term of the inputs if any of them is not zero."""
+    inputs = Inputs(**table)
+    return [] if inputs == NO_INPUTS else [("Inputs", inputs.describe().replace("_", " "))]
 
 
 def describe_ground(surface: Mapping[str, Any]) -> str:

@@ -12,6 +12,7 @@ import rerun as rr
 from ...engines.engine import REFERENCE, Trajectory
 from ...engines.files import write_whole
 from ...reference.bicycle import BODIES, Bicycle
+from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.kinematics import WHEELS, YAW
 from ...reference.surface import Surface, unit_normals
 from ..drawing import (
@@ -198,6 +199,7 @@ def write_recording(
     undisturbed: tuple[np.ndarray, np.ndarray] | None = None,
     before: Mapping[str, str] | None = None,
     paint: Mapping[str, Colour] | None = None,
+    inputs: Inputs = NO_INPUTS,
 ) -> None:
     """Write a recording with its layout, completely or not at all.
 
@@ -221,6 +223,8 @@ def write_recording(
         For two runs shown together: the name of the earlier trajectory that each trajectory is compared with.
     paint : mapping, optional
         Colours by name; those of `velodrome.reports.drawing.assign_colours` if not given.
+    inputs : Inputs
+        Inputs of all rides.
 
     Raises
     ------
@@ -229,8 +233,8 @@ def write_recording(
     """
     if not trajectories or any(len(run.time) == 0 for run in trajectories.values()):
         raise ValueError("a recording needs at least one trajectory, and each at least one sample")
-    modes = None if undisturbed is None else find_modes(bicycle, surface, *undisturbed)
-    ride = RideData(surface, trajectories, before or {}, modes)
+    modes = None if undisturbed is None else find_modes(bicycle, surface, *undisturbed, inputs)
+    ride = RideData(surface, trajectories, before or {}, modes, inputs)
     with write_whole(path) as partial, _strict_mode():
         _write_stream(partial, title, bicycle, ride, summary, paint or assign_colours(trajectories))
 

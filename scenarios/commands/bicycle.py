@@ -9,7 +9,7 @@ import typer
 
 from ..error import ScenarioError
 from .completion import complete_scenario
-from .options import JsonOption, ending_with, print_json, show_written
+from .options import JsonOption, SteerDampingOption, ending_with, make_inputs, print_json, show_written
 
 _FINEST = 10_000  # speeds of a list
 _FASTEST = 1e4  # [m/s]
@@ -26,6 +26,7 @@ def bicycle_command(
     speeds: Annotated[
         str, typer.Option(metavar="FROM:TO", help="Range of forward speeds [m/s], or a list such as 1,3,5.")
     ] = "0:10",
+    steer_damping: SteerDampingOption = 0.0,
     out: Annotated[Path | None, typer.Option(help="Folder for bicycle.json and the figure eigenvalues.png.")] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -36,7 +37,8 @@ def bicycle_command(
     from ..studies import find_bicycle, study_bicycle, write_bicycle
     from .present_bicycle import show_bicycle
 
-    study = study_bicycle(find_bicycle(source), np.array(parse_speeds(speeds)))
+    damping = make_inputs(0.0, 0.0, steer_damping).steer_damping
+    study = study_bicycle(find_bicycle(source), np.array(parse_speeds(speeds)), damping)
     written = [] if out is None else write_bicycle(study, out)
     with ending_with(0):
         if as_json:

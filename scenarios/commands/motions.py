@@ -12,7 +12,11 @@ from .options import (
     AlphaOption,
     GroundOption,
     JsonOption,
+    RearTorqueOption,
+    SteerDampingOption,
+    SteerTorqueOption,
     ending_with,
+    make_inputs,
     parse_angles,
     parse_ground,
     print_json,
@@ -25,6 +29,9 @@ def circular_command(
     surface: GroundOption = None,
     family: Annotated[int | None, typer.Option(help="Solution family, 1 to 4.")] = None,
     near: Annotated[str | None, typer.Option(metavar="LEAN,STEER", help="Angles it is near to [rad].")] = None,
+    steer_torque: SteerTorqueOption = 0.0,
+    rear_wheel_torque: RearTorqueOption = 0.0,
+    steer_damping: SteerDampingOption = 0.0,
     as_json: JsonOption = False,
 ) -> None:
     """One circular motion: its 21 constants, contact forces, eigenvalues, verdict on stability."""
@@ -37,8 +44,9 @@ def circular_command(
     from .progress import show_working
 
     angles, ground = parse_angles(near), parse_ground(alpha, surface)
+    inputs = make_inputs(steer_torque, rear_wheel_torque, steer_damping)
     with show_working(STARTING):
-        found = solve_circular(Bicycle(), make_bowl(ground), rear_rate, family, angles).as_json()
+        found = solve_circular(Bicycle(), make_bowl(ground), rear_rate, family, angles, inputs).as_json()
     with ending_with(0):
         if as_json:
             print_json(found)
@@ -49,6 +57,9 @@ def circular_command(
 def families_command(
     alpha: AlphaOption = None,
     surface: GroundOption = None,
+    steer_torque: SteerTorqueOption = 0.0,
+    rear_wheel_torque: RearTorqueOption = 0.0,
+    steer_damping: SteerDampingOption = 0.0,
     out: Annotated[Path | None, typer.Option(help="Folder for families.json and the figure families.png.")] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -60,8 +71,9 @@ def families_command(
     from .progress import show_working
 
     ground = parse_ground(alpha, surface)
+    inputs = make_inputs(steer_torque, rear_wheel_torque, steer_damping)
     with show_working(STARTING):
-        document = families_document(ground)
+        document = families_document(ground, inputs)
     if out is not None:
         write_families(document, out)
     with ending_with(0):

@@ -17,6 +17,7 @@ import typer
 from ..error import ScenarioError
 
 if TYPE_CHECKING:
+    from ...reference.inputs import Inputs
     from ...reference.surface import Surface
 
 STARTING = "computing the motion (the first time on a machine, kernels are compiled: half a minute)"
@@ -34,6 +35,15 @@ ChangesOption = Annotated[
 DurationOption = Annotated[float | None, typer.Option(help="Simulated time [s].")]
 TracebackOption = Annotated[
     bool, typer.Option("--traceback", help="Show on stderr the whole traceback of an engine that failed.")
+]
+SteerTorqueOption = Annotated[
+    float, typer.Option(help="Torque that is held on the front frame about the steering axis, to the left [N m].")
+]
+RearTorqueOption = Annotated[
+    float, typer.Option("--rear-wheel-torque", help="Torque on the rear wheel; a circle exists with 0 only [N m].")
+]
+SteerDampingOption = Annotated[
+    float, typer.Option(min=0, help="Coefficient of the torque against the steer rate [N m s/rad].")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else.")]
 
@@ -99,6 +109,17 @@ def parse_ground(alpha: float | None, surface: str | None) -> Surface | float:
     from ..scenario import parse_surface
 
     return parse_surface(surface, "--surface")
+
+
+def make_inputs(steer_torque: float, rear_wheel_torque: float, steer_damping: float) -> Inputs:
+    """Return the inputs that --steer-torque, --rear-wheel-torque and --steer-damping give."""
+    from ...reference.inputs import Inputs
+
+    try:
+        return Inputs(steer_torque, rear_wheel_torque, steer_damping)
+    except ValueError as error:
+        name, space, rest = str(error).partition(" ")
+        raise ScenarioError(f"--{name.replace('_', '-')}{space}{rest}") from error
 
 
 def show_written(paths: Iterable[Path]) -> None:

@@ -38,6 +38,8 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
     console.print()
     print_table(console, _make_eigenvalue_columns(study))
     console.print()
+    if study.matrices.steer_damping:
+        console.print(f"steer damping: {study.matrices.steer_damping:g} N m s/rad", highlight=False)
     for mode, speed in (("weave", study.weave_speed), ("capsize", study.capsize_speed)):
         deviation = study.deviations.get(mode)
         spread = f" ± {deviation:.2g}" if deviation else ""

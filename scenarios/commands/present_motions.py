@@ -21,6 +21,9 @@ def show_circular(console: Console, found: dict[str, Any]) -> None:
         for name, value in found["surface"].items():
             table.add_row("surface" if name == "kind" else name, _format_value(value))
     table.add_row("family", "none of the benchmark's" if found["family"] is None else str(found["family"]))
+    for name, unit in (("steer_torque", "N m"), ("steer_damping", "N m s/rad")):
+        if found["inputs"][name] != 0:
+            table.add_row(name, _format_value(found["inputs"][name]), unit)
     for name, unit in (
         *(("rear_rate", "rad/s"), ("front_rate", "rad/s"), ("yaw_rate", "rad/s")),
         *(("lean", "rad"), ("steer", "rad"), ("pitch", "rad"), ("energy", "J"), ("residual", "")),

@@ -12,8 +12,7 @@ import numpy as np
 
 from ...engines.engine import REFERENCE, Trajectory, load_engine, why_failed
 from ...engines.names import suggest_name
-from ...reference.surface import SurfaceOfRevolution
-from ...reports.drawing import assign_colours
+from ...reports.drawing import assign_colours, find_unsteadiness
 from ...reports.measure import ROUND_OFF, START_ERROR, Scale, cut_at_fall, evaluate_ride
 from ..error import ScenarioError
 from ..files import make_folder, write_json, write_text
@@ -213,11 +212,14 @@ def _record(path: Path, pair: Pair, found: Mapping[str, Any], page: str) -> None
                 paint[label] = hue
         if labels[0] != labels[1] and all(label in rides for label in labels):
             earlier[labels[1]] = labels[0]
-    steady = isinstance(ground.surface, SurfaceOfRevolution)
+    inputs, circular = pair.scenario.make_inputs(), isinstance(pair.scenario.motion, CircularTable)
+    steady = find_unsteadiness(ground.surface, inputs, circular) is None
     undisturbed = make_start(pair.scenario).undisturbed if steady else None
     title = f"{pair.scenario.title}: {pair.before.name} against {pair.after.name}"
     where = (ground.bicycle, ground.surface)
-    write_recording(path, title, *where, rides, page, undisturbed=undisturbed, before=earlier, paint=paint)
+    write_recording(
+        path, title, *where, rides, page, undisturbed=undisturbed, before=earlier, paint=paint, inputs=inputs
+    )
 
 
 def _labels(pair: Pair, engine: str, entry: Mapping[str, Any]) -> tuple[str, str]:

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ...engines.engine import Engine, Settings, UnsuitableProblem, why_failed
 from ...engines.format_version import VERSION_KEY, read_version
 from ...engines.guard import call_engine
+from ...reference.inputs import NO_INPUTS
 from ..error import ScenarioError
 from ..files import make_folder, write_json
 from ..run import RunWatch, Trace, configure_engine, installed_engines, library_versions, read_json
@@ -271,8 +272,14 @@ def _missing_verdicts(engines: Sequence[str], results: _ScenarioResults) -> list
 
 
 def gated_content(scenario: Scenario) -> dict[str, Any]:
-    """Return the parts of a scenario that determine its motion, as JSON values."""
-    return scenario.model_dump(mode="json", exclude_none=True, include={*OF_THE_MOTION})
+    """Return the parts of a scenario that determine its motion, as JSON values.
+
+    Inputs are left out if all are zero, as baselines of earlier versions have none.
+    """
+    content = scenario.model_dump(mode="json", exclude_none=True, include={*OF_THE_MOTION})
+    if scenario.make_inputs() == NO_INPUTS:
+        del content["inputs"]
+    return content
 
 
 def read_baseline(name: str, folder: Path | None = None, scenario: Scenario | None = None) -> dict[str, Any]:

@@ -280,10 +280,10 @@ def _measure_eigenvalues(
     their motion is left in the flow.
     """
     problem = start.problem
-    motion = Problem(problem.bicycle, problem.surface, *start.undisturbed, problem.times)
+    motion = Problem(problem.bicycle, problem.surface, *start.undisturbed, problem.times, problem.inputs)
     interval = interval_of(settings)
     jacobian = jacobian_at(engine, settings, motion, interval)
-    exact = linearise(problem.bicycle, problem.surface, *start.undisturbed)
+    exact = linearise(problem.bicycle, problem.surface, *start.undisturbed, problem.inputs)
     scale = replace(scale_of(start), duration=1.5 * interval)
     error = noise(scale, step_noise, ceil(rate * scale.duration))
     allowed = eigenvalue_limits(exact.jacobian, scale, error, DISTURBANCES, STENCIL_WEIGHT, interval)

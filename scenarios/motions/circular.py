@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from ...reference.bicycle import Bicycle
 from ...reference.circular import CircularMotion
 from ...reference.contact import observe
 from ...reference.families import find_motion
+from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.kinematics import YAW
 from ...reference.stability import growth_rate, linearise
 from ...reference.surface import SurfaceOfRevolution
@@ -42,6 +43,8 @@ class CircularSolution:
         Matrix of the reduced linear system (Eq. 17), variables in the order of `reference.stability.VARIABLES`.
     growth_rate : float
         Largest real part of the eigenvalues that symmetry leaves free [1/s].
+    inputs : Inputs
+        Inputs that are held in the motion.
     """
 
     motion: CircularMotion
@@ -53,6 +56,7 @@ class CircularSolution:
     eigenvalues: np.ndarray
     jacobian: np.ndarray = field(repr=False)
     growth_rate: float
+    inputs: Inputs = NO_INPUTS
 
     @property
     def lyapunov_stable(self) -> bool:
@@ -74,6 +78,7 @@ class CircularSolution:
         return "\n".join(
             [
                 f"CircularSolution: family {self.family}, {where}",
+                *([f"  inputs: {self.inputs.describe()}"] if self.inputs != NO_INPUTS else []),
                 f"  rates [rad/s]: {rates}",
                 f"  angles [rad]: {angles}",
                 f"  normal forces [N]: rear {self.normal_force[0]:.6g}, front {self.normal_force[1]:.6g}",
@@ -89,6 +94,7 @@ class CircularSolution:
         return {
             **name_surface(self.surface),
             "family": self.family,
+            "inputs": asdict(self.inputs),
             **{name: getattr(motion, name) for name in names},
             "position": motion.position.tolist(),
             "contact_point": _split_by_wheel(self.contact_point),
@@ -109,6 +115,7 @@ def solve_circular(
     rear_rate: float,
     family: int | None = None,
     near: tuple[float, float] | None = None,
+    inputs: Inputs = NO_INPUTS,
 ) -> CircularSolution:
     """Compute one circular motion.
 
@@ -124,6 +131,8 @@ def solve_circular(
         rate.
     near : tuple of float, optional
         Lean and steer that the motion is near to [rad].
+    inputs : Inputs
+        Held constant. With a steer torque there are no families, and ``near`` is needed.
 
     Returns
     -------
@@ -135,9 +144,9 @@ def solve_circular(
         If there is no such motion.
     """
     try:
-        number, motion = find_motion(bicycle, surface, rear_rate, family, near)
+        number, motion = find_motion(bicycle, surface, rear_rate, family, near, inputs)
         q, qd = motion.state()
-        reduced = linearise(bicycle, surface, q, qd)
+        reduced = linearise(bicycle, surface, q, qd, inputs)
     except ValueError as error:
         raise ScenarioError(str(error)) from error
     contact = observe(bicycle, surface, q[None], qd[None])
@@ -151,6 +160,7 @@ def solve_circular(
         eigenvalues=reduced.eigenvalues,
         jacobian=reduced.jacobian,
         growth_rate=growth_rate(surface, reduced.eigenvalues, float(qd[YAW])),
+        inputs=inputs,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,13 @@ from ...reference.bicycle import Bicycle
 from ...reference.critical import CriticalPoint, last_stable, reconnections
 from ...reference.curve import Samples
 from ...reference.families import FAMILIES, Family, trace_all
+from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.modes import MODES, follow_modes
 from ...reference.sections import SectionEnd, sample_family, stable_sections
 from ...reference.special import SpecialPoint, special_points
 from ...reference.standing import motion_stands, stands
 from ...reference.surface import Surface, SurfaceOfRevolution
+from ..error import ScenarioError
 from ..files import make_folder, write_json
 from ..scenario import make_bowl, name_surface
 
@@ -107,16 +109,20 @@ class SolutionFamilies:
         The families by number, then further curves, each with the number of the family that it was a part of.
     absent : dict
         Reasons by number, for families that have no curve on this ground.
+    inputs : Inputs
+        Inputs that are held in all motions. With a steer torque no curve has a number.
     """
 
     surface: SurfaceOfRevolution
     curves: tuple[FamilyCurve, ...]
     absent: dict[int, str]
+    inputs: Inputs = NO_INPUTS
 
     def as_json(self) -> dict[str, Any]:
         """Return the JSON document of `velodrome families`."""
         return {
             **name_surface(self.surface),
+            "inputs": asdict(self.inputs),
             "modes": list(MODES),  # names of the columns of eigenvalues
             "families": [curve.as_json() for curve in self.curves],
             "absent": {str(number): reason for number, reason in self.absent.items()},
@@ -166,20 +172,30 @@ class CriticalShapes:
         }
 
 
-def follow_families(bicycle: Bicycle, surface: SurfaceOfRevolution) -> SolutionFamilies:
+def follow_families(bicycle: Bicycle, surface: SurfaceOfRevolution, inputs: Inputs = NO_INPUTS) -> SolutionFamilies:
     """Follow every curve of the four families on a ground, with special points and stable sections.
 
     Parameters
     ----------
     bicycle : Bicycle
     surface : SurfaceOfRevolution
+    inputs : Inputs
+        Held constant.
 
     Returns
     -------
     SolutionFamilies
+
+    Raises
+    ------
+    ScenarioError
+        If there is a torque on the rear wheel, with which there is no circular motion.
     """
-    curves, absent = trace_all(bicycle, surface, LONGEST_DRAWN_STEP)
-    return SolutionFamilies(surface=surface, curves=tuple(map(examine_curve, curves)), absent=absent)
+    try:
+        curves, absent = trace_all(bicycle, surface, LONGEST_DRAWN_STEP, inputs)
+    except ValueError as error:
+        raise ScenarioError(str(error)) from error
+    return SolutionFamilies(surface=surface, curves=tuple(map(examine_curve, curves)), absent=absent, inputs=inputs)
 
 
 def examine_curve(family: Family) -> FamilyCurve:
@@ -195,13 +211,15 @@ def examine_curve(family: Family) -> FamilyCurve:
     )
 
 
-def families_document(ground: Surface | float) -> dict[str, Any]:
+def families_document(ground: Surface | float, inputs: Inputs = NO_INPUTS) -> dict[str, Any]:
     """Follow the four families of the benchmark bicycle on a ground.
 
     Parameters
     ----------
     ground : Surface or float
         A surface of revolution, or the alpha of a paraboloid [1/m].
+    inputs : Inputs
+        Held constant.
 
     Returns
     -------
@@ -212,9 +230,9 @@ def families_document(ground: Surface | float) -> dict[str, Any]:
     Raises
     ------
     ScenarioError
-        If the ground is not a surface of revolution.
+        If the ground is not a surface of revolution, or there is a torque on the rear wheel.
     """
-    return follow_families(Bicycle(), make_bowl(ground)).as_json()
+    return follow_families(Bicycle(), make_bowl(ground), inputs).as_json()
 
 
 def find_critical_shapes(bicycle: Bicycle, watch: Callable[[str, float, float], None]) -> CriticalShapes:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from ...engines.engine import Engine, Settings, Trajectory, packages
-from ...reference.surface import SurfaceOfRevolution
-from ...reports.drawing import make_summary
+from ...reports.drawing import find_unsteadiness, make_summary
 from ..error import ScenarioError
 from ..files import write_sealed, write_text
 from ..scenario import Scenario, Start, resolve_scenario
@@ -116,6 +115,7 @@ def write_manifest(
         "libraries": library_versions(),
         "suite": find_commit(),
         "platform": describe_machine(),
+        "inputs": asdict(start.problem.inputs),
         "start": {
             "family": start.family,
             "growth_rate": start.growth_rate,
@@ -153,12 +153,13 @@ def write_run_recording(
     from ...reports.recording import write_recording
 
     problem = plan.start.problem
-    steady = isinstance(problem.surface, SurfaceOfRevolution)
-    facts = (plan.start.growth_rate, plan.scenario.simulation.duration, steady)
+    unsteady = find_unsteadiness(problem.surface, problem.inputs, plan.start.motion is not None)
+    facts = (plan.start.growth_rate, plan.scenario.simulation.duration, unsteady)
     text = make_summary(plan.scenario.title, measured, failures, verdicts, *facts)
     where = (plan.scenario.title, problem.bicycle, problem.surface)
-    undisturbed = plan.start.undisturbed if steady else None
-    write_recording(folder / "comparison.rrd", *where, shown, text, undisturbed=undisturbed)
+    undisturbed = plan.start.undisturbed if unsteady is None else None
+    path = folder / "comparison.rrd"
+    write_recording(path, *where, shown, text, undisturbed=undisturbed, inputs=problem.inputs)
 
 
 def write_page(

@@ -305,6 +305,7 @@ def measure_one(
         start.growth_rate,
         start.size,
         start.motion is not None,
+        inputs=start.problem.inputs,
         step_noise=step_noise,
         followed=followed,
     )

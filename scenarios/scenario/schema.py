@@ -10,6 +10,7 @@ from pydantic import Field, ValidationError, ValidatorFunctionWrapHandler, field
 
 from ...engines.names import suggest_name
 from ...reference.bicycle import Bicycle, require_rigid_bodies
+from ...reference.inputs import Inputs
 from ..error import ScenarioError
 from ..names import LIBRARY as LIBRARY
 from ..names import list_library
@@ -19,7 +20,7 @@ from .surfaces import SurfaceTable
 from .table import Table, Texts, join_complaints, list_complaints, read_toml, set_keys, show_value, validate_known
 
 # Tables of a scenario that determine its motion.
-OF_THE_MOTION = ("surface", "motion", "perturbation", "bicycle")
+OF_THE_MOTION = ("surface", "motion", "perturbation", "bicycle", "inputs")
 
 
 # Larger than any value of a real bicycle, and small enough that products do not overflow.
@@ -69,6 +70,26 @@ class Perturbation(Table):
     lean_rate: _Moderate = Field(default=0.0, description="of the rear frame", json_schema_extra={"unit": "rad/s"})
     steer_rate: _Moderate = Field(default=0.0, description="positive to the left", json_schema_extra={"unit": "rad/s"})
     rear_rate: _Moderate = Field(default=0.0, description="of the rear wheel", json_schema_extra={"unit": "rad/s"})
+
+
+class InputsTable(Table):
+    """Generalised forces, the same in every engine and constant during the ride."""
+
+    steer_torque: _Moderate = Field(
+        default=0.0,
+        description="on the front frame against the rear frame, positive to the left",
+        json_schema_extra={"unit": "N m"},
+    )
+    rear_wheel_torque: _Moderate = Field(
+        default=0.0,
+        description="on the rear wheel against the rear frame, positive forward",
+        json_schema_extra={"unit": "N m"},
+    )
+    steer_damping: Annotated[float, Field(ge=0, le=1e6)] = Field(
+        default=0.0,
+        description="coefficient of the torque against the steer rate on the front frame",
+        json_schema_extra={"unit": "N m s/rad"},
+    )
 
 
 class Simulation(Table):
@@ -141,6 +162,9 @@ class Scenario(Table):
         description="parameters that differ from the benchmark bicycle's",
         json_schema_extra=_list_parameters,
     )
+    inputs: InputsTable = Field(
+        default=InputsTable(), description="generalised forces; a circular motion is the one with them held"
+    )
     engines: dict[str, dict[str, Any]] = Field(
         default_factory=dict, description="settings by engine, each checked by its engine"
     )
@@ -179,6 +203,10 @@ class Scenario(Table):
     def make_bicycle(self) -> Bicycle:
         """Build the benchmark bicycle with this scenario's overrides."""
         return Bicycle(**self.bicycle)
+
+    def make_inputs(self) -> Inputs:
+        """Make the inputs of this scenario's rides."""
+        return Inputs(**self.inputs.model_dump())
 
 
 def _list_bicycle_faults(values: Mapping[str, float]) -> list[str]:

@@ -38,7 +38,8 @@ class Start:
     motion : CircularMotion or None
     growth_rate : float
         Largest real part of the motion's eigenvalues that symmetry does not fix [1/s]. On ground without symmetry,
-        where no motion is steady, the value is that of the same start on the level plane.
+        where no motion is steady, the value is that of the same start on the level plane. Of a straight start with
+        torques, which is not steady either, it is that of the equations frozen at the start.
     size : float
         Radius of the circle of D, or the wheelbase for a straight start [m].
     """
@@ -71,7 +72,8 @@ def make_start(scenario: Scenario) -> Start:
         raise ScenarioError(f"motion: {error}") from error
     times = output_times(scenario.simulation)
     size = float(np.hypot(*motion.position[:2])) if motion is not None else bicycle.wheelbase
-    return Start(Problem(bicycle, surface, q, qd, times), undisturbed, family, motion, rate, size)
+    problem = Problem(bicycle, surface, q, qd, times, scenario.make_inputs())
+    return Start(problem, undisturbed, family, motion, rate, size)
 
 
 def output_times(simulation: Simulation) -> np.ndarray:
@@ -87,7 +89,7 @@ def _compute_growth_rate(
     if not isinstance(surface, SurfaceOfRevolution):
         surface = Plane()
         _, _, q, qd = _compute_undisturbed(scenario, bicycle, surface)
-    return growth_rate(surface, linearise(bicycle, surface, q, qd).eigenvalues, float(qd[YAW]))
+    return growth_rate(surface, linearise(bicycle, surface, q, qd, scenario.make_inputs()).eigenvalues, float(qd[YAW]))
 
 
 def _compute_undisturbed(
@@ -96,7 +98,8 @@ def _compute_undisturbed(
     table = scenario.motion
     if isinstance(table, CircularTable):
         near = (table.near.lean, table.near.steer) if table.near is not None else None
-        family, motion = _find_motion(bicycle, make_bowl(surface), table.rear_rate, table.family, near)  # type: ignore[arg-type]
+        where, inputs = (bicycle, make_bowl(surface)), scenario.make_inputs()
+        family, motion = _find_motion(*where, table.rear_rate, table.family, near, inputs)  # type: ignore[arg-type]
         return family, motion, *motion.state()
     rates = (0.0, 0.0, table.speed / bicycle.rear_wheel_radius)
     # Where the disturbed bicycle stands: there may be no ground at the origin.

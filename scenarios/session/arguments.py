@@ -12,6 +12,7 @@ import numpy as np
 
 from ...engines.engine import REFERENCE, Settings
 from ...reference.bicycle import Bicycle
+from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.surface import Surface
 from ..error import ScenarioError
 from ..scenario import parse_surface, show_value
@@ -226,6 +227,21 @@ def read_bicycle(bicycle: Any) -> Bicycle:
     if not isinstance(bicycle, Bicycle):
         raise _refuse("bicycle", bicycle, "it must be a Bicycle, such as Bicycle(trail=0.1)")
     return bicycle
+
+
+def read_inputs(inputs: Any) -> Inputs:
+    """Return the inputs, none if they are None.
+
+    Raises
+    ------
+    ScenarioError
+        If they are no inputs.
+    """
+    if inputs is None:
+        return NO_INPUTS
+    if not isinstance(inputs, Inputs):
+        raise _refuse("inputs", inputs, "it must be an Inputs, such as Inputs(steer_torque=0.1)")
+    return inputs
 
 
 def _refuse(name: str, value: Any, right: str) -> ScenarioError:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ...reference.bicycle import Bicycle
+from ...reference.inputs import Inputs
 from ...reference.surface import Surface
 from ..motions import (
     CircularSolution,
@@ -15,7 +16,15 @@ from ..motions import (
     solve_circular,
 )
 from ..scenario import make_bowl
-from .arguments import read_bicycle, read_family, read_ground, read_near, read_number, read_progress
+from .arguments import (
+    read_bicycle,
+    read_family,
+    read_ground,
+    read_inputs,
+    read_near,
+    read_number,
+    read_progress,
+)
 
 
 def circular(
@@ -26,8 +35,9 @@ def circular(
     family: int | None = None,
     near: tuple[float, float] | None = None,
     bicycle: Bicycle | None = None,
+    inputs: Inputs | None = None,
 ) -> CircularSolution:
-    """Compute one hands-free circular motion, its contact forces and its stability.
+    """Compute one circular motion, hands-free or with constant inputs, its contact forces and its stability.
 
     Parameters
     ----------
@@ -44,6 +54,9 @@ def circular(
         Lean and steer that the motion is near to [rad].
     bicycle : Bicycle, optional
         The benchmark bicycle if not given.
+    inputs : Inputs, optional
+        Torques and steer damping that are held; none if not given. With a steer torque the families have no numbers,
+        and ``near`` is needed.
 
     Returns
     -------
@@ -66,11 +79,16 @@ def circular(
     """
     ground = make_bowl(read_ground(alpha, surface))
     rate = read_number("rear_rate", rear_rate, "rad/s")
-    return solve_circular(read_bicycle(bicycle), ground, rate, read_family(family), read_near(near))
+    made = read_bicycle(bicycle)
+    return solve_circular(made, ground, rate, read_family(family), read_near(near), read_inputs(inputs))
 
 
 def families(
-    *, alpha: float | None = None, surface: Surface | str | None = None, bicycle: Bicycle | None = None
+    *,
+    alpha: float | None = None,
+    surface: Surface | str | None = None,
+    bicycle: Bicycle | None = None,
+    inputs: Inputs | None = None,
 ) -> SolutionFamilies:
     """Follow the four families of circular motions, with special points and stable sections.
 
@@ -82,6 +100,8 @@ def families(
         Another surface of revolution about z, or the text that names it, such as ``"sphere:radius=20"``.
     bicycle : Bicycle, optional
         The benchmark bicycle if not given.
+    inputs : Inputs, optional
+        Torques and steer damping that are held; none if not given. With a steer torque no curve has a number.
 
     Returns
     -------
@@ -102,7 +122,7 @@ def families(
     >>> found.curves[1].samples.lean.shape == found.curves[1].samples.rear_rate.shape
     True
     """
-    return follow_families(read_bicycle(bicycle), make_bowl(read_ground(alpha, surface)))
+    return follow_families(read_bicycle(bicycle), make_bowl(read_ground(alpha, surface)), read_inputs(inputs))
 
 
 def critical(

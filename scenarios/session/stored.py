@@ -65,7 +65,7 @@ def _read_run(folder: Path, manifest: Mapping[str, Any], metrics: Mapping[str, A
     return Run(
         name=str(manifest["scenario"]),
         title=str(manifest["title"]),
-        start=Problem(bicycle, surface, q, qd, output_times(scenario.simulation)),
+        start=Problem(bicycle, surface, q, qd, output_times(scenario.simulation), scenario.make_inputs()),
         growth_rate=float(manifest["start"]["growth_rate"]),
         family=None if family is None else int(family),
         trajectories={name: read_ride(folder, manifest, metrics, name) for name in metrics},

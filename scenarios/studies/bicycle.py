@@ -78,6 +78,7 @@ class BicycleStudy:
             "ignored": list(self.source.ignored),
             "warnings": list(self.source.bicycle.warnings()),
             "canonical": {name: getattr(m, name).tolist() for name in ("M", "C1", "K0", "K2")},
+            "steer_damping": m.steer_damping,
             "speeds": self.speeds.tolist(),
             "eigenvalues": _split_complex(self.eigenvalues),
             "modes": {"names": list(self.modes), "eigenvalues": _split_complex(self.followed)},
@@ -127,7 +128,7 @@ def find_bicycle(source: str) -> BicycleFile:
     return BicycleFile(name, scenario.make_bicycle(), convention="the suite's names, z up")
 
 
-def study_bicycle(source: BicycleFile, speeds: np.ndarray) -> BicycleStudy:
+def study_bicycle(source: BicycleFile, speeds: np.ndarray, steer_damping: float = 0.0) -> BicycleStudy:
     """Compute a bicycle's canonical matrices, its eigenvalues over speed, and where its stability changes.
 
     Parameters
@@ -135,6 +136,8 @@ def study_bicycle(source: BicycleFile, speeds: np.ndarray) -> BicycleStudy:
     source : BicycleFile
     speeds : ndarray, shape (n,)
         Not negative [m/s].
+    steer_damping : float
+        Not negative [N m s/rad].
 
     Returns
     -------
@@ -145,7 +148,7 @@ def study_bicycle(source: BicycleFile, speeds: np.ndarray) -> BicycleStudy:
     ScenarioError
         If the equations of lean and steer are singular.
     """
-    matrices = canonical_matrices(source.bicycle)
+    matrices = canonical_matrices(source.bicycle, steer_damping)
     try:
         eigenvalues = matrices.eigenvalues(speeds)
         followed, modes = name_modes(matrices, speeds)
@@ -160,7 +163,9 @@ def study_bicycle(source: BicycleFile, speeds: np.ndarray) -> BicycleStudy:
         modes=tuple(str(mode) for mode in modes),
         weave_speed=weave_speed(matrices),
         capsize_speed=capsize_speed(matrices),
-        deviations=speed_deviations(source.bicycle, source.uncertainties) if source.uncertainties else {},
+        deviations=speed_deviations(source.bicycle, source.uncertainties, steer_damping)
+        if source.uncertainties
+        else {},
         changes=stability_changes(matrices),
         stable_speeds=stable_speeds(matrices),
     )

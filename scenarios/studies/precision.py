@@ -13,7 +13,7 @@ from ...engines.admission import ride_engine
 from ...engines.engine import REFERENCE, Engine, Problem, Settings, Trajectory, why_failed
 from ...engines.guard import call_engine
 from ...reference.stability import linearise
-from ...reference.surface import SurfaceOfRevolution
+from ...reports.drawing import find_unsteadiness
 from ...reports.measure import IDENTIFY_LEVELS as IDENTIFY_LEVELS
 from ...reports.measure import Identified, Level, comparison_horizon, eigenvalue_document, engine_document, identify
 from ..error import ScenarioError
@@ -104,12 +104,13 @@ def study_precision(
     studies = {}
     q, qd = plan.start.undisturbed
     undisturbed = replace(plan.start.problem, q=q, qd=qd)
+    unsteady = find_unsteadiness(undisturbed.surface, undisturbed.inputs, plan.start.motion is not None)
     for engine_name, (engine, settings) in plan.engines.items():
         runs = list(_run_levels(engine, ladders[engine_name], plan.start, problem, reference, watch, trace))
         found = [run for run in runs if isinstance(run, Level)]
         failures = [run.as_json() for run in runs if isinstance(run, _Failure)]
         ran = not runs or not all(isinstance(run, _Failure) and run.broke for run in runs)
-        identified = _identify(engine, settings, undisturbed, watch, trace) if eigenvalues else None
+        identified = _identify(engine, settings, undisturbed, unsteady, watch, trace) if eigenvalues else None
         studies[engine_name] = Study(found, failures, ran, identified)
     return _make_document(name, plan.start, problem, reference, undisturbed, studies)
 
@@ -232,10 +233,12 @@ def _run_levels(
 
 
 def _identify(
-    engine: Engine, settings: Settings, undisturbed: Problem, watch: RunWatch, trace: Trace | None
+    engine: Engine, settings: Settings, undisturbed: Problem, unsteady: str | None, watch: RunWatch, trace: Trace | None
 ) -> Identified | str:
-    if not isinstance(undisturbed.surface, SurfaceOfRevolution):
+    if unsteady == "ground":
         return "the ground is no surface of revolution, so that the motion is not steady"
+    if unsteady == "torques":
+        return "a straight start with torques is no steady motion"
     label = f"{engine.name} modes"
     try:
         return call_engine(
@@ -267,7 +270,9 @@ def _make_document(
         found = study.identified
         entry["eigenvalues"] = None
         if isinstance(found, Identified):
-            exact = linearise(undisturbed.bicycle, undisturbed.surface, undisturbed.q, undisturbed.qd)
+            exact = linearise(
+                undisturbed.bicycle, undisturbed.surface, undisturbed.q, undisturbed.qd, undisturbed.inputs
+            )
             entry["eigenvalues"] = eigenvalue_document(found, exact.eigenvalues)
         elif found is not None:
             entry["failures"].append({"step": None, "reason": f"no eigenvalues: {found}"})

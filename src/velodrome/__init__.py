@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from .reference.bowls import Sphere as Sphere
     from .reference.bowls import Torus as Torus
     from .reference.height_field import HeightField as HeightField
+    from .reference.inputs import Inputs as Inputs
     from .reference.profile import PolynomialProfile as PolynomialProfile
     from .reference.profile import SplineProfile as SplineProfile
     from .reference.stability import Linearisation as Linearisation
@@ -64,6 +65,7 @@ __all__ = [
     "EngineError",
     "FamilyCurve",
     "HeightField",
+    "Inputs",
     "Linearisation",
     "MetricsTable",
     "Paraboloid",
@@ -109,6 +111,7 @@ _HOMES = {
     ".reference.bicycle": ("Bicycle",),
     ".reference.bowls": ("Cone", "Sphere", "Torus"),
     ".reference.height_field": ("HeightField",),
+    ".reference.inputs": ("Inputs",),
     ".reference.profile": ("PolynomialProfile", "SplineProfile"),
     ".reference.stability": ("Linearisation", "linearise"),
     ".reference.surface": ("Paraboloid", "Plane", "Surface", "SurfaceOfRevolution", "surface_function"),
