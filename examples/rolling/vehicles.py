@@ -205,6 +205,7 @@ def _axle_hinge(parent: str, wheel: Body) -> Hinge:
     return Hinge(wheel.name, parent, wheel.name, wheel.position, wheel.rotation[:, 1])
 
 
+CART_BOWL, TANDEM_BOWL = Paraboloid(0.05), Paraboloid(0.02)
 TRICYCLE_RADIUS = 2.0  # of the circle of the middle of the rear axle [m]
 TRICYCLE_RATE = 0.5  # [rad/s]
 
@@ -249,7 +250,7 @@ def find_tricycle_force(vehicle: Vehicle, time: float) -> np.ndarray:
     return force
 
 
-def make_cart(surface: Surface = Paraboloid(0.05), speed: float = 1.5) -> Vehicle:
+def make_cart(surface: Surface = CART_BOWL, speed: float = 1.5) -> Vehicle:
     """Make a cart of four wheels in a bowl: a rigid rear axle, and a front beam that rocks about the forward axis.
 
     The front wheels are steered for good, each to the circles of 3 m about the rear axle's line. On the plane three
@@ -280,7 +281,7 @@ def make_cart(surface: Surface = Paraboloid(0.05), speed: float = 1.5) -> Vehicl
     return set_rolling(set_down(_place(vehicle, 2.5), "up", "lean", "pitch", "rocking"), forward=speed)
 
 
-def make_tandem(surface: Surface = Paraboloid(0.02), speed: float = 6.0) -> Vehicle:
+def make_tandem(surface: Surface = TANDEM_BOWL, speed: float = 6.0) -> Vehicle:
     """Make a tandem in a bowl: a frame with two riders, a fork, two wheels, and cranks that swing freely.
 
     The cranks' mass centre is off their axis, since one pedal carries a load, so they move the whole tandem a little.
