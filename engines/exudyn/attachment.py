@@ -13,12 +13,12 @@ from . import pose
 
 _indices: Any = exu  # the library's type stubs lack the types of its indices
 
-# Kinds of nodes by the engine's names, with the numbers of their coordinates, and of those that are positions.
+# Kinds of nodes by the engine's names, with the numbers of their coordinates.
 _RIGID_NODES = {
-    "RigidBodyEP": (pose.EULER_PARAMETERS, 7, 3),
-    "RigidBodyRxyz": (pose.ANGLES, 6, 3),
-    "RigidBodyRotVecLG": (pose.ROTATION_VECTOR, 6, 3),
-    "RigidBody2D": (pose.PLANAR, 3, 2),
+    "RigidBodyEP": (pose.EULER_PARAMETERS, 7),
+    "RigidBodyRxyz": (pose.ANGLES, 6),
+    "RigidBodyRotVecLG": (pose.ROTATION_VECTOR, 6),
+    "RigidBody2D": (pose.PLANAR, 3),
 }
 _BODIES = ("RigidBody", "RigidBody2D", "Ground")
 _JOINTS = ("RevoluteX", "RevoluteY", "RevoluteZ", "PrismaticX", "PrismaticY", "PrismaticZ")
@@ -46,8 +46,8 @@ class Attachment:
         How it depends on its node; one of the kinds of `pose`.
     node : exudyn.NodeIndex or None
         Its node; None for the ground.
-    size, translations : int
-        Numbers of the node's coordinates, and of those that are the position itself; see `pose.Frames`.
+    size : int
+        Number of the node's coordinates.
     position : ndarray, shape (3,)
         Its origin in the body's axes [m]; that of the ground in inertial axes.
     rotation : ndarray, shape (3, 3)
@@ -59,13 +59,12 @@ class Attachment:
     kind: int
     node: Any = None
     size: int = 0
-    translations: int = 0
     position: np.ndarray = field(default_factory=lambda: np.zeros(3))
     rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
     path: TreePath = _NO_PATH
 
 
-INERTIAL_FRAME = Attachment(pose.INERTIAL)
+INERTIAL_FRAME = Attachment(pose.FIXED)
 
 
 def find_attachment(mbs: exu.MainSystem, number: Any) -> Attachment:
@@ -131,8 +130,8 @@ def _read_node(mbs: exu.MainSystem, number: Any, owner: str) -> Attachment:
     if kind not in _RIGID_NODES:
         known = ", ".join(f"Node{name}" for name in _RIGID_NODES)
         raise ValueError(f"{owner} has a Node{kind}; a rolling joint takes a rigid body's node: {known}")
-    family, size, translations = _RIGID_NODES[kind]
-    return Attachment(family, number, size, translations)
+    family, size = _RIGID_NODES[kind]
+    return Attachment(family, number, size)
 
 
 def _read_link(mbs: exu.MainSystem, number: Any, link: int) -> Attachment:
@@ -193,7 +192,6 @@ def stack_frames(attachments: Sequence[Attachment]) -> pose.Frames:
         kinds=np.array([each.kind for each in attachments]),
         starts=np.array([0 if each.node is None else starts[int(each.node)] for each in attachments]),
         sizes=np.array([each.size for each in attachments]),
-        translations=np.array([each.translations for each in attachments]),
         positions=np.array([each.position for each in attachments]),
         rotations=np.array([each.rotation for each in attachments]),
         lengths=np.array([len(each.path.joints) for each in attachments]),

@@ -43,9 +43,9 @@ from numpy.typing import ArrayLike
 
 from ...reference.rim import rim_search
 from ...reference.surface import Surface
-from . import kernel
+from . import general, kernel
 from .attachment import INERTIAL_FRAME, Attachment, find_attachment, list_nodes, reference_coordinates, stack_frames
-from .pose import Frames
+from .pose import EULER_PARAMETERS, FIXED, Frames
 
 SLIP_ROWS = (0, 1)  # of a wheel's three
 
@@ -226,6 +226,19 @@ def _make_triad(axle: Sequence[float]) -> np.ndarray:
     return np.stack([np.cross(along, across), along, across])
 
 
+def _is_common(frames: Frames, order: np.ndarray) -> bool:
+    """Whether the joint is of the kind that `kernel` is for, as in a bicycle."""
+    *wheels, ground = frames.kinds
+    return (
+        ground == FIXED
+        and not frames.positions[-1].any()
+        and np.array_equal(frames.rotations[-1], np.eye(3))
+        and all(kind == EULER_PARAMETERS for kind in wheels)
+        and len(set(frames.starts[:-1])) == len(wheels)
+        and bool(np.all(order >= 0))
+    )
+
+
 def _make_user_functions(
     rolling: tuple[Frames, np.ndarray, np.ndarray, np.ndarray], start: np.ndarray, surface: Surface, ratio: float
 ) -> Any:
@@ -235,13 +248,17 @@ def _make_user_functions(
     """
     frames, triads, radii, order = rolling
     count, size = int(order.max()) + 1, len(start)
-    state, rows, values, scale = (np.zeros(shape) for shape in ((2, size), (count, size), (2, count), 1))
-    state[0] = start
     function = surface.function.real
-    ground = rim_search(surface, radii)
-    evaluate = kernel.constraints(
-        state, frames, triads, radii, order, ground, function, surface.parameters, scale, rows, values
-    ).__next__
+    where = (rim_search(surface, radii), function, surface.parameters)
+    rows, values, scale = np.zeros((count, size)), np.zeros((2, count)), np.zeros(1)
+    if _is_common(frames, order):
+        state = np.stack([start, np.zeros(size)]).reshape(-1, 7)
+        evaluate = kernel.constraints(state, frames.positions[:-1], triads, radii, *where, scale, rows, values).__next__
+    else:
+        state = np.stack([start, np.zeros(size)])
+        evaluate = general.attached_constraints(
+            state, frames, triads, radii, order, *where, scale, rows, values
+        ).__next__
     evaluate()  # compiles
     memory, pack = state.data.cast("B"), Struct(f"{2 * size}d").pack_into
     on_position_level, on_velocity_level = values[0].tolist, values[1].tolist

@@ -15,7 +15,6 @@ kind of node as the engine defines its coordinates:
     PLANAR             position in the xy plane and the angle about z
     TREE               joint coordinates of a kinematic tree
     FIXED              none
-    INERTIAL           none; the frame is the inertial one
 """
 
 from __future__ import annotations
@@ -24,10 +23,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...reference.kernels.compilation import jit, jit_inline
+from ...reference.kernels.compilation import jit
 from ...reference.kernels.vector import add, cross
+from .kernel import axes as euler_parameter_axes
+from .kernel import rotate_vector
 
-INERTIAL, FIXED, EULER_PARAMETERS, ANGLES, ROTATION_VECTOR, PLANAR, TREE = range(7)
+FIXED, EULER_PARAMETERS, ANGLES, ROTATION_VECTOR, PLANAR, TREE = range(6)
 REVOLUTE, PRISMATIC = 0, 3  # joints turn about, or slide along, axis number joint - REVOLUTE or joint - PRISMATIC
 
 
@@ -42,9 +43,6 @@ class Frames(NamedTuple):
         Indices of the nodes' first coordinates.
     sizes : ndarray, shape (f,)
         Numbers of the nodes' coordinates.
-    translations : ndarray, shape (f,)
-        Numbers of their first coordinates that are the position itself in inertial axes, along x, y and z: L is the
-        unit matrix there, zero elsewhere, and is not filled; none in a tree.
     positions : ndarray, shape (f, 3)
         Frames' origins in their bodies' axes [m]; of fixed frames in inertial axes.
     rotations : ndarray, shape (f, 3, 3)
@@ -62,7 +60,6 @@ class Frames(NamedTuple):
     kinds: np.ndarray
     starts: np.ndarray
     sizes: np.ndarray
-    translations: np.ndarray
     positions: np.ndarray
     rotations: np.ndarray
     lengths: np.ndarray
@@ -72,30 +69,6 @@ class Frames(NamedTuple):
 
 
 @jit
-def euler_parameter_axes(t0, t1, t2, t3):
-    """Return unit vectors (x, y, z) of a body with Euler parameters of any length.
-
-    Newton's iterates leave the unit sphere, and the engine's own equation brings them back, so the contact must
-    not depend on the length.
-    """
-    s = 2 / (t0 * t0 + t1 * t1 + t2 * t2 + t3 * t3)
-    x = (1 - s * (t2 * t2 + t3 * t3), s * (t1 * t2 + t0 * t3), s * (t1 * t3 - t0 * t2))
-    y = (s * (t1 * t2 - t0 * t3), 1 - s * (t1 * t1 + t3 * t3), s * (t2 * t3 + t0 * t1))
-    z = (s * (t1 * t3 + t0 * t2), s * (t2 * t3 - t0 * t1), 1 - s * (t1 * t1 + t2 * t2))
-    return x, y, z
-
-
-@jit
-def rotate_vector(body, v):
-    """Return the inertial components of a vector ``v`` fixed in a body with unit vectors ``body``."""
-    return (
-        body[0][0] * v[0] + body[1][0] * v[1] + body[2][0] * v[2],
-        body[0][1] * v[0] + body[1][1] * v[1] + body[2][1] * v[2],
-        body[0][2] * v[0] + body[1][2] * v[1] + body[2][2] * v[2],
-    )
-
-
-@jit_inline
 def rotate_axes(body, matrix):
     """Return the unit vectors of axes that are the columns of a rotation ``matrix`` (3, 3) in a body's axes."""
     return (
@@ -105,7 +78,7 @@ def rotate_axes(body, matrix):
     )
 
 
-@jit_inline
+@jit
 def turn_axes(body, axis, angle):
     """Return the unit vectors of a body after a turn about its axis number ``axis``."""
     c, s = np.cos(angle), np.sin(angle)
@@ -117,7 +90,7 @@ def turn_axes(body, axis, angle):
     return combine_axes(c, x, s, y), combine_axes(c, y, -s, x), z
 
 
-@jit_inline
+@jit
 def combine_axes(a, u, b, v):
     """Return a u + b v."""
     return a * u[0] + b * v[0], a * u[1] + b * v[1], a * u[2] + b * v[2]
@@ -137,7 +110,7 @@ def rotation_vector_axes(v0, v1, v2):
     return x, y, z
 
 
-@jit_inline
+@jit
 def set_column(matrix, column, vector):
     """Set a column of a matrix (3, n)."""
     for i in range(3):
@@ -149,9 +122,6 @@ def follow_tree(frames, number, coordinates, linear, angular):
     """Return (origin, axes) of a link, and fill the columns of its joints in the Jacobians of that origin."""
     start, count = frames.starts[number], frames.lengths[number]
     joints, offsets, turns = frames.joints[number], frames.offsets[number], frames.turns[number]
-    for i in range(3):
-        for j in range(start, start + frames.sizes[number]):
-            linear[i, j] = angular[i, j] = 0.0
     origin = (offsets[0, 0], offsets[0, 1], offsets[0, 2])
     body = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     for i in range(count):
@@ -180,40 +150,43 @@ def follow_tree(frames, number, coordinates, linear, angular):
     return origin, body
 
 
-@jit_inline
+@jit
 def locate_body(frames, number, coordinates, linear, angular):
     """Return (origin, unit vectors) of the body of a frame, and fill the Jacobians L and G (3, n) of its origin.
 
-    Only the columns of the body's own node are filled, those of its ``translations`` excepted.
+    Only the columns of the body's own node are filled.
     """
     kind, start = frames.kinds[number], frames.starts[number]
-    origin, body = (0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    if kind == EULER_PARAMETERS or kind == ANGLES or kind == ROTATION_VECTOR:
-        origin = (coordinates[start], coordinates[start + 1], coordinates[start + 2])
-        t0, t1, t2 = coordinates[start + 3], coordinates[start + 4], coordinates[start + 5]
-        if kind == EULER_PARAMETERS:
-            t3 = coordinates[start + 6]
-            # w = G theta' is twice the vector part of theta' conj(theta).
-            set_column(angular, start + 3, (-2 * t1, -2 * t2, -2 * t3))
-            set_column(angular, start + 4, (2 * t0, 2 * t3, -2 * t2))
-            set_column(angular, start + 5, (-2 * t3, 2 * t0, 2 * t1))
-            set_column(angular, start + 6, (2 * t2, -2 * t1, 2 * t0))
-            body = euler_parameter_axes(t0, t1, t2, t3)
-        elif kind == ANGLES:
-            set_column(angular, start + 3, body[0])
-            body = turn_axes(body, 0, t0)
-            set_column(angular, start + 4, body[1])
-            body = turn_axes(body, 1, t1)
-            set_column(angular, start + 5, body[2])
-            body = turn_axes(body, 2, t2)
-        else:
-            body = rotation_vector_axes(t0, t1, t2)
-            for j in range(3):
-                set_column(angular, start + 3 + j, body[j])
-    elif kind == PLANAR:
-        origin = (coordinates[start], coordinates[start + 1], 0.0)
+    linear[:, start : start + frames.sizes[number]] = 0.0
+    angular[:, start : start + frames.sizes[number]] = 0.0
+    body = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    if kind == FIXED:
+        return (0.0, 0.0, 0.0), body
+    if kind == TREE:
+        return follow_tree(frames, number, coordinates, linear, angular)
+    linear[0, start] = linear[1, start + 1] = 1.0
+    if kind == PLANAR:
         set_column(angular, start + 2, body[2])
-        body = turn_axes(body, 2, coordinates[start + 2])
-    elif kind == TREE:
-        origin, body = follow_tree(frames, number, coordinates, linear, angular)
+        return (coordinates[start], coordinates[start + 1], 0.0), turn_axes(body, 2, coordinates[start + 2])
+    linear[2, start + 2] = 1.0
+    origin = (coordinates[start], coordinates[start + 1], coordinates[start + 2])
+    t0, t1, t2 = coordinates[start + 3], coordinates[start + 4], coordinates[start + 5]
+    if kind == EULER_PARAMETERS:
+        t3 = coordinates[start + 6]
+        # w = G theta' is twice the vector part of theta' conj(theta).
+        set_column(angular, start + 3, (-2 * t1, -2 * t2, -2 * t3))
+        set_column(angular, start + 4, (2 * t0, 2 * t3, -2 * t2))
+        set_column(angular, start + 5, (-2 * t3, 2 * t0, 2 * t1))
+        set_column(angular, start + 6, (2 * t2, -2 * t1, 2 * t0))
+        return origin, euler_parameter_axes(t0, t1, t2, t3)
+    if kind == ANGLES:
+        set_column(angular, start + 3, body[0])
+        body = turn_axes(body, 0, t0)
+        set_column(angular, start + 4, body[1])
+        body = turn_axes(body, 1, t1)
+        set_column(angular, start + 5, body[2])
+        return origin, turn_axes(body, 2, t2)
+    body = rotation_vector_axes(t0, t1, t2)
+    for j in range(3):
+        set_column(angular, start + 3 + j, body[j])
     return origin, body

@@ -9,7 +9,7 @@ import numpy as np
 from exudyn.itemInterface import SensorUserFunction
 
 from ...reference.rim import rim_search
-from . import kernel
+from . import general
 from .attachment import reference_coordinates
 from .joint import RollingJoint
 
@@ -72,7 +72,7 @@ def _make_user_function(mbs: exu.MainSystem, joint: RollingJoint, quantity: Quan
     function = joint.surface.function.real
     shape = (joint.frames, joint.triads, joint.radii)
     where = (rim_search(joint.surface, joint.radii), function, joint.surface.parameters)
-    measure = kernel.probe(wheel, state, *shape, *where, point, frame, slip, gap).__next__
+    measure = general.probe(wheel, state, *shape, *where, point, frame, slip, gap).__next__
     values = {"ContactPoint": point, "Gap": gap, "Slip": slip}
     constrained = joint.order[wheel] >= 0
     rows = joint.order[wheel, constrained]

@@ -105,9 +105,9 @@ def roll_discs_on_tangents(
     """
     nodes, out = [wheel["nodeNumber"] for wheel in wheels], np.empty((2, 3))
     coordinates = np.array([system.GetNode(node)["referenceCoordinates"] for node in nodes])
-    radii = np.array(wheel_radii(problem))
+    shape = (np.zeros((2, 3)), np.stack([np.eye(3)] * 2), np.array(wheel_radii(problem)))
     function, looking = problem.surface.function.real, rim_search(problem.surface, wheel_radii(problem))
-    find = kernel.normals(coordinates, radii, looking, function, problem.surface.parameters, out).__next__
+    find = kernel.normals(coordinates, *shape, looking, function, problem.surface.parameters, out).__next__
     find()
     discs, objects = _add_discs(system, wheels, problem, out)
     kind = exu.OutputVariableType
