@@ -281,8 +281,10 @@ def make_cart(surface: Surface = CART_BOWL, speed: float = 1.5) -> Vehicle:
     return set_rolling(set_down(_place(vehicle, 2.5), "up", "lean", "pitch", "rocking"), forward=speed)
 
 
-def make_tandem(surface: Surface = TANDEM_BOWL, speed: float = 6.0) -> Vehicle:
+def make_tandem(surface: Surface = TANDEM_BOWL, speed: float = 5.0) -> Vehicle:
     """Make a tandem in a bowl: a frame with two riders, a fork, two wheels, and cranks that swing freely.
+
+    It starts upright and straight ahead, across the slope, with a lean rate, and steers by itself.
 
     The cranks' mass centre is off their axis, since one pedal carries a load, so they move the whole tandem a little.
     """
@@ -309,8 +311,8 @@ def make_tandem(surface: Surface = TANDEM_BOWL, speed: float = 6.0) -> Vehicle:
         wheels=(Wheel("rear-wheel", rear), Wheel("front-wheel", front)),
         surface=surface,
     )
-    leaning = set_down(move(_place(vehicle, 10.0), lean=-0.15, steer=0.1), "up", "pitch")
-    return set_rolling(leaning, forward=speed, lean=0.05, steer=0.1, crank=1.0)
+    standing = set_down(_place(vehicle, 10.0), "up", "pitch")
+    return set_rolling(standing, forward=speed, lean=0.05, steer=0.0, crank=1.0)
 
 
 def _place(vehicle: Vehicle, distance: float) -> Vehicle:
