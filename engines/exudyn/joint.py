@@ -1,8 +1,8 @@
 """A rolling joint of knife-edge wheels on any smooth surface, for any Exudyn model.
 
-The engine's own rolling disc works on flat ground only. Here a wheel gets three constraints on the
-coordinates of its node: two rows of slip, nonholonomic, and the gap, holonomic. One object of the
-engine's general connector holds all rows of one wheel or of two, with one compiled kernel behind it, which
+The engine's own rolling disc works on flat ground only. Here a wheel gets up to three constraints on the
+coordinates of its node: two rows of slip, nonholonomic, and the gap, holonomic. One object of the engine's general
+connector holds the rows of all wheels that belong to its node or two, with one compiled kernel behind it, which
 provides the analytic Jacobian::
 
     wheel = mbs.CreateRigidBody(...)
@@ -18,13 +18,17 @@ slips in a step, about ``newmarkRatio * step * slip``: it is zero exactly where 
 derivative with respect to the positions at the end of the step is the row's own Jacobian, as the engine expects. So
 gap and slip share one call, the slip is not differentiated, and the engine's initial accelerations, which
 omit the term (W q')_q q' of a constraint declared nonholonomic, are right.
+
+As in the engine's own disc, rows can be left out with ``constrainedAxes``: a vehicle with more constraints than it
+needs has redundant rows, with which the engine's linear solver fails. The ground may be fixed to a body, on which the
+reaction then acts.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from struct import Struct
 from typing import Any
 
@@ -35,10 +39,13 @@ from exudyn.itemInterface import (
     NodePointGround,
     ObjectConnectorCoordinateVector,
 )
+from numpy.typing import ArrayLike
 
 from ...reference.rim import rim_search
 from ...reference.surface import Surface
-from . import kernel
+from . import general, kernel
+from .attachment import INERTIAL_FRAME, Attachment, find_attachment, list_nodes, reference_coordinates, stack_frames
+from .pose import EULER_PARAMETERS, FIXED, Frames
 
 SLIP_ROWS = (0, 1)  # of a wheel's three
 
@@ -50,25 +57,28 @@ class RollingJoint:
     Attributes
     ----------
     objectNumber : exudyn.ObjectIndex
-        Object number of the constraint; its output variable `Force` contains minus the components
-        (lateral, forward, normal) of the contact forces, wheel by wheel [N].
+        Object number of the constraint; its output variable `Force` contains minus the components of the contact
+        forces that are constrained, wheel by wheel: lateral, forward, normal [N].
     nodeNumbers : tuple
-        The wheels' nodes.
+        The one or two nodes on whose coordinates the constraints depend.
+    frames : Frames
+        Frames of the wheels, with their origins at the centres, and the frame of the ground.
     surface : Surface
-    centres : ndarray, shape (k, 3)
-        Wheel centres in the bodies' axes [m].
     triads : ndarray, shape (k, 3, 3)
-        Rows are right-handed unit vectors in the bodies' axes; the middle row is the axle.
+        Rows are right-handed unit vectors in the axes of the wheels' bodies; the middle row is the axle.
     radii : ndarray, shape (k,)
         Radii of the knife edges [m].
+    order : ndarray, shape (k, 3)
+        Rows of the wheels' lateral, forward and normal constraints in the object; -1 for those that are left out.
     """
 
     objectNumber: Any
     nodeNumbers: tuple[Any, ...]
+    frames: Frames
     surface: Surface
-    centres: np.ndarray
     triads: np.ndarray
     radii: np.ndarray
+    order: np.ndarray
 
 
 def CreateRollingJointOnSurface(
@@ -79,14 +89,18 @@ def CreateRollingJointOnSurface(
     axisVector: Sequence[float] = (1.0, 0.0, 0.0),
     discRadius: float | Sequence[float] = 0.0,
     surface: Surface | None = None,
+    constrainedAxes: ArrayLike = (1, 1, 1),
+    groundNumber: Any = None,
     newmarkRatio: float = 0.5,
     activeConnector: bool = True,
 ) -> RollingJoint:
-    """Let one or two wheels roll on a surface, as knife edges that neither slip nor lift off.
+    """Let wheels roll on a surface, as knife edges that neither slip nor lift off.
 
-    Two wheels in one joint take less time than in two joints: the engine requests all their constraints at once.
-    The wheels touch where their edges are closest to the surface, from above. The joint works with the engine's
-    implicit solvers; with ``useIndex2Constraints`` all rows are velocities, as they should be.
+    All wheels of a joint and its ground belong to one node or to two: two wheels that are bodies of their own, any
+    number of wheels of one body or one kinematic tree, or a wheel on moving ground. Further wheels get joints of their
+    own; two wheels in one joint take less time than in two joints, since the engine requests all their constraints at
+    once. The wheels touch where their edges are closest to the surface, from above. The joint works with the
+    engine's implicit solvers; with ``useIndex2Constraints`` all rows are velocities, as they should be.
 
     Parameters
     ----------
@@ -95,13 +109,20 @@ def CreateRollingJointOnSurface(
     name : str
         Name of the constraint.
     bodyNumbers : sequence
-        The wheels: one or two rigid bodies whose nodes have Euler parameters.
+        The wheels: rigid bodies, their nodes, or markers (MarkerBodyRigid, MarkerNodeRigid,
+        MarkerKinematicTreeRigid), with nodes of any kind. Several wheels of one body are markers on it.
     axisPosition, axisVector : array_like, shape (3,)
-        Wheel centre [m] and axle, of any length, in the body's axes; the same for both wheels.
+        Wheel centre [m] and axle, of any length, in the axes of the body, or of the marker; the same for all wheels.
     discRadius : float or sequence of float
         Radius of the edge [m], one for all wheels or one for each.
     surface : Surface
-        The ground, fixed in space; see `velodrome.reference.surface`.
+        The ground; see `velodrome.reference.surface`.
+    constrainedAxes : array_like, shape (3,) or (k, 3)
+        Flags of the constraints, for all wheels or for each: lateral, forward and normal, as for the engine's own
+        disc. Those that are 0 are left out, and so is their force.
+    groundNumber : exudyn.ObjectIndex, exudyn.NodeIndex or exudyn.MarkerIndex, optional
+        The body or marker to which the surface is fixed, in its axes: moving ground, or ground at another place. By
+        default the surface is fixed in inertial axes.
     newmarkRatio : float
         Newmark's beta / gamma of the time integration: 0.5 for the trapezoidal rule, up to 2/3 for
         generalized alpha (see `method`). It affects only how fast Newton's method converges.
@@ -115,51 +136,78 @@ def CreateRollingJointOnSurface(
     Raises
     ------
     ValueError
-        If the bodies, the radii, the axle or the surface are not as above.
+        If the bodies, the radii, the axle, the flags or the surface are not as above.
     """
-    nodes = [_find_euler_parameter_node(mbs, body) for body in bodyNumbers]
-    if len(nodes) not in (1, 2) or surface is None:
-        raise ValueError("a rolling joint takes one or two bodyNumbers and a surface")
-    radii = np.broadcast_to(np.asarray(discRadius, float), len(nodes)).copy()
+    if len(bodyNumbers) == 0 or surface is None:
+        raise ValueError("a rolling joint takes a surface, and at least one wheel in bodyNumbers")
+    wheels = [_offset(find_attachment(mbs, number), axisPosition) for number in bodyNumbers]
+    ground = INERTIAL_FRAME if groundNumber is None else find_attachment(mbs, groundNumber)
+    nodes = list_nodes([*wheels, ground])
+    if not nodes:
+        raise ValueError("nothing can roll: the wheels and their ground are all fixed")
+    if len(nodes) > 2:
+        raise ValueError(
+            f"the wheels and their ground belong to {len(nodes)} nodes; the engine's connector joins at most two, so "
+            "give each wheel a joint of its own"
+        )
+    count = len(wheels)
+    radii = np.broadcast_to(np.asarray(discRadius, float), count).copy()
     if not np.all(radii > 0) or not np.all(np.isfinite(radii)):
         raise ValueError(f"discRadius is {discRadius!r}; a wheel's radius is a positive number [m]")
     if not (math.isfinite(newmarkRatio) and newmarkRatio > 0):
         raise ValueError(f"newmarkRatio is {newmarkRatio!r}; it must be a positive number, about 0.5")
-    shape = (
-        np.tile(np.asarray(axisPosition, float), (len(nodes), 1)),
-        np.stack([_make_triad(axisVector)] * len(nodes)),
-    )
-    constraint, jacobian = _make_user_functions(shape, radii, surface, newmarkRatio)
+    frames = stack_frames([*wheels, ground])
+    triad = _make_triad(axisVector)
+    triads = np.stack([triad if np.array_equal(a.rotation, np.eye(3)) else triad @ a.rotation.T for a in wheels])
+    order = _number_rows(constrainedAxes, count)
+    start = reference_coordinates(mbs, nodes)
+    rolling = (frames, triads, radii, order)
+    constraint, jacobian = _make_user_functions(rolling, start, surface, newmarkRatio)
     item = ObjectConnectorCoordinateVector(
         name=name,
         markerNumbers=_add_markers(mbs, nodes),
-        scalingMarker1=np.zeros((3 * len(nodes), 7)),  # gives the number of rows; the functions do the rest
+        # It gives the number of rows; the functions do the rest.
+        scalingMarker1=np.zeros((int(order.max()) + 1, 1)),
         constraintUserFunction=constraint,
         jacobianUserFunction=jacobian,
         activeConnector=activeConnector,
         visualization={"show": False},
     )
-    return RollingJoint(mbs.AddObject(item), tuple(nodes), surface, *shape, radii)
+    return RollingJoint(mbs.AddObject(item), tuple(nodes), frames, surface, triads, radii, order)
 
 
 def slip_equations(mbs: exu.MainSystem, joint: RollingJoint) -> list[int]:
     """Return the indices of the slip rows among the algebraic equations of an assembled system."""
     equations = mbs.systemData.GetObjectLTGAE(joint.objectNumber)
-    return [equations[3 * wheel + row] for wheel in range(len(joint.radii)) for row in SLIP_ROWS]
+    return [equations[row] for row in joint.order[:, SLIP_ROWS].ravel() if row >= 0]
 
 
-def _find_euler_parameter_node(mbs: exu.MainSystem, body: Any) -> Any:
-    item = mbs.GetObject(body)
-    if item["objectType"] != "RigidBody":
-        raise ValueError(f"body {body} is a {item['objectType']}; a wheel is a rigid body (CreateRigidBody)")
-    kind = mbs.GetNode(item["nodeNumber"])["nodeType"]
-    if kind != "RigidBodyEP":
-        raise ValueError(f"body {body} has a {kind} node; a wheel needs nodeType=NodeType.RotationEulerParameters")
-    return item["nodeNumber"]
+def _offset(wheel: Attachment, centre: Sequence[float]) -> Attachment:
+    """Move the frame of a wheel to the wheel's centre."""
+    shift = np.asarray(centre, float)
+    if shift.shape != (3,) or not np.all(np.isfinite(shift)):
+        raise ValueError(f"axisPosition is {centre!r}; it must be a vector of three numbers [m]")
+    return replace(wheel, position=wheel.position + wheel.rotation @ shift)
+
+
+def _number_rows(flags: ArrayLike, wheels: int) -> np.ndarray:
+    """Return the rows (k, 3) of the constraints whose flags are set, and -1 for the others."""
+    chosen = np.asarray(flags)
+    if chosen.shape not in ((3,), (wheels, 3)) or not np.all((chosen == 0) | (chosen == 1)):
+        raise ValueError(
+            f"constrainedAxes is {flags!r}; it must be three flags 0 or 1 (lateral, forward, normal), for all wheels "
+            "or for each"
+        )
+    chosen = np.broadcast_to(chosen, (wheels, 3)).astype(bool)
+    if not chosen.any():
+        raise ValueError("constrainedAxes leaves out all constraints, so there is no joint")
+    order = np.full((wheels, 3), -1)
+    order[chosen] = np.arange(chosen.sum())
+    return order
 
 
 def _add_markers(mbs: exu.MainSystem, nodes: list[Any]) -> list[Any]:
-    """Add the markers of the connector's two sides: both wheels, or the ground and one wheel."""
+    """Add the markers of the connector's two sides: two nodes, or the ground and one node."""
     if len(nodes) == 1:
         nodes = [mbs.AddNode(NodePointGround()), *nodes]
     return [mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=node)) for node in nodes]
@@ -178,32 +226,49 @@ def _make_triad(axle: Sequence[float]) -> np.ndarray:
     return np.stack([np.cross(along, across), along, across])
 
 
+def _is_common(frames: Frames, order: np.ndarray) -> bool:
+    """Whether the joint is of the kind that `kernel` is for, as in a bicycle."""
+    *wheels, ground = frames.kinds
+    return (
+        ground == FIXED
+        and not frames.positions[-1].any()
+        and np.array_equal(frames.rotations[-1], np.eye(3))
+        and all(kind == EULER_PARAMETERS for kind in wheels)
+        and len(set(frames.starts[:-1])) == len(wheels)
+        and bool(np.all(order >= 0))
+    )
+
+
 def _make_user_functions(
-    shape: tuple[np.ndarray, np.ndarray], radii: np.ndarray, surface: Surface, ratio: float
+    rolling: tuple[Frames, np.ndarray, np.ndarray, np.ndarray], start: np.ndarray, surface: Surface, ratio: float
 ) -> Any:
-    """Make the connector's two user functions, which share one evaluation.
+    """Make the connector's two user functions, which share one evaluation; ``start`` has coordinates (n,).
 
     The engine requests the Jacobian and the constraints at every iterate, with the same coordinates.
     """
-    count = len(radii)
-    state, rows, values, scale = (
-        np.zeros(size) for size in ((2 * count, 7), (3 * count, 7 * count), (2, 3 * count), 1)
-    )
-    state[:count, 2], state[:count, 3] = radii, 1.0
+    frames, triads, radii, order = rolling
+    count, size = int(order.max()) + 1, len(start)
     function = surface.function.real
-    evaluate = kernel.constraints(
-        state, *shape, radii, rim_search(surface, radii), function, surface.parameters, scale, rows, values
-    ).__next__
+    where = (rim_search(surface, radii), function, surface.parameters)
+    rows, values, scale = np.zeros((count, size)), np.zeros((2, count)), np.zeros(1)
+    if _is_common(frames, order):
+        state = np.stack([start, np.zeros(size)]).reshape(-1, 7)
+        evaluate = kernel.constraints(state, frames.positions[:-1], triads, radii, *where, scale, rows, values).__next__
+    else:
+        state = np.stack([start, np.zeros(size)])
+        evaluate = general.attached_constraints(
+            state, frames, triads, radii, order, *where, scale, rows, values
+        ).__next__
     evaluate()  # compiles
-    memory, pack = state.data.cast("B"), Struct(f"{14 * count}d").pack_into
+    memory, pack = state.data.cast("B"), Struct(f"{2 * size}d").pack_into
     on_position_level, on_velocity_level = values[0].tolist, values[1].tolist
-    start: Any = exu.ConfigurationType.StartOfStep
+    begun: Any = exu.ConfigurationType.StartOfStep
     evaluated_at: tuple[Any, Any, Any] = (None, None, None)
 
     def update(mbs, time, coordinates, rates):
         nonlocal evaluated_at
         if time != evaluated_at[0]:
-            scale[0] = ratio * (time - mbs.systemData.GetTime(start))
+            scale[0] = ratio * (time - mbs.systemData.GetTime(begun))
         pack(memory, 0, *coordinates, *rates)
         evaluate()
         evaluated_at = (time, coordinates, rates)

@@ -9,7 +9,8 @@ import numpy as np
 from exudyn.itemInterface import SensorUserFunction
 
 from ...reference.rim import rim_search
-from . import kernel
+from . import general
+from .attachment import reference_coordinates
 from .joint import RollingJoint
 
 Quantity = Literal["ContactPoint", "Gap", "Slip", "ContactForce"]
@@ -32,8 +33,8 @@ def CreateRollingJointSensor(
     joint : RollingJoint
     quantity : {"ContactPoint", "Gap", "Slip", "ContactForce"}
         Point of the edge closest to the surface, (3,) [m]; its distance from the surface, (1,) [m];
-        the material velocity there, lateral and forward, (2,) [m/s]; force of the ground on the wheel,
-        (3,) [N]. Vectors in inertial axes.
+        the material velocity there relative to the ground, lateral and forward, (2,) [m/s]; force of the ground on the
+        wheel, (3,) [N], which has no component along axes that are not constrained. Vectors in inertial axes.
     wheel : int
         Index of the wheel in the joint.
     name, storeInternal, fileName
@@ -54,7 +55,7 @@ def CreateRollingJointSensor(
         raise ValueError(f"the joint has no wheel {wheel!r}; it has {len(joint.radii)}")
     item = SensorUserFunction(
         name=name,
-        sensorUserFunction=_make_user_function(joint, quantity, wheel),
+        sensorUserFunction=_make_user_function(mbs, joint, quantity, wheel),
         storeInternal=storeInternal,
         writeToFile=bool(fileName),
         fileName=fileName,
@@ -62,25 +63,28 @@ def CreateRollingJointSensor(
     return mbs.AddSensor(item)
 
 
-def _make_user_function(joint: RollingJoint, quantity: Quantity, wheel: int) -> Any:
-    state = np.zeros((2, 7))
-    state[0, 2], state[0, 3] = joint.radii[wheel], 1.0
+def _make_user_function(mbs: exu.MainSystem, joint: RollingJoint, quantity: Quantity, wheel: int) -> Any:
+    nodes, kind = joint.nodeNumbers, exu.OutputVariableType
+    start = reference_coordinates(mbs, nodes)
+    state = np.zeros((2, len(start)))
+    state[0] = start
     point, frame, slip, gap = np.empty(3), np.empty((3, 3)), np.empty(2), np.empty(1)
     function = joint.surface.function.real
+    shape = (joint.frames, joint.triads, joint.radii)
     where = (rim_search(joint.surface, joint.radii), function, joint.surface.parameters)
-    shape = (joint.centres[wheel], joint.triads[wheel], joint.radii[wheel])
-    measure = kernel.probe(state, *shape, *where, point, frame, slip, gap).__next__
+    measure = general.probe(wheel, state, *shape, *where, point, frame, slip, gap).__next__
     values = {"ContactPoint": point, "Gap": gap, "Slip": slip}
-    node, kind = joint.nodeNumbers[wheel], exu.OutputVariableType
+    constrained = joint.order[wheel] >= 0
+    rows = joint.order[wheel, constrained]
 
     # The generator does not keep the surface's compiled function alive, but the default argument does.
     def value(mbs, _time, _sensors, _factors, configuration, _function=function):
-        state[0] = mbs.GetNodeOutput(node, kind.CoordinatesTotal, configuration)
-        state[1] = mbs.GetNodeOutput(node, kind.Coordinates_t, configuration)
+        for k, output in enumerate((kind.CoordinatesTotal, kind.Coordinates_t)):
+            state[k] = np.concatenate([mbs.GetNodeOutput(node, output, configuration) for node in nodes])
         measure()
         if quantity == "ContactForce":
-            multipliers = mbs.GetObjectOutput(joint.objectNumber, kind.Force, configuration)
-            return (-multipliers[3 * wheel : 3 * wheel + 3] @ frame).tolist()
+            multipliers = np.atleast_1d(mbs.GetObjectOutput(joint.objectNumber, kind.Force, configuration))
+            return (-multipliers[rows] @ frame[constrained]).tolist()
         return values[quantity].tolist()
 
     return value

@@ -1,8 +1,9 @@
 """Compilation of kernels by numba, with compiled code cached on disk.
 
 numba renews a cached function when the function's own file changes, but not when a kernel that it calls from
-another file does. The name of the cache folder therefore contains a fingerprint of all kernels: a changed kernel
-starts a new folder, and so does another version of numba. The folder is used only for the functions compiled here;
+another file does. The name of the cache folder therefore contains a fingerprint of all kernels, and of the files beside
+a kernel that stands elsewhere in the package: a changed kernel starts a new folder, and so does another version of
+numba. The folder is used only for the functions compiled here;
 numba's settings are restored to those of the user's process after each of them.
 """
 
@@ -28,7 +29,7 @@ _lock = threading.Lock()
 
 def jit(function: Callable[..., Any]) -> Any:
     """Compile a kernel on its first call for each set of argument types."""
-    with _cache_folder_set():
+    with _cache_folder_set(function):
         return nb.njit(cache=True, error_model="numpy")(function)
 
 
@@ -38,7 +39,7 @@ def jit_inline(function: Callable[..., Any]) -> Any:
     For parts of one function that are separate only for readability: a call that passes a dozen tuples through
     memory costs as much as the arithmetic in it (measured: a quarter of the right-hand side).
     """
-    with _cache_folder_set():
+    with _cache_folder_set(function):
         return nb.njit(cache=True, error_model="numpy", forceinline=True)(function)
 
 
@@ -56,18 +57,18 @@ def compile_callback(signature: Any, cache: bool = True, **options: Any) -> Call
     """
 
     def compile_function(function: Callable[..., Any]) -> Any:
-        with _cache_folder_set():
+        with _cache_folder_set(function):
             return nb.cfunc(signature, cache=cache, **options)(function)
 
     return compile_function
 
 
 @contextmanager
-def _cache_folder_set() -> Iterator[None]:
-    """Set numba's cache folder; numba reads the setting only when a function is decorated."""
+def _cache_folder_set(function: Callable[..., Any]) -> Iterator[None]:
+    """Set numba's cache folder for a function; numba reads the setting only when a function is decorated."""
     with _lock:
         before = config.CACHE_DIR
-        config.CACHE_DIR = _cache_folder(before)
+        config.CACHE_DIR = _cache_folder(before, Path(function.__code__.co_filename).parent)
         try:
             yield
         finally:
@@ -75,12 +76,17 @@ def _cache_folder_set() -> Iterator[None]:
 
 
 @cache
-def _cache_folder(chosen: str) -> str:
-    """Return the folder for compiled code, below the one chosen through NUMBA_CACHE_DIR if there is one."""
+def _cache_folder(chosen: str, folder: Path) -> str:
+    """Return the folder for compiled code, below the one chosen through NUMBA_CACHE_DIR if there is one.
+
+    ``folder`` is that of the kernel's file. Kernels call others in it only where it belongs to the package.
+    """
     here = Path(__file__).parent
     digest = hashlib.sha256(nb.__version__.encode())
-    for source in sorted(here.glob("*.py")):
-        digest.update(source.read_bytes())
+    package = here.parents[1]
+    for place in [here] if folder == here or package not in folder.parents else [here, folder]:
+        for source in sorted(place.glob("*.py")):
+            digest.update(source.read_bytes())
     if chosen:
         parent = Path(chosen)
     elif os.access(here, os.W_OK):
