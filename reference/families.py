@@ -42,10 +42,9 @@ from .continuation import (
     metric,
     roots_along,
 )
-from .curve import sample_curve
 from .kernels.steady import STANDING, direction
+from .rideability import assess_motions
 from .search import describe_search, guesses_at, is_on_curve, search_starts
-from .standing import require_standing, stands
 from .surface import SurfaceOfRevolution, has_tip
 
 FAMILIES = (1, 2, 3, 4)
@@ -230,7 +229,7 @@ def trace_families(
 def search_curves(
     bicycle: Bicycle, surface: SurfaceOfRevolution, families: Sequence[Family], longest: float = LONGEST_STEP
 ) -> list[Family]:
-    """Search for the curves without a number on which both wheels are pushed somewhere.
+    """Search for the curves without a number that can be ridden somewhere.
 
     Parameters
     ----------
@@ -270,10 +269,9 @@ def _searched_anchor(equations: Steady, found: Point) -> Anchor:
 
 
 def _is_ridden_somewhere(curve: Family) -> bool:
-    """Return whether the ground pushes both wheels, and nothing else of their rims touches it, somewhere on a curve."""
-    seen = sample_curve(curve.equations, np.array([point.unknowns for point in curve.points]))
-    pushed = np.flatnonzero(np.all(seen.normal_force > 0, axis=1))
-    return any(stands(curve.equations, curve.points[k].unknowns) for k in pushed)
+    """Return whether a motion on a curve can be ridden."""
+    unknowns = np.array([point.unknowns for point in curve.points])
+    return bool(assess_motions(curve.equations.bicycle, curve.equations.surface, unknowns).physical.any())
 
 
 def _passes_through(curve: Family, start: Anchor) -> bool:
@@ -428,11 +426,12 @@ def find_motion(
     family : int or None
         None on a curve without a number.
     motion : CircularMotion
+        Whether it can be ridden says `velodrome.reference.rideability.explain_motion`.
 
     Raises
     ------
     ValueError
-        If there is no such motion, an argument is invalid, or a rim of the motion lies inside the ground.
+        If there is no such motion, or an argument is invalid.
     """
     if not (np.isfinite(rear_rate) and rear_rate > 0):
         raise ValueError(f"rear rate is {rear_rate!r}; it must be a positive number of rad/s")
@@ -455,7 +454,6 @@ def find_motion(
         if not found:
             reason = "; ".join(failures) or "its curves, as followed from their anchors, do not reach it"
             raise ValueError(f"no circular motion found with {wanted} in family {family}: {reason}")
-        require_standing(bicycle, surface, found[0][1])
         return found[0]
 
     def distance(item: tuple[int | None, CircularMotion]) -> float:
@@ -476,7 +474,6 @@ def find_motion(
             f"no circular motion found with {wanted} within {_NEAR_ENOUGH} rad of near = {near[0]:g}, {near[1]:g}"
             f"{place}; searched were {searched}{lost}"
         )
-    require_standing(bicycle, surface, nearest[1])
     return nearest
 
 
