@@ -19,6 +19,7 @@ from ...reference.rideable_parts import PartEnd, assess_family, find_rideable_pa
 from ...reference.sections import SectionEnd, sample_family, stable_sections
 from ...reference.special import SpecialPoint, special_points
 from ...reference.surface import Surface, SurfaceOfRevolution
+from ...reports.measure import to_number
 from ..files import make_folder, write_json
 from ..scenario import make_bowl, name_surface
 
@@ -114,7 +115,7 @@ class FamilyCurve:
             "physical": self.physical.tolist(),
             "unphysical_because": self.rideability.list_obstacles(),
             "rims_clear": self.rims_clear.tolist(),
-            "required_friction": _replace_infinite(self.rideability.friction.max(axis=1)),
+            "required_friction": [to_number(value) for value in self.rideability.friction.max(axis=1)],
             "growth_rate": samples.growth_rate.tolist(),
             "normal_force_rear": samples.normal_force[:, 0].tolist(),
             "normal_force_front": samples.normal_force[:, 1].tolist(),
@@ -170,7 +171,9 @@ class CriticalShapes:
 
     def __repr__(self) -> str:
         def show(point: CriticalPoint | None) -> str:
-            return "none" if point is None else f"{point.alpha:.6g}"
+            if point is None:
+                return "none"
+            return f"{point.alpha:.6g}" + (" (cannot be ridden)" if point.unphysical_because else "")
 
         last = ", ".join(f"family {number} {show(point)}" for number, point in self.last_stable.items())
         merging = ", ".join(f"families {' and '.join(map(str, one.families))} {show(one)}" for one in self.merging)
@@ -303,9 +306,7 @@ def write_families(document: Mapping[str, Any], out: Path) -> None:
     family_figure(out / "families.png", document, Bicycle().front_wheel_radius)
 
 
-def _describe_section(
-    start: SectionEnd, end: SectionEnd, parts: Sequence[tuple[PartEnd, PartEnd]]
-) -> dict[str, Any]:
+def _describe_section(start: SectionEnd, end: SectionEnd, parts: Sequence[tuple[PartEnd, PartEnd]]) -> dict[str, Any]:
     """Return the entry of a stable section: its ends, and the parts of it that can be ridden."""
     whole = any(first.motion is start.motion and last.motion is end.motion for first, last in parts)
     return _describe_ends(start, end) | {
@@ -321,8 +322,3 @@ def _describe_ends(*both: SectionEnd | PartEnd) -> dict[str, Any]:
     return {name: [getattr(end.motion, name) for end in both] for name in names} | {
         "cause": [end.cause for end in both]
     }
-
-
-def _replace_infinite(values: np.ndarray) -> list[float | None]:
-    """Return numbers as JSON can hold them: None where they are infinite."""
-    return [float(value) if np.isfinite(value) else None for value in values]
