@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..reference.rim import find_second_touch, require_clear_rims
+from ..reference.wheel_overlap import find_wheel_collision, require_separate_wheels
 from .engine import (
     REQUIRED,
     SHAPES,
@@ -32,10 +33,10 @@ CLOCK_ERROR = 1e-9
 def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
     """Run a problem in an engine and validate the trajectory.
 
-    The trajectory is cut before a state that is not finite, and where a rim touches the ground at a second place. An
-    engine may detect this in its own steps; here the samples of every engine are checked. The engine's times must agree
-    with the problem's up to `CLOCK_ERROR`; they are then replaced by the problem's, so that engines can be compared
-    sample by sample.
+    The trajectory is cut before a state that is not finite, and where a rim touches the ground at a second place or the
+    wheels collide. An engine may detect this in its own steps; here the samples of every engine are checked. The
+    engine's times must agree with the problem's up to `CLOCK_ERROR`; they are then replaced by the problem's, so that
+    engines can be compared sample by sample.
 
     Parameters
     ----------
@@ -51,9 +52,8 @@ def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progr
     Raises
     ------
     EngineError
-        If the engine does not apply the problem's inputs, a rim lies inside the ground at the start, or the engine
-        returns no trajectory, or one that does not fit the
-        problem. The message states the fault.
+        If the engine does not apply the problem's inputs, a rim lies inside the ground or the wheels overlap at the
+        start, or the engine returns no trajectory, or one that does not fit the problem. The message states the fault.
     Exception
         Any exception that the engine raises.
     """
@@ -62,6 +62,7 @@ def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progr
         raise EngineError(ignored)
     try:
         require_clear_rims(problem.bicycle, problem.surface, problem.q, may_sink=True)
+        require_separate_wheels(problem.bicycle, problem.q)
     except ValueError as error:
         raise EngineError(str(error)) from error
     trajectory = simulate_guarded(engine, problem, settings, progress)
@@ -75,12 +76,12 @@ def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progr
         trajectory = replace(trajectory, time=asked.copy())
     finite = np.all([np.isfinite(_flatten_samples(getattr(trajectory, name))).all(axis=1) for name in REQUIRED], axis=0)
     if finite.all():
-        return _cut_at_second_touch(problem, trajectory)
+        return _cut_at_collision(problem, trajectory)
     bad = int(np.argmin(finite))
     if bad == 0:
         raise EngineError("its first state is not finite")
     ended = f"its state is not finite at {trajectory.time[bad]:.6g} s"
-    return _cut_at_second_touch(problem, replace(trajectory.first(bad), ended=trajectory.ended or ended))
+    return _cut_at_collision(problem, replace(trajectory.first(bad), ended=trajectory.ended or ended))
 
 
 def _copy_arrays(trajectory: Trajectory) -> Trajectory:
@@ -90,9 +91,16 @@ def _copy_arrays(trajectory: Trajectory) -> Trajectory:
     return replace(trajectory, **copies, steps=int(trajectory.steps), cpu_time=float(trajectory.cpu_time))
 
 
-def _cut_at_second_touch(problem: Problem, trajectory: Trajectory) -> Trajectory:
-    """Return the trajectory up to where a rim touches a second place; it keeps at least its first sample."""
-    ending = find_second_touch(problem.bicycle, problem.surface, trajectory.time, trajectory.q, trajectory.qd)
+def _cut_at_collision(problem: Problem, trajectory: Trajectory) -> Trajectory:
+    """Return the trajectory up to where a rim touches a second place or the wheels collide.
+
+    It keeps at least its first sample.
+    """
+    found = (
+        find_second_touch(problem.bicycle, problem.surface, trajectory.time, trajectory.q, trajectory.qd),
+        find_wheel_collision(problem.bicycle, trajectory.time, trajectory.q),
+    )
+    ending = min((one for one in found if one is not None), key=lambda one: one.time, default=None)
     if ending is None:
         return trajectory
     return replace(trajectory.until(ending.time), ended=ending.why)

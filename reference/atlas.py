@@ -13,6 +13,8 @@ from .circular import Steady
 from .critical import CriticalPoint, reconnections, vanishing_between
 from .curve import Samples
 from .families import FAMILIES, trace_from
+from .rideability import Rideability
+from .rideable_parts import assess_family
 from .sections import SectionEnd, sample_family, stable_sections
 from .surface import Paraboloid
 
@@ -35,6 +37,8 @@ class AtlasCurve:
         See `velodrome.reference.families.Family`.
     samples : Samples
         Its motions in the order of the curve.
+    rideability : Rideability
+        Whether the motions can be ridden, and what friction they need.
     sections : list of (SectionEnd, SectionEnd)
         Its stable sections, their ends solved to round-off.
     """
@@ -43,6 +47,7 @@ class AtlasCurve:
     family: int
     ends: tuple[str, str]
     samples: Samples
+    rideability: Rideability
     sections: list[tuple[SectionEnd, SectionEnd]]
 
 
@@ -178,7 +183,8 @@ def _compute_curve(
     anchors[rear_rate] = alpha, start.unknowns
     family = trace_from(start, longest)
     seen = sample_family(family)
-    return AtlasCurve(alpha, number, family.ends, seen, stable_sections(family, seen.growth_rate))
+    sections = stable_sections(family, seen.growth_rate)
+    return AtlasCurve(alpha, number, family.ends, seen, assess_family(family), sections)
 
 
 def _carry_anchor(bicycle: Bicycle, alpha: float, number: int, known: tuple[float, np.ndarray] | None) -> Anchor:

@@ -52,6 +52,11 @@ def metric(u: np.ndarray) -> np.ndarray:
     return weights
 
 
+def arc_distance(first: Point, point: Point) -> float:
+    """Return the distance of a near point from the first, along the curve."""
+    return float((metric(first.unknowns) * first.tangent) @ (point.unknowns - first.unknowns))
+
+
 def tangent(equations: Steady, u: np.ndarray) -> np.ndarray:
     """Return the unit tangent of the curve, in the arclength's metric and of either sign, at a solution `as_solved`."""
     chosen, full, along = u[kernel.CHOSEN], np.empty(UNKNOWNS), np.empty(UNKNOWNS)

@@ -25,6 +25,7 @@ from .continuation import Point, metric
 from .families import FAMILIES, trace
 from .kernels.circle import COORDINATES
 from .kernels.curve import CHOSEN
+from .rideability import explain_motion
 from .sections import SectionEnd, linearise_point, stable_sections
 from .stability import linearise
 from .surface import Paraboloid
@@ -49,6 +50,8 @@ class CriticalPoint:
         Largest residual of the defining equations; the growth rate [1/s] where a section vanishes.
     kind : str
         ``reconnection``; ``tangency`` or ``crossing`` where a stable section vanishes.
+    unphysical_because : tuple of str
+        Why the motion cannot be ridden; empty if it can.
     """
 
     families: tuple[int, ...]
@@ -56,6 +59,7 @@ class CriticalPoint:
     motion: CircularMotion
     residual: float
     kind: str
+    unphysical_because: tuple[str, ...]
 
 
 def reconnections(
@@ -141,7 +145,11 @@ def _find_touching_point(bicycle: Bicycle, number: int, low: float, high: float)
             continue
         if low - 5 * _BRACKET < alpha < high + 5 * _BRACKET and unknowns[SIGMA] > 0:
             motion = Steady(bicycle, Paraboloid(alpha)).motion(unknowns)
-            return CriticalPoint(_passing_families(bicycle, motion, low, high), alpha, motion, residual, "reconnection")
+            families, why = (
+                _passing_families(bicycle, motion, low, high),
+                explain_motion(bicycle, Paraboloid(alpha), motion),
+            )
+            return CriticalPoint(families, alpha, motion, residual, "reconnection", why)
     return None
 
 
@@ -293,4 +301,5 @@ def _solve_vanishing(bicycle: Bicycle, number: int, alpha: float) -> CriticalPoi
     # Growth rate at the point. At a tangency its slope is the other equation, whose round-off moves the point only
     # along the arc.
     left = equations(x)[:1] if kind == "tangency" else equations(x)
-    return CriticalPoint((number,), float(x[1]), motion, float(np.abs(left).max()), kind)
+    why = explain_motion(bicycle, Paraboloid(float(x[1])), motion)
+    return CriticalPoint((number,), float(x[1]), motion, float(np.abs(left).max()), kind, why)

@@ -52,7 +52,7 @@ class Samples:
         return self.growth_rate < 0
 
     @property
-    def physical(self) -> np.ndarray:
+    def pushed(self) -> np.ndarray:
         """Whether the ground pushes on both wheels, shape (n,)."""
         return np.all(self.normal_force > 0, axis=1)
 

@@ -42,11 +42,10 @@ from .continuation import (
     metric,
     roots_along,
 )
-from .curve import sample_curve
 from .inputs import NO_INPUTS, Inputs
 from .kernels.steady import STANDING, direction
+from .rideability import assess_motions
 from .search import describe_search, guesses_at, is_on_curve, search_starts
-from .standing import require_standing, stands
 from .surface import SurfaceOfRevolution, has_tip
 
 FAMILIES = (1, 2, 3, 4)
@@ -253,7 +252,7 @@ def search_curves(
     longest: float = LONGEST_STEP,
     inputs: Inputs = NO_INPUTS,
 ) -> list[Family]:
-    """Search for the curves without a number on which both wheels are pushed somewhere.
+    """Search for the curves without a number that can be ridden somewhere.
 
     Parameters
     ----------
@@ -294,10 +293,9 @@ def _searched_anchor(equations: Steady, found: Point) -> Anchor:
 
 
 def _is_ridden_somewhere(curve: Family) -> bool:
-    """Return whether the ground pushes both wheels, and nothing else of their rims touches it, somewhere on a curve."""
-    seen = sample_curve(curve.equations, np.array([point.unknowns for point in curve.points]))
-    pushed = np.flatnonzero(np.all(seen.normal_force > 0, axis=1))
-    return any(stands(curve.equations, curve.points[k].unknowns) for k in pushed)
+    """Return whether a motion on a curve can be ridden."""
+    unknowns = np.array([point.unknowns for point in curve.points])
+    return bool(assess_motions(curve.equations.bicycle, curve.equations.surface, unknowns).physical.any())
 
 
 def _passes_through(curve: Family, start: Anchor) -> bool:
@@ -456,11 +454,12 @@ def find_motion(
     family : int or None
         None on a curve without a number.
     motion : CircularMotion
+        Whether it can be ridden says `velodrome.reference.rideability.explain_motion`.
 
     Raises
     ------
     ValueError
-        If there is no such motion, an argument is invalid, or a rim of the motion lies inside the ground.
+        If there is no such motion, or an argument is invalid.
     """
     Steady(bicycle, surface, inputs)  # refuses inputs with which there is no circular motion
     held = Inputs(steer_torque=inputs.steer_torque)  # damping acts in no circular motion
@@ -490,7 +489,6 @@ def find_motion(
         if not found:
             reason = "; ".join(failures) or "its curves, as followed from their anchors, do not reach it"
             raise ValueError(f"no circular motion found with {wanted} in family {family}: {reason}")
-        require_standing(bicycle, surface, found[0][1])
         return found[0]
 
     def distance(item: tuple[int | None, CircularMotion]) -> float:
@@ -512,7 +510,6 @@ def find_motion(
             f"no circular motion found with {wanted} within {_NEAR_ENOUGH} rad of near = {near[0]:g}, {near[1]:g}"
             f"{place}; searched were {searched}{lost}"
         )
-    require_standing(bicycle, surface, nearest[1])
     return nearest
 
 

@@ -142,6 +142,12 @@ def require_clear_rims(
             )
 
 
+def describe_rim_depth(bicycle: Bicycle, surface: Surface, q: np.ndarray, k: int) -> str:
+    """Describe how far the rim of wheel ``k`` lies inside the ground at coordinates (9,); empty if it only touches."""
+    distance, *_ = _find_deepest(bicycle, surface, q, k)
+    return f": {-1e3 * distance:.3g} mm inside" if distance < -_TOUCHING else ""
+
+
 def _format_xy(point: tuple[float, float]) -> str:
     return f"x = {point[0]:.4g} m, y = {point[1]:.4g} m"
 

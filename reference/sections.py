@@ -25,11 +25,16 @@ class SectionEnd:
     motion : CircularMotion
     eigenvalue : complex
         The crossing eigenvalue, of positive imaginary part [1/s].
+    point : Point
+    place : int
+        Index of the last of the family's points before it.
     """
 
     cause: str
     motion: CircularMotion
     eigenvalue: complex
+    point: Point
+    place: int
 
 
 def linearise_point(equations: Steady, point: Point) -> tuple[CircularMotion, Linearisation]:
@@ -66,23 +71,26 @@ def stable_sections(family: Family, growth: np.ndarray | None = None) -> list[tu
         In the order of the family's points.
     """
     equations = family.equations
-    points, rates = _insert_minima(family, sample_family(family).growth_rate if growth is None else growth)
+    points, rates, places = _insert_minima(family, sample_family(family).growth_rate if growth is None else growth)
     ends = [
-        _make_end(equations, root)
-        for _, root in roots_along(equations, points, lambda point: growth_along(equations, point), rates)
+        _make_end(equations, root, places[i])
+        for i, root in roots_along(equations, points, lambda point: growth_along(equations, point), rates)
     ]
     signed = [rate for rate in rates if rate != 0] or [0.0]
     if signed[0] < 0:
-        ends.insert(0, _make_end(equations, points[0], "end"))
+        ends.insert(0, _make_end(equations, points[0], 0, "end"))
     if signed[-1] < 0:
-        ends.append(_make_end(equations, points[-1], "end"))
+        ends.append(_make_end(equations, points[-1], len(family.points) - 2, "end"))
     return list(zip(ends[::2], ends[1::2], strict=True))
 
 
-def _insert_minima(family: Family, growth: np.ndarray) -> tuple[list[Point], list[float]]:
-    """Return the points and growth rates of a family, with points added where the growth rate dips below zero."""
+def _insert_minima(family: Family, growth: np.ndarray) -> tuple[list[Point], list[float], list[int]]:
+    """Return the points and growth rates of a family, with points added where the growth rate dips below zero.
+
+    The third list has the index of the last of the family's own points up to each.
+    """
     equations = family.equations
-    points, rates = [family.points[0]], [float(growth[0])]
+    points, rates, places = [family.points[0]], [float(growth[0])], [0]
     for i in range(1, len(growth)):
         before, here = family.points[i - 1], family.points[i]
         if _may_dip(growth, i):
@@ -91,9 +99,11 @@ def _insert_minima(family: Family, growth: np.ndarray) -> tuple[list[Point], lis
             if rate < 0:
                 points.append(low)
                 rates.append(rate)
+                places.append(i - 1)
         points.append(here)
         rates.append(float(growth[i]))
-    return points, rates
+        places.append(i)
+    return points, rates, places
 
 
 def _may_dip(growth: np.ndarray, i: int) -> bool:
@@ -113,11 +123,11 @@ def _is_minimum(values: np.ndarray, i: int) -> bool:
     return 0 < i < len(values) - 1 and values[i] <= min(values[i - 1], values[i + 1])
 
 
-def _make_end(equations: Steady, point: Point, cause: str | None = None) -> SectionEnd:
+def _make_end(equations: Steady, point: Point, place: int, cause: str | None = None) -> SectionEnd:
     motion, reduced = linearise_point(equations, point)
     free = free_eigenvalues(equations.surface, reduced.eigenvalues, motion.yaw_rate)
     critical = max(free, key=lambda value: (value.real, value.imag))
     # A double zero splits by the square root of round-off, 1e-7; the slowest pair that crosses has about 1 rad/s.
     turning = abs(critical.imag) > 1e-3
     eigenvalue = complex(critical.real, abs(critical.imag) if turning else 0.0)
-    return SectionEnd(cause or ("hopf" if turning else "energy"), motion, eigenvalue)
+    return SectionEnd(cause or ("hopf" if turning else "energy"), motion, eigenvalue, point, place)

@@ -13,14 +13,14 @@ from scipy.optimize import brentq
 from .bicycle import Bicycle
 from .circular import REAR_SPEED, CircularMotion, Steady
 from .circular import STEER as STEER_UNKNOWN
-from .continuation import Point, metric, roots_along, sign_changes
-from .dae import consistent_state
+from .continuation import Point, arc_distance, roots_along, sign_changes
+from .dae import consistent_state, dynamics
 from .families import Family, front_rate_slope, rear_rate_slope
 from .kernels.circle import STEP
 from .kernels.steady import steady_energy
 from .kinematics import FRONT_ANGLE, constants
+from .rideability import assess_motions, explain_motion, explain_obstacles
 from .stability import VARIABLES, linearise
-from .standing import stands
 from .surface import Plane, is_level
 
 LEAN, STEER, LEAN_RATE, STEER_RATE = (VARIABLES.index(name) for name in ("lean", "steer", "lean_rate", "steer_rate"))
@@ -43,6 +43,8 @@ class SpecialPoint:
         [rad].
     rear_rate, front_rate : float
         [rad/s].
+    unphysical_because : tuple of str
+        Why its motion cannot be ridden; empty if it can.
     """
 
     name: str
@@ -51,6 +53,7 @@ class SpecialPoint:
     steer: float
     rear_rate: float
     front_rate: float
+    unphysical_because: tuple[str, ...]
 
 
 def energy_slope(equations: Steady) -> Callable[[Point], float]:
@@ -80,21 +83,22 @@ def special_points(family: Family) -> list[SpecialPoint]:
         for i, point in roots_along(equations, family.points, condition):
             # The squared rear rate is least at the pivoting motion, which is not a fold.
             if kind != "fold" or abs(point.unknowns[REAR_SPEED]) > 1e-6:
-                found.append((i, _arc_distance(family.points[i], point), kind, point))
+                found.append((i, arc_distance(family.points[i], point), kind, point))
     for i, end in zip((0, len(family.points) - 1), family.ends, strict=True):
         if end in ("static", "pivot"):
             found.append((i, 0.0, end, family.points[i]))
-    found = sorted((item for item in found if stands(equations, item[3].unknowns)), key=lambda item: item[:2])
-    ordered = [(kind, equations.motion(point.unknowns)) for *_, kind, point in found]
-    points = [SpecialPoint(name, kind, *_quantities(motion)) for name, kind, motion in _name_points(family, ordered)]
+    where = equations.bicycle, equations.surface
+    if found:
+        stands = assess_motions(*where, np.array([point.unknowns for *_, point in found])).rims_clear
+        found = [item for item, clear in zip(found, stands, strict=True) if clear]
+    ordered = [(kind, equations.motion(point.unknowns)) for *_, kind, point in sorted(found, key=lambda item: item[:2])]
+    points = [
+        SpecialPoint(name, kind, *_quantities(motion), explain_motion(*where, motion))
+        for name, kind, motion in _name_points(family, ordered)
+    ]
     if is_level(equations.surface) and family.number in STRAIGHT:
         points.append(straight_motion(equations.bicycle, *STRAIGHT[family.number]))
     return points
-
-
-def _arc_distance(first: Point, point: Point) -> float:
-    """Return the distance of a near point from the first, along the curve."""
-    return float((metric(first.unknowns) * first.tangent) @ (point.unknowns - first.unknowns))
 
 
 def straight_motion(bicycle: Bicycle, name: str, steer: float) -> SpecialPoint:
@@ -119,8 +123,10 @@ def straight_motion(bicycle: Bicycle, name: str, steer: float) -> SpecialPoint:
     if not changes:
         raise ValueError(f"no straight motion at steer = {steer!r} has circular neighbours")
     rear_rate: Any = brentq(determinant, *rates[list(changes[0])], xtol=1e-13)
-    _, rates = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.0, steer, (0.0, 0.0, rear_rate))
-    return SpecialPoint(name, "straight", 0.0, steer, rear_rate, float(rates[FRONT_ANGLE]))
+    q, rates = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.0, steer, (0.0, 0.0, rear_rate))
+    now = dynamics(bicycle, Plane(), q, rates)
+    why = explain_obstacles(bicycle, Plane(), q, now.contact, now.force)
+    return SpecialPoint(name, "straight", 0.0, steer, rear_rate, float(rates[FRONT_ANGLE]), why)
 
 
 def _quantities(motion: CircularMotion) -> tuple[float, float, float, float]:

@@ -31,6 +31,7 @@ _SLOW, _FAST = 0.1, 100.0  # growth rates of the colour scale [1/s]
 _NORM, _COLOURS = LogNorm(_SLOW, _FAST), "YlOrRd"
 _CAUSE_LINES = {"hopf": "-", "energy": ":", "end": "--"}
 _CAUSE_LABELS = {"hopf": "a complex pair crosses (Hopf)", "energy": "the energy is extreme", "end": "the family ends"}
+_NOT_RIDDEN = "cannot be ridden: a wheel is pulled or a rim inside the ground"
 _TICKS = (0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
 
 
@@ -65,11 +66,11 @@ def growth_figure(path: Path, columns: Columns, document: Mapping[str, Any]) -> 
 
 def _draw_panel(axes: Axes, columns: Columns, document: Mapping[str, Any], family: int) -> None:
     alphas, rates = np.array(document["alphas"]), np.linspace(0.0, _HIGHEST, _PIXELS)
-    growth, pushed = sheet(columns, family, alphas, rates)
+    growth, physical = sheet(columns, family, alphas, rates)
     axes.pcolormesh(alphas, rates, growth.clip(_SLOW / 2), norm=_NORM, cmap=_COLOURS, rasterized=True)
     stable = np.where(growth < 0, 1.0, np.nan)
     axes.pcolormesh(alphas, rates, stable, cmap=ListedColormap([STABLE]), rasterized=True)
-    _draw_hatching(axes, alphas, rates, np.isfinite(growth) & ~pushed)
+    _draw_hatching(axes, alphas, rates, np.isfinite(growth) & ~physical)
     _set_root_scale(axes, float(alphas[-1]))
     axes.set_ylim(0, _HIGHEST)
     axes.set_title(f"family {family}", loc="left", color=FAMILY_COLOURS[family], fontweight="bold")
@@ -102,7 +103,7 @@ def stable_figure(path: Path, columns: Columns, document: Mapping[str, Any]) -> 
             axes.set_title(f"({tag})", loc="left")
         for axes, name in zip(panels, ("rear_rate", "lean"), strict=True):
             _label_alphas(axes, [b["vanishing"] for b in document["stable"] if b["vanishing"] is not None], name)
-        figure.legend(handles=list(_stable_legend(document)), loc="outside lower center", ncols=3)
+        figure.legend(handles=list(_stable_legend(columns, document)), loc="outside lower center", ncols=3)
         figure.suptitle("Stable circular motions of the hands-free bicycle", x=0.01, ha="left", fontsize=10)
         write_figure(path, figure)
 
@@ -123,10 +124,10 @@ def sheet(columns: Columns, family: int, alphas: np.ndarray, rates: np.ndarray) 
     -------
     growth : ndarray, shape (m, k)
         nan where the family has no motion.
-    pushed : ndarray of bool, shape (m, k)
-        Whether the ground pushes on both wheels.
+    physical : ndarray of bool, shape (m, k)
+        Whether the motion can be ridden.
     """
-    out, pushed = np.full((len(rates), len(alphas)), np.nan), np.zeros((len(rates), len(alphas)), bool)
+    out, ridden = np.full((len(rates), len(alphas)), np.nan), np.zeros((len(rates), len(alphas)), bool)
     chosen = columns["family"] == family
     alpha, rate, growth, physical = (columns[n][chosen] for n in ("alpha", "rear_rate", "growth_rate", "physical"))
     starts, stops = np.searchsorted(alpha, alphas, "left"), np.searchsorted(alpha, alphas, "right")
@@ -139,8 +140,8 @@ def sheet(columns: Columns, family: int, alphas: np.ndarray, rates: np.ndarray) 
         values = g[segment] + share * (g[segment + 1] - g[segment])
         order = np.argsort(-values)  # of several values in one place the last, the smallest, stays
         out[at[order], column] = values[order]
-        pushed[at[order], column] = physical[start:stop][segment[order]]
-    return out, pushed
+        ridden[at[order], column] = physical[start:stop][segment[order]]
+    return out, ridden
 
 
 def _draw_hatching(axes: Axes, alphas: np.ndarray, rates: np.ndarray, where: np.ndarray) -> None:
@@ -210,7 +211,7 @@ def _mark_touching(axes: Axes, document: Mapping[str, Any], family: int) -> None
 def _growth_legend(document: Mapping[str, Any]) -> Iterator[Any]:
     yield Patch(facecolor=STABLE, label="stable")
     yield Patch(facecolor="white", edgecolor=GREY, lw=0.6, label="the family has no such motion")
-    yield Patch(facecolor="white", edgecolor=INK, lw=0.6, hatch="////", label="the ground would have to pull a wheel")
+    yield Patch(facecolor="white", edgecolor=INK, lw=0.6, hatch="////", label=_NOT_RIDDEN)
     yield from _cause_legend(document)
     yield Line2D([], [], ls="", marker="*", color=INK, ms=8, label="the stable section vanishes")
     yield Line2D([], [], ls="", marker="D", color="white", mec=INK, ms=5, label="two curves touch and exchange parts")
@@ -220,6 +221,7 @@ def _draw_region(axes: Axes, columns: Columns, boundary: Mapping[str, Any], name
     colour = FAMILY_COLOURS[boundary["family"]]
     alphas, low, high = [], [], []
     stable = columns["stable"] & (columns["family"] == boundary["family"])
+    _draw_stable_hatching(axes, columns, boundary, name, stable & ~columns["physical"])
     for i, alpha in enumerate(boundary["alpha"]):
         inside = columns[name][stable & (columns["alpha"] == alpha)]
         reached = [*inside, boundary["start"][name][i], boundary["end"][name][i]]
@@ -234,11 +236,23 @@ def _draw_region(axes: Axes, columns: Columns, boundary: Mapping[str, Any], name
     _draw_sides(axes, boundary, name, colour, 1.4)
 
 
-def _stable_legend(document: Mapping[str, Any]) -> Iterator[Any]:
+def _draw_stable_hatching(
+    axes: Axes, columns: Columns, boundary: Mapping[str, Any], name: str, where: np.ndarray
+) -> None:
+    """Hatch the motions of a stable region that cannot be ridden."""
+    lost = {alpha: columns[name][where & (columns["alpha"] == alpha)] for alpha in boundary["alpha"]}
+    reached = [(alpha, inside.min(), inside.max()) for alpha, inside in lost.items() if len(inside)]
+    if reached:
+        axes.fill_between(*zip(*reached, strict=True), facecolor="none", edgecolor=INK, hatch="////", lw=0)
+
+
+def _stable_legend(columns: Columns, document: Mapping[str, Any]) -> Iterator[Any]:
     for boundary in document["stable"]:
         colour = FAMILY_COLOURS[boundary["family"]]
         yield Patch(facecolor=colour, alpha=0.4, label=f"family {boundary['family']}")
     yield from _cause_legend(document)
+    if np.any(columns["stable"] & ~columns["physical"]):
+        yield Patch(facecolor="white", edgecolor=INK, lw=0.6, hatch="////", label=_NOT_RIDDEN)
     yield Line2D([], [], ls="", marker="*", color=INK, ms=9, label="the stable section vanishes")
 
 

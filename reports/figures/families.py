@@ -34,7 +34,13 @@ _SPEEDS = (0, 5, 10, 15, 20, 30, 50, 100)  # on the upper axis [rad/s]
 # Left, bottom, width, height of the magnified part, relative to a panel: where no curve of small alpha lies.
 _LENSES = {"lean": (0.045, 0.575, 0.36, 0.33), "steer": (0.615, 0.19, 0.36, 0.31)}
 _LONGEST = 40  # largest number of characters for the ground
-_STABLE, _PLAIN, _PULLED = 4.6, 1.4, 1.0  # widths of lines [pt]
+_STABLE, _PLAIN = 4.6, 1.4  # widths of lines [pt]
+_UNRIDDEN: dict[str, dict[str, Any]] = {
+    "pulled": {"lw": 1.0, "dashes": (4, 2.2), "alpha": 0.6},
+    "touching": {"lw": 1.4, "dashes": (1, 1.6), "alpha": 0.6},
+}
+_UNRIDDEN_STABLE: dict[str, Any] = {"lw": _STABLE, "alpha": 0.25}
+_UNRIDDEN_MEANINGS = {"pulled": "a wheel pulled", "touching": "a rim in the ground"}
 
 
 def family_figure(
@@ -147,15 +153,18 @@ def _curve_colour(curve: SolutionCurve) -> str:
 
 def _draw_curve(axes: Axes, curve: SolutionCurve, angle: str) -> None:
     colour = _curve_colour(curve)
-    for low, high, pushed in curve.pieces():
+    for low, high, kind in curve.pieces():
         line = curve.line(angle, low, high)
-        if not pushed:
-            axes.plot(*line.T, color=colour, lw=_PULLED, dashes=(4, 2.2), alpha=0.6, gid="pulled")
+        if kind != "ridden":
+            axes.plot(*line.T, color=colour, **_UNRIDDEN[kind], gid=kind)
             continue
         axes.plot(*line.T, color=colour, lw=_PLAIN, gid="pushed")
         if len(curve.families) > 1:  # a curve of two families is striped in their colours
             other = FAMILY_COLOURS[curve.families[1]]
             axes.plot(*line.T, color=other, lw=_PLAIN, dashes=(6, 6), gid="shared")
+    for low, high in curve.unridden_stable:
+        line = curve.line(angle, low, high)
+        axes.plot(*line.T, color=colour, **_UNRIDDEN_STABLE, solid_capstyle="butt", gid="unridden stable")
     for low, high in curve.stable:
         axes.plot(*curve.line(angle, low, high).T, color=colour, lw=_STABLE, solid_capstyle="butt", gid="stable")
     for point in curve.limits:
@@ -189,8 +198,13 @@ def _draw_legend(figure: Figure, drawn: Sequence[SolutionCurve], points: Sequenc
     handles: list[Line2D] = [Line2D([], [], color=FAMILY_COLOURS[k], lw=2, label=f"family {k}") for k in numbers]
     if any(curve.stable for curve in drawn):
         handles.append(Line2D([], [], color=GREY, lw=_STABLE, solid_capstyle="butt", label="Lyapunov stable"))
-    if any(not pushed for curve in drawn for _, _, pushed in curve.pieces()):
-        handles.append(Line2D([], [], color=GREY, lw=_PULLED, dashes=(4, 2.2), label="a wheel pulled"))
+    if any(curve.unridden_stable for curve in drawn):
+        style = {**_UNRIDDEN_STABLE, "solid_capstyle": "butt"}
+        handles.append(Line2D([], [], color=GREY, **style, label="stable, cannot be ridden"))
+    kinds = {kind for curve in drawn for *_, kind in curve.pieces()}
+    for kind, meaning in _UNRIDDEN_MEANINGS.items():
+        if kind in kinds:
+            handles.append(Line2D([], [], color=GREY, **_UNRIDDEN[kind], label=meaning))
     for kind, meaning in POINT_MEANINGS.items():
         marked = [point for point in points if point.kind == kind]
         if marked:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -44,10 +45,14 @@ class SolutionCurve:
         Families that it belongs to; two where families have joined, none for a curve without a number.
     speed, lean, steer : ndarray, shape (n,)
         Abscissa [1] and angles [rad].
-    push : ndarray, shape (n,)
-        The smaller of the two normal forces [N]; negative where a wheel would have to be pulled.
+    pulled : ndarray of bool, shape (n,)
+        Whether the ground does not push a wheel.
+    ridden : tuple of (float, float)
+        Parts that can be ridden, as positions along the curve in samples, in rising order.
     stable : tuple of (float, float)
-        Lyapunov-stable sections, as positions along the curve in samples.
+        Lyapunov-stable sections, or the parts of them that can be ridden.
+    unridden_stable : tuple of (float, float)
+        Lyapunov-stable sections that cannot be ridden, or not wholly.
     limits : tuple of NamedPoint
         Points that the curve tends to at its ends.
     """
@@ -56,8 +61,10 @@ class SolutionCurve:
     speed: np.ndarray
     lean: np.ndarray
     steer: np.ndarray
-    push: np.ndarray
+    pulled: np.ndarray
+    ridden: tuple[tuple[float, float], ...]
     stable: tuple[tuple[float, float], ...]
+    unridden_stable: tuple[tuple[float, float], ...]
     limits: tuple[NamedPoint, ...]
 
     def line(self, angle: str, low: float = 0.0, high: float | None = None) -> np.ndarray:
@@ -68,14 +75,32 @@ class SolutionCurve:
         places = np.concatenate([[low], inside, [high]])
         return np.column_stack([np.interp(places, samples, row) for row in (self.speed, getattr(self, angle))])
 
-    def pieces(self) -> list[tuple[float, float, bool]]:
-        """Split the curve by whether both wheels are pushed; return (start, end, whether pushed) of each part."""
-        pushed = self.push > 0
-        turns = np.flatnonzero(pushed[1:] != pushed[:-1])
-        crossings = turns + self.push[turns] / (self.push[turns] - self.push[turns + 1])
-        bounds = [0.0, *crossings.tolist(), float(len(pushed) - 1)]
-        signs = [bool(pushed[0]) ^ bool(k % 2) for k in range(len(turns) + 1)]
-        return list(zip(bounds[:-1], bounds[1:], signs, strict=True))
+    def pieces(self) -> list[tuple[float, float, str]]:
+        """Split the curve by whether and why it cannot be ridden.
+
+        Returns
+        -------
+        list of (float, float, str)
+            Start and end of each piece in samples; ``ridden``, ``pulled`` where the ground does not push a wheel, or
+            ``touching`` where a rim is inside the ground or the wheels overlap. Between the latter two a piece ends
+            half-way between samples.
+        """
+        bounds = [0.0, *(place for part in self.ridden for place in part), float(len(self.speed) - 1)]
+        found: list[tuple[float, float, str]] = []
+        for k, (low, high) in enumerate(pairwise(bounds)):
+            if k % 2:
+                found.append((low, high, "ridden"))
+            elif low < high:
+                found += self._split_unridden(low, high)
+        return found
+
+    def _split_unridden(self, low: float, high: float) -> list[tuple[float, float, str]]:
+        samples = [k for k in range(len(self.speed)) if low <= k <= high]
+        pulled = [bool(self.pulled[k]) for k in samples] or [bool(self.pulled[round((low + high) / 2)])]
+        turns = [i for i in range(1, len(pulled)) if pulled[i] != pulled[i - 1]]
+        bounds = [low, *(samples[i] - 0.5 for i in turns), high]
+        kinds = ["pulled" if pulled[i] else "touching" for i in (0, *turns)]
+        return [(*ends, kind) for ends, kind in zip(pairwise(bounds), kinds, strict=True)]
 
 
 def make_curves(families: Sequence[Mapping[str, Any]], front_radius: float) -> list[SolutionCurve]:
@@ -86,16 +111,29 @@ def make_curves(families: Sequence[Mapping[str, Any]], front_radius: float) -> l
 def _make_curve(family: Mapping[str, Any], front_radius: float) -> SolutionCurve:
     points = family["points"]
     rate, lean, steer = (np.array(points[name]) for name in ("front_rate", "lean", "steer"))
-    push = np.minimum(points["normal_force_rear"], points["normal_force_front"])
-    sections = []
-    for section in family["stable_sections"]:
-        ends = zip(section["lean"], section["steer"], strict=True)
-        low, high = sorted(_position_along(lean, steer, *end) for end in ends)
-        sections.append((low, high))
+    pulled = np.array([any("pushed" in why for why in reasons) for reasons in points["unphysical_because"]], bool)
+    sections = family["stable_sections"]
     speed = scaled_speed(rate, front_radius)
     return SolutionCurve(
-        _owning_families(family), speed, lean, steer, push, tuple(sections), _find_curve_limits(family, speed)
+        families=_owning_families(family),
+        speed=speed,
+        lean=lean,
+        steer=steer,
+        pulled=pulled,
+        ridden=tuple(_place_section(lean, steer, part) for part in family["rideable_parts"]),
+        stable=tuple(_place_section(lean, steer, part) for section in sections for part in section["rideable_parts"]),
+        unridden_stable=tuple(
+            _place_section(lean, steer, section) for section in sections if section["rideable"] != "wholly"
+        ),
+        limits=_find_curve_limits(family, speed),
     )
+
+
+def _place_section(lean: np.ndarray, steer: np.ndarray, section: Mapping[str, Any]) -> tuple[float, float]:
+    """Return the positions of both ends of a section along a curve, in samples."""
+    ends = zip(section["lean"], section["steer"], strict=True)
+    low, high = sorted(_position_along(lean, steer, *end) for end in ends)
+    return low, high
 
 
 def _position_along(lean: np.ndarray, steer: np.ndarray, at_lean: float, at_steer: float) -> float:

@@ -41,8 +41,12 @@ def show_circular(console: Console, found: dict[str, Any]) -> None:
         table.add_row("eigenvalues" if i == 0 else "", value, "1/s" if i == 0 else "")
     console.print(table)
     stable = "Lyapunov stable" if found["lyapunov_stable"] else "unstable"
-    physical = "both wheels are pushed" if found["physical"] else "not physical: the ground would have to pull a wheel"
-    console.print(f"{stable}; {physical}")
+    console.print(stable)
+    if found["physical"]:
+        friction = f"{found['required_friction']:.6g}"
+        console.print(f"it can be ridden: rolling needs a coefficient of friction of {friction}", soft_wrap=True)
+    for reason in found["unphysical_because"]:
+        console.print(f"it cannot be ridden: {reason}", style="yellow", markup=False, soft_wrap=True)
 
 
 def _format_value(value: Any) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...reference.atlas import ATLAS_SIZE, Atlas, Boundary, compute_atlas, spacing
 from ...reference.bicycle import Bicycle
+from ...reference.rideability import OBSTACLES
 from ...reference.stability import VARIABLES
 from ..error import ScenarioError
 from ..files import make_folder, write_json
@@ -30,6 +31,7 @@ UNITS = {
     "normal_force_rear": "N",
     "normal_force_front": "N",
     "growth_rate": "1/s",
+    "required_friction": "1",
 }
 _SAMPLED = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "radius", "energy", "growth_rate")
 
@@ -70,7 +72,9 @@ def make_atlas(
     alphas, longest = spacing(size, largest)
     found = compute_atlas(Bicycle(), alphas, longest, lambda fraction: progress(0.9 * fraction))
     columns, document = atlas_columns(found), atlas_document(found)
-    write_atlas(columns, out / "atlas.parquet", {"longest_step": longest, "bicycle": asdict(found.bicycle)})
+    # Bit k of the column `obstacles` says whether a motion meets obstacle k.
+    facts = {"longest_step": longest, "bicycle": asdict(found.bicycle), "obstacles": list(OBSTACLES)}
+    write_atlas(columns, out / "atlas.parquet", facts)
     write_json(out / "boundaries.json", document)
     growth_figure(out / "growth.png", columns, document)
     stable_figure(out / "stable.png", columns, document)
@@ -90,7 +94,11 @@ def atlas_columns(found: Atlas) -> dict[str, np.ndarray]:
     columns |= {name: np.concatenate([getattr(curve, name) for curve in samples]) for name in _SAMPLED}
     normal = np.concatenate([curve.normal_force for curve in samples])
     columns |= {"normal_force_rear": normal[:, 0], "normal_force_front": normal[:, 1]}
-    columns |= {name: np.concatenate([getattr(curve, name) for curve in samples]) for name in ("stable", "physical")}
+    columns["stable"] = np.concatenate([curve.stable for curve in samples])
+    rideability = [curve.rideability for curve in found.curves]
+    columns["physical"] = np.concatenate([motions.physical for motions in rideability])
+    columns["obstacles"] = np.concatenate([motions.codes for motions in rideability])
+    columns["required_friction"] = np.concatenate([motions.friction.max(axis=1) for motions in rideability])
     eigenvalues = np.concatenate([curve.eigenvalues for curve in samples])
     for k in range(len(VARIABLES)):
         columns[f"eigenvalue_{k + 1}_re"] = np.real(eigenvalues[:, k])

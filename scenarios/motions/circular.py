@@ -13,6 +13,7 @@ from ...reference.contact import observe
 from ...reference.families import find_motion
 from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.kinematics import YAW
+from ...reference.rideability import assess_state, explain_motion
 from ...reference.stability import growth_rate, linearise
 from ...reference.surface import SurfaceOfRevolution
 from ..error import ScenarioError
@@ -43,6 +44,11 @@ class CircularSolution:
         Matrix of the reduced linear system (Eq. 17), variables in the order of `reference.stability.VARIABLES`.
     growth_rate : float
         Largest real part of the eigenvalues that symmetry leaves free [1/s].
+    wheel_friction : numpy.ndarray, shape (2,)
+        Coefficient of friction that the rear and the front wheel need to roll; inf where the ground does not push.
+    unphysical_because : tuple of str
+        Why the motion cannot be ridden: the ground does not push a wheel, a rim touches the ground at a second place,
+        or the wheels overlap, each with how much. Empty if it can. Frames have no known shape and are not looked at.
     inputs : Inputs
         Inputs that are held in the motion.
     """
@@ -56,6 +62,8 @@ class CircularSolution:
     eigenvalues: np.ndarray
     jacobian: np.ndarray = field(repr=False)
     growth_rate: float
+    wheel_friction: np.ndarray = field(repr=False)
+    unphysical_because: tuple[str, ...]
     inputs: Inputs = NO_INPUTS
 
     @property
@@ -65,8 +73,14 @@ class CircularSolution:
 
     @property
     def physical(self) -> bool:
-        """Whether the ground pushes both wheels."""
-        return bool(np.all(self.normal_force > 0))
+        """Whether the motion can be ridden: the ground pushes both wheels, and they touch nothing else."""
+        return not self.unphysical_because
+
+    @property
+    def required_friction(self) -> float | None:
+        """Coefficient of friction that rolling needs, the larger of both wheels; None where a wheel is not pushed."""
+        largest = float(self.wheel_friction.max())
+        return largest if np.isfinite(largest) else None
 
     def __repr__(self) -> str:
         motion = self.motion
@@ -83,9 +97,15 @@ class CircularSolution:
                 f"  angles [rad]: {angles}",
                 f"  normal forces [N]: rear {self.normal_force[0]:.6g}, front {self.normal_force[1]:.6g}",
                 f"  energy [J]: {self.energy:.6g}",
+                f"  {self._describe_rideability()}",
                 f"  {stable}: growth rate {self.growth_rate:.6g} 1/s",
             ]
         )
+
+    def _describe_rideability(self) -> str:
+        if not self.physical:
+            return f"cannot be ridden: {'; '.join(self.unphysical_because)}"
+        return f"can be ridden with a coefficient of friction of {self.required_friction:.6g}"
 
     def as_json(self) -> dict[str, Any]:
         """Return the JSON document of `velodrome circular`."""
@@ -106,6 +126,8 @@ class CircularSolution:
             "jacobian": self.jacobian.tolist(),
             "lyapunov_stable": self.lyapunov_stable,
             "physical": self.physical,
+            "unphysical_because": list(self.unphysical_because),
+            "required_friction": self.required_friction,
         }
 
 
@@ -150,6 +172,7 @@ def solve_circular(
     except ValueError as error:
         raise ScenarioError(str(error)) from error
     contact = observe(bicycle, surface, q[None], qd[None])
+    rideability = assess_state(bicycle, surface, q, motion.contact, motion.force)
     return CircularSolution(
         motion=motion,
         surface=surface,
@@ -161,6 +184,8 @@ def solve_circular(
         jacobian=reduced.jacobian,
         growth_rate=growth_rate(surface, reduced.eigenvalues, float(qd[YAW])),
         inputs=inputs,
+        wheel_friction=rideability.friction[0],
+        unphysical_because=explain_motion(bicycle, surface, motion),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,10 +15,12 @@ from ...reference.curve import Samples
 from ...reference.families import FAMILIES, Family, trace_all
 from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.modes import MODES, follow_modes
+from ...reference.rideability import Rideability
+from ...reference.rideable_parts import PartEnd, assess_family, find_rideable_parts, find_rideable_parts_of_section
 from ...reference.sections import SectionEnd, sample_family, stable_sections
 from ...reference.special import SpecialPoint, special_points
-from ...reference.standing import motion_stands, stands
 from ...reference.surface import Surface, SurfaceOfRevolution
+from ...reports.measure import to_number
 from ..error import ScenarioError
 from ..files import make_folder, write_json
 from ..scenario import make_bowl, name_surface
@@ -42,10 +44,14 @@ class FamilyCurve:
         Rates, angles, energy, normal forces and growth rates of the n motions along the curve.
     modes : ndarray, shape (n, 7), complex
         Eigenvalues along the curve, each column following one mode [1/s].
-    rims_clear : ndarray of bool, shape (n,)
-        Whether the wheels touch the ground only at their contact points.
+    rideability : Rideability
+        Whether the motions can be ridden, and what friction they need.
+    rideable_parts : tuple of pairs of PartEnd
+        Ends of the parts of the curve that can be ridden.
     stable_sections : tuple of pairs of SectionEnd
         Ends of the sections in which the motions are Lyapunov stable.
+    stable_parts : tuple of tuples of pairs of PartEnd
+        For each of these sections, the ends of its parts that can be ridden.
     special_points : tuple of SpecialPoint
         Points with a letter in the paper, folds, cusps and extremes of the energy.
     """
@@ -54,14 +60,26 @@ class FamilyCurve:
     ends: tuple[str, str]
     samples: Samples = field(repr=False)
     modes: np.ndarray = field(repr=False)
-    rims_clear: np.ndarray = field(repr=False)
+    rideability: Rideability = field(repr=False)
+    rideable_parts: tuple[tuple[PartEnd, PartEnd], ...] = field(repr=False)
     stable_sections: tuple[tuple[SectionEnd, SectionEnd], ...] = field(repr=False)
+    stable_parts: tuple[tuple[tuple[PartEnd, PartEnd], ...], ...] = field(repr=False)
     special_points: tuple[SpecialPoint, ...] = field(repr=False)
 
     @property
     def number(self) -> int | None:
         """Smallest number of the families on the curve; None if it has no number."""
         return self.numbers[0] if self.numbers else None
+
+    @property
+    def rims_clear(self) -> np.ndarray:
+        """Whether the wheels touch the ground only at their contact points, boolean of shape (n,)."""
+        return self.rideability.rims_clear
+
+    @property
+    def physical(self) -> np.ndarray:
+        """Whether the motions can be ridden, boolean of shape (n,)."""
+        return self.rideability.physical
 
     def as_json(self) -> dict[str, Any]:
         """Return this curve's part of the document of `velodrome families`."""
@@ -70,7 +88,11 @@ class FamilyCurve:
             "joined_families": list(self.numbers[1:]),
             "ends": list(self.ends),
             "points": self._list_points(),
-            "stable_sections": [_describe_section(*ends) for ends in self.stable_sections],
+            "rideable_parts": [_describe_ends(*ends) for ends in self.rideable_parts],
+            "stable_sections": [
+                _describe_section(*ends, parts=parts)
+                for ends, parts in zip(self.stable_sections, self.stable_parts, strict=True)
+            ],
             "special_points": {
                 point.name: {
                     "rear_rate": point.rear_rate,
@@ -78,6 +100,8 @@ class FamilyCurve:
                     "lean": point.lean,
                     "steer": point.steer,
                     "kind": point.kind,
+                    "physical": not point.unphysical_because,
+                    "unphysical_because": list(point.unphysical_because),
                 }
                 for point in self.special_points
             },
@@ -90,7 +114,10 @@ class FamilyCurve:
         return {
             **{name: getattr(samples, name).tolist() for name in names},
             "lyapunov_stable": samples.stable.tolist(),
+            "physical": self.physical.tolist(),
+            "unphysical_because": self.rideability.list_obstacles(),
             "rims_clear": self.rims_clear.tolist(),
+            "required_friction": [to_number(value) for value in self.rideability.friction.max(axis=1)],
             "growth_rate": samples.growth_rate.tolist(),
             "normal_force_rear": samples.normal_force[:, 0].tolist(),
             "normal_force_front": samples.normal_force[:, 1].tolist(),
@@ -150,7 +177,9 @@ class CriticalShapes:
 
     def __repr__(self) -> str:
         def show(point: CriticalPoint | None) -> str:
-            return "none" if point is None else f"{point.alpha:.6g}"
+            if point is None:
+                return "none"
+            return f"{point.alpha:.6g}" + (" (cannot be ridden)" if point.unphysical_because else "")
 
         last = ", ".join(f"family {number} {show(point)}" for number, point in self.last_stable.items())
         merging = ", ".join(f"families {' and '.join(map(str, one.families))} {show(one)}" for one in self.merging)
@@ -199,14 +228,17 @@ def follow_families(bicycle: Bicycle, surface: SurfaceOfRevolution, inputs: Inpu
 
 
 def examine_curve(family: Family) -> FamilyCurve:
-    """Sample a curve and find its stable sections and special points."""
+    """Sample a curve and find its special points, its stable sections and what of them can be ridden."""
+    sections = stable_sections(family)
     return FamilyCurve(
         numbers=family.numbers,
         ends=family.ends,
         samples=sample_family(family),
         modes=follow_modes(family),
-        rims_clear=np.array([stands(family.equations, point.unknowns) for point in family.points]),
-        stable_sections=tuple(ends for ends in stable_sections(family) if _can_stand(family, ends)),
+        rideability=assess_family(family),
+        rideable_parts=tuple(find_rideable_parts(family)),
+        stable_sections=tuple(sections),
+        stable_parts=tuple(tuple(find_rideable_parts_of_section(family, ends)) for ends in sections),
         special_points=tuple(special_points(family)),
     )
 
@@ -268,6 +300,8 @@ def critical_entry(point: CriticalPoint) -> dict[str, Any]:
         "steer": motion.steer,
         "kind": point.kind,
         "residual": point.residual,
+        "physical": not point.unphysical_because,
+        "unphysical_because": list(point.unphysical_because),
     }
 
 
@@ -290,15 +324,19 @@ def write_families(document: Mapping[str, Any], out: Path) -> None:
     family_figure(out / "families.png", document, Bicycle().front_wheel_radius)
 
 
-def _can_stand(family: Family, ends: tuple[SectionEnd, SectionEnd]) -> bool:
-    """Return whether the wheels can stand on the ground at one of a section's ends at least."""
-    where = family.equations.bicycle, family.equations.surface
-    return any(motion_stands(*where, end.motion) for end in ends)
+def _describe_section(start: SectionEnd, end: SectionEnd, parts: Sequence[tuple[PartEnd, PartEnd]]) -> dict[str, Any]:
+    """Return the entry of a stable section: its ends, and the parts of it that can be ridden."""
+    whole = any(first.motion is start.motion and last.motion is end.motion for first, last in parts)
+    return _describe_ends(start, end) | {
+        "eigenvalue": [[side.eigenvalue.real, side.eigenvalue.imag] for side in (start, end)],
+        "rideable": "wholly" if whole else "partly" if parts else "not",
+        "rideable_parts": [_describe_ends(*ends) for ends in parts],
+    }
 
 
-def _describe_section(*both: SectionEnd) -> dict[str, Any]:
+def _describe_ends(*both: SectionEnd | PartEnd) -> dict[str, Any]:
+    """Return rear rates, leans, steers and causes of two ends."""
     names = ("rear_rate", "lean", "steer")
     return {name: [getattr(end.motion, name) for end in both] for name in names} | {
-        "cause": [end.cause for end in both],
-        "eigenvalue": [[end.eigenvalue.real, end.eigenvalue.imag] for end in both],
+        "cause": [end.cause for end in both]
     }

@@ -219,9 +219,9 @@ def _count_pushed(found: FoundMotion) -> int:
     for curve in found.curves:
         # At a pivoting motion the rear rate is round-off of either sign: the sign changes between its neighbours.
         moving = curve[(curve[:, SIGMA] >= 0) & (np.abs(curve[:, REAR_SPEED]) > STANDING)]
-        physical = sample_curve(found.equations, moving).physical
-        turns = (moving[:-1, REAR_SPEED] * moving[1:, REAR_SPEED] < 0) & physical[:-1] & physical[1:]
-        pieces += int(physical[0]) + int(np.sum(~physical[:-1] & physical[1:])) + int(np.sum(turns))
+        pushed = sample_curve(found.equations, moving).pushed
+        turns = (moving[:-1, REAR_SPEED] * moving[1:, REAR_SPEED] < 0) & pushed[:-1] & pushed[1:]
+        pieces += int(pushed[0]) + int(np.sum(~pushed[:-1] & pushed[1:])) + int(np.sum(turns))
     return pieces
 
 

@@ -13,9 +13,11 @@ from ...reference.circular import CircularMotion
 from ...reference.dae import consistent_state
 from ...reference.families import find_motion
 from ...reference.kinematics import LEAN, REAR_ANGLE, STEER, YAW, body_positions
+from ...reference.rideability import require_standing
 from ...reference.rim import require_clear_rims
 from ...reference.stability import growth_rate, linearise
 from ...reference.surface import Plane, Surface, SurfaceOfRevolution, evaluate
+from ...reference.wheel_overlap import require_separate_wheels
 from ..error import ScenarioError
 from .schema import CircularTable, Scenario, Simulation, UprightTable
 from .surfaces import make_bowl
@@ -58,7 +60,8 @@ def make_start(scenario: Scenario) -> Start:
     Raises
     ------
     ScenarioError
-        If there is no such motion, or its disturbed state cannot be reached or has a rim inside the ground.
+        If there is no such motion, or its disturbed state cannot be reached, has a rim inside the ground or
+        wheels that overlap.
     """
     bicycle, surface = scenario.make_bicycle(), scenario.surface.make()
     try:
@@ -68,6 +71,7 @@ def make_start(scenario: Scenario) -> Start:
             rate = _compute_growth_rate(scenario, bicycle, surface, q, qd)
             undisturbed, (q, qd) = (q, qd), _disturb_state(scenario, bicycle, surface, q, qd)
             require_clear_rims(bicycle, surface, q)
+            require_separate_wheels(bicycle, q)
     except (ValueError, ArithmeticError) as error:
         raise ScenarioError(f"motion: {error}") from error
     times = output_times(scenario.simulation)
@@ -100,6 +104,7 @@ def _compute_undisturbed(
         near = (table.near.lean, table.near.steer) if table.near is not None else None
         where, inputs = (bicycle, make_bowl(surface)), scenario.make_inputs()
         family, motion = _find_motion(*where, table.rear_rate, table.family, near, inputs)  # type: ignore[arg-type]
+        require_standing(bicycle, surface, motion)
         return family, motion, *motion.state()
     rates = (0.0, 0.0, table.speed / bicycle.rear_wheel_radius)
     # Where the disturbed bicycle stands: there may be no ground at the origin.

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from velodrome.reference.standing import stands
 
 from velodrome.reference.anchors import above_ground
 from velodrome.reference.bicycle import Bicycle
@@ -16,7 +17,6 @@ from velodrome.reference.curve import sample_curve
 from velodrome.reference.families import find_motion, trace_all
 from velodrome.reference.search import guesses_at, is_on_curve
 from velodrome.reference.sections import stable_sections
-from velodrome.reference.standing import stands
 from velodrome.reference.surface import Paraboloid, Plane, SurfaceOfRevolution
 
 # Meijaard et al. (2007); a measured bicycle of Moore (2012), "Silver"; one with a long trail.

@@ -29,8 +29,11 @@ def families_caption(document: Mapping[str, Any], front_radius: float) -> str:
     if shared:
         pairs = " and ".join(f"{first} with {second}" for first, second in shared)
         sentences.append(f"Families have joined: {pairs}, each pair on one curve, striped where a bicycle can ride it.")
-    if any(not pushed for curve in drawn for _, _, pushed in curve.pieces()):
+    kinds = {kind for curve in drawn for *_, kind in curve.pieces()}
+    if "pulled" in kinds:
         sentences.append("Dashed: the ground would have to pull a wheel, so no bicycle can ride there.")
+    if "touching" in kinds:
+        sentences.append("Dotted: a rim would lie inside the ground, so no bicycle can ride there.")
     sentences.append("Open marks are limits: E and F lying flat at infinite speed, others on ever larger circles.")
     sections = []
     for family in document["families"]:

@@ -68,10 +68,16 @@ def test_the_abscissa_is_the_papers_and_blind_to_the_sign() -> None:
     assert np.array_equal(scaled_speed(np.array([-3.0, 3.0]), RADIUS), np.full(2, np.arctan(RADIUS * 3.0 / 4)))
 
 
-def test_a_curve_is_cut_where_the_least_push_is_zero() -> None:
-    line = np.arange(4.0)
-    curve = SolutionCurve((1,), line, line, line, np.array([3.0, 1.0, -1.0, 2.0]), (), ())
-    assert curve.pieces() == [(0.0, 1.5, True), (1.5, 2 + 1 / 3, False), (2 + 1 / 3, 3.0, True)]
+def test_a_curve_is_cut_where_it_can_no_longer_be_ridden() -> None:
+    line = np.arange(7.0)
+    pulled = np.array([False, False, True, True, False, False, False])
+    curve = SolutionCurve((1,), line, line, line, pulled, ((0.0, 1.25), (5.5, 6.0)), (), (), ())
+    assert curve.pieces() == [
+        (0.0, 1.25, "ridden"),
+        (1.25, 3.5, "pulled"),
+        (3.5, 5.5, "touching"),
+        (5.5, 6.0, "ridden"),
+    ]
     assert curve.line("lean", 0.5, 2.25).tolist() == [[0.5, 0.5], [1.0, 1.0], [2.0, 2.0], [2.25, 2.25]]
 
 
