@@ -77,15 +77,34 @@ def show_families(console: Console, document: Mapping[str, Any]) -> None:
             columns = [
                 Column("", list(specials), right=False),
                 Column("kind", [point["kind"] for point in specials.values()], right=False),
+                _make_physical_column(list(specials.values())),
             ]
             columns += _make_number_columns(list(specials.values()), ("rear_rate", "front_rate", "lean", "steer"))
             print_table(console, columns)
         for section in family["stable_sections"]:
-            rates, causes = section["rear_rate"], section["cause"]
-            line = " to ".join(f"{rate:z.9f} ({cause})" for rate, cause in zip(rates, causes, strict=True))
-            console.print(f"Lyapunov stable: rear rate {line}", style="green", markup=False, highlight=False)
+            line = _format_section(section)
+            style = "yellow" if section["rideable"] == "not" else "green"
+            console.print(f"Lyapunov stable: rear rate {line}", style=style, markup=False, highlight=False)
+            if section["rideable"] != "wholly":
+                ridden = [_format_section(part) for part in section["rideable_parts"]]
+                words = f"only {' and '.join(ridden)} of it can be ridden" if ridden else "none of it can be ridden"
+                console.print(f"  {words}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+        if not all(points["physical"]):
+            ridden = [_format_section(part) for part in family["rideable_parts"]]
+            words = f"can be ridden: rear rate {', '.join(ridden)}" if ridden else "cannot be ridden"
+            console.print(words, style="yellow", markup=False, highlight=False, soft_wrap=True)
     for number, reason in document["absent"].items():
         console.print(f"family {number}: no curve: {reason}", style="yellow", markup=False, soft_wrap=True)
+
+
+def _format_section(section: Mapping[str, Any]) -> str:
+    """Format the rear rates at both ends of a section, each with what ends it."""
+    ends = zip(section["rear_rate"], section["cause"], strict=True)
+    return " to ".join(f"{rate:z.9f} ({cause})" for rate, cause in ends)
+
+
+def _make_physical_column(points: Sequence[Mapping[str, Any]]) -> Column:
+    return Column("ridden", ["yes" if point["physical"] else "no" for point in points], right=False)
 
 
 def _curve_name(family: Mapping[str, Any]) -> str:
@@ -107,8 +126,13 @@ def show_critical(console: Console, document: Mapping[str, Any]) -> None:
         Column("what happens", what, right=False),
         Column("alpha", [f"{point['alpha']:.11f}" for point in points]),
         *_make_number_columns(points, ("rear_rate", "lean", "steer")),
+        _make_physical_column(points),
     ]
     print_table(console, columns, keys=2)
+    for point in points:
+        for reason in point["unphysical_because"]:
+            line = f"at alpha {point['alpha']:.11f} the motion cannot be ridden: {reason}"
+            console.print(line, style="yellow", markup=False, highlight=False, soft_wrap=True)
     for number, point in document["last_stable"].items():
         if point is None:
             console.print(f"family {number} has no stable section", markup=False, highlight=False)

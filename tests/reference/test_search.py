@@ -13,8 +13,8 @@ from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.bowls import Cone, Sphere, Torus
 from velodrome.reference.circular import LEAN, PITCH, SIGMA, STEER, Steady, as_solved, newton, rear_rate_condition
 from velodrome.reference.continuation import Point, tangent
-from velodrome.reference.curve import sample_curve
 from velodrome.reference.families import find_motion, trace_all
+from velodrome.reference.rideability import assess_motions
 from velodrome.reference.search import guesses_at, is_on_curve
 from velodrome.reference.sections import stable_sections
 from velodrome.reference.surface import Paraboloid, Plane, SurfaceOfRevolution
@@ -74,8 +74,8 @@ def random_motions(bicycle: Bicycle, surface: SurfaceOfRevolution, starts: int) 
             if unknowns[SIGMA] < 0 or not 0 < unknowns[STEER] < np.pi or not above_ground(equations, unknowns):
                 continue
             unknowns = as_solved(unknowns)
-            pushed = np.all(sample_curve(equations, unknowns[None]).normal_force > 0)
-            if pushed and stands(equations, unknowns) and not any(np.allclose(unknowns, u, atol=1e-7) for u in found):
+            (ridden,) = assess_motions(bicycle, surface, unknowns[None]).physical
+            if ridden and not any(np.allclose(unknowns, u, atol=1e-7) for u in found):
                 found.append(unknowns)
     return found
 

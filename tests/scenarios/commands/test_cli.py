@@ -51,7 +51,7 @@ def test_list_names_every_scenario_and_engine(velodrome) -> None:
 CIRCULAR_FIELDS = {
     *("alpha", "family", "rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "position"),
     *("contact_point", "contact_force", "normal_force", "energy", "residual", "eigenvalues", "jacobian"),
-    *("lyapunov_stable", "physical"),
+    *("lyapunov_stable", "physical", "unphysical_because", "required_friction"),
 }
 
 
@@ -110,7 +110,7 @@ def test_circular_has_exactly_its_fields_in_full_precision(velodrome) -> None:
 def test_circular_tells_people_the_same(velodrome) -> None:
     result = velodrome("circular", *Q2, "--family", "2")
     assert result.status == 0
-    for words in ("0.737443", "-12.2844", "Lyapunov stable", "both wheels are pushed"):
+    for words in ("0.737443", "-12.2844", "Lyapunov stable", "it can be ridden: rolling needs a coefficient of friction of 0.9592"):
         assert words in result.stdout
 
 

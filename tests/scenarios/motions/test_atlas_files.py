@@ -37,7 +37,12 @@ def test_an_atlas_is_written_whole(tmp_path: Path) -> None:
     assert sorted(set(values["alpha"])) == document["alphas"]
     assert np.array_equal(values["stable"], values["growth_rate"] < 0)
     pushed = (values["normal_force_rear"] > 0) & (values["normal_force_front"] > 0)
+    # On so shallow bowls no rim touches twice, and the benchmark's wheels are apart at every steer.
     assert np.array_equal(values["physical"], pushed)
+    assert facts["obstacles"][:2] == ["rear wheel not pushed", "front wheel not pushed"]
+    codes = (values["normal_force_rear"] <= 0) + 2 * (values["normal_force_front"] <= 0)
+    assert np.array_equal(values["obstacles"], codes)
+    assert np.array_equal(np.isfinite(values["required_friction"]), pushed)
     # The stable motions of a family are one piece of its curve at every alpha.
     for boundary in document["stable"]:
         for alpha in boundary["alpha"]:
