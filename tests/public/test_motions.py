@@ -62,7 +62,9 @@ def test_the_families_are_the_commands() -> None:
 def test_critical_shapes_are_the_reference_modules(monkeypatch: pytest.MonkeyPatch) -> None:
     """The search takes half a minute and has tests of its own; here it is what is made of it."""
     motion = velodrome.circular(alpha=0.012, rear_rate=18.0, family=2).motion
-    point = reference_critical.CriticalPoint((2, 4), 0.012, motion, 0.0, "reconnection", ("the wheels overlap by 1 mm",))
+    point = reference_critical.CriticalPoint(
+        (2, 4), 0.012, motion, 0.0, "reconnection", ("the wheels overlap by 1 mm",)
+    )
     asked: list[velodrome.Bicycle] = []
 
     def reconnections(bicycle: velodrome.Bicycle, progress: Any) -> list[Any]:

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from velodrome.reference.standing import stands
 
 from velodrome.reference.anchors import above_ground
 from velodrome.reference.bicycle import Bicycle

@@ -14,8 +14,8 @@ import velodrome
 from velodrome.engines.engine import REFERENCE
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.families import trace_all
+from velodrome.reference.rideability import assess_motions
 from velodrome.reference.sections import sample_family
-from velodrome.reference.standing import stands
 from velodrome.reference.surface import Paraboloid
 from velodrome.scenarios.scenario.bicycle_file import read_bicycle_file
 
@@ -68,7 +68,8 @@ def circle_changes(name: str) -> dict[str, Any]:
         rides &= samples.radius < 30
         for k in np.flatnonzero(rides):
             growth = float(samples.growth_rate[k])
-            if (best is None or growth < best[0]) and stands(curve.equations, curve.points[k].unknowns):
+            unknowns = curve.points[k].unknowns[None]
+            if (best is None or growth < best[0]) and assess_motions(read_bicycle(name), BOWL, unknowns).physical[0]:
                 near = {"lean": float(samples.lean[k]), "steer": float(samples.steer[k])}
                 best = growth, {"motion": {"rear_rate": float(samples.rear_rate[k]), "near": near}}
     assert best is not None
