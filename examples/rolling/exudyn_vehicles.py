@@ -1,6 +1,6 @@
 """Vehicles in plain Exudyn with the suite's rolling joint: `python examples/rolling/exudyn_vehicles.py`.
 
-Every body is a rigid body of the library, every hinge its revolute joint, and every wheel has a rolling joint of its own.
+Every body is a rigid body of the library, every hinge its revolute joint, and every wheel has a joint of its own.
 Redundant rows are left out by the joint's `constrainedAxes`. The script rides a tricycle on the exact circle of its
 wheels, a cart and a tandem in bowls, at three steps each.
 """
