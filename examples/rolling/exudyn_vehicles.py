@@ -20,6 +20,7 @@ from velodrome.engines.exudyn.joint import CreateRollingJointOnSurface
 from velodrome.engines.exudyn.sensor import CreateRollingJointSensor
 
 _exu: Any = exu
+_make_inertia: Any = RigidBodyInertia  # whose annotation asks for a whole number of kilograms
 EULER_PARAMETERS = _exu.NodeType.RotationEulerParameters
 SAMPLE_INTERVAL = 0.01
 
@@ -44,7 +45,7 @@ def add_vehicle(mbs: Any, vehicle: Vehicle, node_type: Any = EULER_PARAMETERS) -
     bodies = [
         mbs.CreateRigidBody(
             name=body.name,
-            inertia=RigidBodyInertia(mass=body.mass, inertiaTensor=body.inertia),
+            inertia=_make_inertia(mass=body.mass, inertiaTensor=body.inertia),
             referencePosition=body.position,
             referenceRotationMatrix=body.rotation,
             initialVelocity=body.velocity,

@@ -95,7 +95,7 @@ def test_tricycle_rides_on_other_nodes(node) -> None:
 
 
 def test_cart_rides_in_its_bowl() -> None:
-    """Eleven degrees of freedom and ten constraints, without the two redundant ones: it rides on, on all four wheels."""
+    """Eleven degrees of freedom, and ten constraints without the two redundant ones: it rides, on all four wheels."""
     vehicle = VEHICLES.make_cart()
     drifts = []
     for step in (4e-3, 2e-3):
