@@ -45,7 +45,7 @@ from ...reference.rim import rim_search
 from ...reference.surface import Surface
 from . import general, kernel
 from .attachment import INERTIAL_FRAME, Attachment, find_attachment, list_nodes, reference_coordinates, stack_frames
-from .pose import EULER_PARAMETERS, FIXED, Frames
+from .pose import EULER_PARAMETERS, FIXED, TREE, Frames
 
 SLIP_ROWS = (0, 1)  # of a wheel's three
 
@@ -148,6 +148,8 @@ def CreateRollingJointOnSurface(
     nodes = list_nodes([*wheels, ground])
     if not nodes:
         raise ValueError("nothing can roll: the wheels and their ground are all fixed")
+    if any(each.node is not None and each.node == ground.node and each.kind != TREE for each in wheels):
+        raise ValueError(f"nothing can roll: a wheel is fixed to the body of its ground, node {int(ground.node)}")
     if len(nodes) > 2:
         raise ValueError(
             f"the wheels and their ground belong to {len(nodes)} nodes; the engine's connector joins at most two, so "

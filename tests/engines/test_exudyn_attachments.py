@@ -504,6 +504,7 @@ def test_joints_that_cannot_be_are_refused() -> None:
         ({"bodyNumbers": bodies}, "belong to 3 nodes"),
         ({"groundNumber": bodies[2], "bodyNumbers": bodies[:2]}, "a joint of its own"),
         ({"bodyNumbers": [ground]}, "all fixed"),
+        ({"groundNumber": bodies[0]}, "fixed to the body of its ground"),
         ({"bodyNumbers": [tree]}, "MarkerKinematicTreeRigid, which names its link"),
         ({"bodyNumbers": [point]}, "is a MassPoint"),
         ({"bodyNumbers": [mbs.AddMarker(MarkerBodyPosition(bodyNumber=bodies[0]))]}, "is a MarkerBodyPosition"),
