@@ -148,7 +148,7 @@ def CreateRollingJointOnSurface(
     nodes = list_nodes([*wheels, ground])
     if not nodes:
         raise ValueError("nothing can roll: the wheels and their ground are all fixed")
-    if any(each.node is not None and each.node == ground.node and each.kind != TREE for each in wheels):
+    if any(len(list_nodes([each, ground])) == 1 and each.kind == ground.kind != TREE for each in wheels):
         raise ValueError(f"nothing can roll: a wheel is fixed to the body of its ground, node {int(ground.node)}")
     if len(nodes) > 2:
         raise ValueError(
