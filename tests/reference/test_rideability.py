@@ -85,8 +85,8 @@ def count_clear(surface: Surface, q: np.ndarray, contact: np.ndarray) -> int:
     clear = 0
     for k, margin in enumerate(assess_state(BICYCLE, surface, q, contact.reshape(2, 3), UP).margins[0, 2:4]):
         turn, height = rim_heights(surface, q, contact, k)
-        # Ground that ends above a rim leaves no height. Next to the contact, round-off of heights is all there is: 1e-15
-        # over the versine of 1e-3 is 2e-9.
+        # Ground that ends above a rim leaves no height. Next to the contact, round-off of heights is all there is:
+        # 1e-15 over the versine of 1e-3 is 2e-9.
         seen = np.isfinite(height) & (np.abs(turn) > 1e-3)
         least = (height[seen] / (1 - np.cos(turn[seen]))).min()
         # A margin is a clearance in radii, or a bound of it, less round-off of up to 1e-4.
