@@ -21,7 +21,15 @@ from .plots import (
     mode_plots,
     to_nanoseconds,
 )
-from .summary import COLUMNS, describe_stability, format_cell, format_verdict, make_remarks, make_summary
+from .summary import (
+    COLUMNS,
+    describe_required_friction,
+    describe_stability,
+    format_cell,
+    format_verdict,
+    make_remarks,
+    make_summary,
+)
 
 __all__ = [
     "CHANGE",
@@ -45,6 +53,7 @@ __all__ = [
     "assign_colours",
     "ball",
     "body_meshes",
+    "describe_required_friction",
     "describe_stability",
     "drawable_values",
     "escape_markdown",

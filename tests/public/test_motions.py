@@ -62,7 +62,9 @@ def test_the_families_are_the_commands() -> None:
 def test_critical_shapes_are_the_reference_modules(monkeypatch: pytest.MonkeyPatch) -> None:
     """The search takes half a minute and has tests of its own; here it is what is made of it."""
     motion = velodrome.circular(alpha=0.012, rear_rate=18.0, family=2).motion
-    point = reference_critical.CriticalPoint((2, 4), 0.012, motion, 0.0, "reconnection", ("the wheels overlap by 1 mm",))
+    point = reference_critical.CriticalPoint(
+        (2, 4), 0.012, motion, 0.0, "reconnection", ("the wheels overlap by 1 mm",)
+    )
     asked: list[velodrome.Bicycle] = []
 
     def reconnections(bicycle: velodrome.Bicycle, progress: Any) -> list[Any]:
@@ -82,7 +84,8 @@ def test_critical_shapes_are_the_reference_modules(monkeypatch: pytest.MonkeyPat
     assert repr(found).splitlines() == [
         "CriticalShapes, alpha [1/m]:",
         "  cusps of families 2 and 4 meet: 0.012 (cannot be ridden)",
-        "  last stable section vanishes: family 1 none, family 2 0.012 (cannot be ridden), family 3 none, family 4 none",
+        "  last stable section vanishes: family 1 none, family 2 0.012 (cannot be ridden), family 3 none, "
+        "family 4 none",
         "  families exchange parts: families 2 and 4 0.012 (cannot be ridden)",
     ]
     document = found.as_json()

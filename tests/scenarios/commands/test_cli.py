@@ -110,7 +110,12 @@ def test_circular_has_exactly_its_fields_in_full_precision(velodrome) -> None:
 def test_circular_tells_people_the_same(velodrome) -> None:
     result = velodrome("circular", *Q2, "--family", "2")
     assert result.status == 0
-    for words in ("0.737443", "-12.2844", "Lyapunov stable", "it can be ridden: rolling needs a coefficient of friction of 0.9592"):
+    for words in (
+        "0.737443",
+        "-12.2844",
+        "Lyapunov stable",
+        "it can be ridden: rolling needs a coefficient of friction of 0.9592",
+    ):
         assert words in result.stdout
 
 
