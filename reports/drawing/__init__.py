@@ -23,6 +23,7 @@ from .plots import (
 )
 from .summary import (
     COLUMNS,
+    describe_required_friction,
     describe_stability,
     find_unsteadiness,
     format_cell,
@@ -53,6 +54,7 @@ __all__ = [
     "assign_colours",
     "ball",
     "body_meshes",
+    "describe_required_friction",
     "describe_stability",
     "drawable_values",
     "escape_markdown",

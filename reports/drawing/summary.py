@@ -74,6 +74,15 @@ def make_remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list
     return lines
 
 
+def describe_required_friction(measured: Mapping[str, Mapping[str, Any]]) -> str | None:
+    """Describe the friction that rolling needs by the reference's forces; None where it is not known.
+
+    Engines whose wheels are bound to roll have no limit of friction; whether a real wheel would hold is for the reader.
+    """
+    needed = measured.get(REFERENCE, {}).get("required_friction")
+    return None if needed is None else f"Rolling without slip needs a coefficient of friction of up to {needed:.3g}."
+
+
 def _equals_reference(metrics: Mapping[str, Any]) -> bool:
     """Return whether path, orientation of the frame and rate of the wheel have no error over the whole ride."""
     errors = [metrics.get("position_error"), metrics.get("orientation_error"), {"max": metrics.get("rear_rate_error")}]
@@ -123,6 +132,8 @@ def make_summary(
         f"Errors are the largest over {duration:g} s, against `{REFERENCE}`; drifts are slopes of a line fit.",
         "",
     ]
+    friction = describe_required_friction(measured)
+    lines += [] if friction is None else [friction, ""]
     for engine, values in measured.items():
         lines += [f"- {escape_markdown(line)}" for line in make_remarks(engine, values, duration)]
     lines += [f"- {escape_markdown(f'{engine} did not run: {reason}')}" for engine, reason in failures.items()]

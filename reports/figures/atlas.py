@@ -241,9 +241,10 @@ def _draw_stable_hatching(
 ) -> None:
     """Hatch the motions of a stable region that cannot be ridden."""
     lost = {alpha: columns[name][where & (columns["alpha"] == alpha)] for alpha in boundary["alpha"]}
-    reached = [(alpha, inside.min(), inside.max()) for alpha, inside in lost.items() if len(inside)]
-    if reached:
-        axes.fill_between(*zip(*reached, strict=True), facecolor="none", edgecolor=INK, hatch="////", lw=0)
+    reached = np.array([(alpha, inside.min(), inside.max()) for alpha, inside in lost.items() if len(inside)])
+    if len(reached):
+        alphas, low, high = reached.T
+        axes.fill_between(alphas, low, high, facecolor="none", edgecolor=INK, hatch="////", lw=0)
 
 
 def _stable_legend(columns: Columns, document: Mapping[str, Any]) -> Iterator[Any]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from ...reports.drawing import COLUMNS, format_cell, format_verdict, make_remarks
+from ...reports.drawing import COLUMNS, describe_required_friction, format_cell, format_verdict, make_remarks
 from .tables import Column, print_table
 
 if TYPE_CHECKING:
@@ -25,6 +25,9 @@ def show_outcome(console: Console, plan: RunPlan, outcome: RunOutcome) -> None:
         cells = [format_cell(values, metric, part) for values in outcome.metrics.values()]
         columns.append(Column(title.replace(" ", "\n"), cells, unit))
     print_table(console, columns)
+    friction = describe_required_friction(outcome.metrics)
+    if friction is not None:
+        console.print(friction, style="dim", markup=False, highlight=False, soft_wrap=True)
     for name, values in outcome.metrics.items():
         for line in make_remarks(name, values, duration):
             console.print(line, style="yellow", markup=False, soft_wrap=True)

@@ -101,6 +101,8 @@ def test_many_bicycles_ride_circles_or_are_refused(parameters: dict[str, float],
         ({"front_wheel_Iyy": -0.1}, "front_wheel_I.*rigid body"),
         ({"wheelbase": 0.0}, "wheelbase is 0.0; it must be positive"),
         ({"steer_axis_tilt": 1.6}, "steer_axis_tilt is 1.6"),
+        # The rear wheel has 0.3 m, and its centre is 1.7 m lower and 1.02 m behind.
+        ({"front_wheel_radius": 2.0}, f"the wheels overlap by {1e3 * (2.3 - np.hypot(1.7, 1.02)):.3g} mm"),
     ],
 )
 def test_a_bicycle_that_cannot_be_is_refused(parameters: dict[str, float], words: str) -> None:
@@ -115,7 +117,7 @@ def test_a_bicycle_that_cannot_be_is_refused(parameters: dict[str, float], words
         {"steer_axis_tilt": 0.0},
         {"trail": 0.0, "steer_axis_tilt": 0.0},
         {"front_wheel_radius": 0.3},
-        {"front_wheel_radius": 2.0},
+        {"front_wheel_radius": 2.0, "wheelbase": 2.0},
         {"front_wheel_mass": 1e-9, "front_wheel_Ixx": 1e-12, "front_wheel_Iyy": 2e-12},
     ],
     ids=repr,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import EntryPoint
@@ -15,8 +16,10 @@ from velodrome.engines.admission import ride_engine
 from velodrome.engines.engine import SHAPES, EngineError, Problem, Settings, Trajectory, load_engine
 from velodrome.engines.lagrange import ENGINE, LagrangeEngine
 from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.dae import consistent_state
 from velodrome.reference.families import find_motion
-from velodrome.reference.surface import Paraboloid
+from velodrome.reference.kinematics import STEER
+from velodrome.reference.surface import Paraboloid, Plane
 
 
 @cache
@@ -75,6 +78,24 @@ def test_what_an_engine_writes_into_its_problem_changes_no_other_ride() -> None:
     ride_engine(Writing(), before, ENGINE.settings(), lambda _: None)
     for array, copy in zip((before.q, before.qd, before.times), kept, strict=True):
         assert np.array_equal(array, copy)
+
+
+def test_a_ride_ends_where_the_wheels_collide() -> None:
+    """A wheelbase shorter than both radii: the front wheel strikes the rear one where steer passes zero."""
+    short = Bicycle(wheelbase=0.6)
+    q, qd = consistent_state(short, Plane(), (0.5, 0.0), 0.0, 0.2, (0.0, -1.0, 10.0))
+    turned = Problem(short, Plane(), q, qd, np.arange(101) / 100)
+    ride = ride_engine(ENGINE, turned, ENGINE.settings(), lambda _: None)
+    told = re.fullmatch(r"the wheels collide at t = (\S+) s: there they overlap by 47\.9 mm", ride.ended or "")
+    assert told is not None, ride.ended
+    time, steer = float(told[1]), ride.q[:, STEER]
+    assert np.all(steer > 0)
+    assert ride.time[-1] <= time < ride.time[-1] + 0.01
+    # Straight ahead from the last sample on, to second order in the 10 ms between samples.
+    assert time - ride.time[-1] == pytest.approx(-steer[-1] / ride.qd[-1, STEER], abs=2e-3)
+    q, qd = consistent_state(short, Plane(), (0.5, 0.0), 0.0, 0.0, (0.0, 0.0, 10.0))
+    with pytest.raises(EngineError, match=r"^the wheels overlap by 47\.9 mm at a steer of 0 rad$"):
+        ride_engine(ENGINE, replace(turned, q=q, qd=qd), ENGINE.settings(), lambda _: None)
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,8 @@ def test_critical_shapes_are_the_reference_modules(monkeypatch: pytest.MonkeyPat
     assert repr(found).splitlines() == [
         "CriticalShapes, alpha [1/m]:",
         "  cusps of families 2 and 4 meet: 0.012 (cannot be ridden)",
-        "  last stable section vanishes: family 1 none, family 2 0.012 (cannot be ridden), family 3 none, family 4 none",
+        "  last stable section vanishes: family 1 none, family 2 0.012 (cannot be ridden), family 3 none, "
+        "family 4 none",
         "  families exchange parts: families 2 and 4 0.012 (cannot be ridden)",
     ]
     document = found.as_json()

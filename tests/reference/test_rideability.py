@@ -26,7 +26,7 @@ from velodrome.reference.rideability import (
     require_standing,
 )
 from velodrome.reference.rideable_parts import assess_family, find_rideable_parts, find_rideable_parts_of_section
-from velodrome.reference.sections import sample_family, stable_sections
+from velodrome.reference.sections import SectionEnd, sample_family, stable_sections
 from velodrome.reference.special import special_points
 from velodrome.reference.surface import Paraboloid, Plane, Surface, evaluate, unit_normals
 
@@ -85,8 +85,8 @@ def count_clear(surface: Surface, q: np.ndarray, contact: np.ndarray) -> int:
     clear = 0
     for k, margin in enumerate(assess_state(BICYCLE, surface, q, contact.reshape(2, 3), UP).margins[0, 2:4]):
         turn, height = rim_heights(surface, q, contact, k)
-        # Ground that ends above a rim leaves no height. Next to the contact, round-off of heights is all there is: 1e-15
-        # over the versine of 1e-3 is 2e-9.
+        # Ground that ends above a rim leaves no height. Next to the contact, round-off of heights is all there is:
+        # 1e-15 over the versine of 1e-3 is 2e-9.
         seen = np.isfinite(height) & (np.abs(turn) > 1e-3)
         least = (height[seen] / (1 - np.cos(turn[seen]))).min()
         # A margin is a clearance in radii, or a bound of it, less round-off of up to 1e-4.
@@ -238,3 +238,38 @@ def test_assessing_many_is_assessing_each() -> None:
         q = np.array([*u[:3], 0.0, u[LEAN], u[PITCH], u[STEER], 0.0, 0.0])
         one = assess_state(BICYCLE, Paraboloid(5.0), q, u[10:16], WEIGHT * u[16:22])
         np.testing.assert_allclose(one.margins[0], margins, rtol=1e-12, atol=1e-14)
+
+
+@cache
+def trough_curve() -> Family:
+    """Family 2 in a trough of 0.5 m radius: flat enough circles bring the rear rim, then both, against its wall."""
+    return trace(BICYCLE, Torus(3.0, 0.5), 2, 0.05)
+
+
+def test_parts_end_where_a_rim_grazes_the_ground() -> None:
+    curve, surface = trough_curve(), Torus(3.0, 0.5)
+    ((start, end),) = find_rideable_parts(curve)
+    assert (start.cause, end.cause) == ("end", "rear rim touches twice")
+    turn, height = rim_heights(surface, end.motion.state()[0], end.motion.contact.ravel(), 0)
+    seen = np.isfinite(height) & (np.abs(turn) > 1e-3)
+    # Zero but for round-off of up to 1e-4, see `rideability`, and for the samples' distance squared.
+    assert abs((height[seen] / (1 - np.cos(turn[seen]))).min()) < 2e-4
+    physical = assess_family(curve).physical
+    (last,) = np.flatnonzero(physical[:-1] & ~physical[1:])
+    rates = [curve.equations.motion(curve.points[k].unknowns).rear_rate for k in (last, last + 1)]
+    assert min(rates) <= end.motion.rear_rate <= max(rates)
+
+
+def test_a_section_that_leaves_the_rideable_part_is_ridden_up_to_there() -> None:
+    curve = trough_curve()
+    ((_, grazing),) = find_rideable_parts(curve)
+    physical = assess_family(curve).physical
+    (last,) = np.flatnonzero(physical[:-1] & ~physical[1:])
+
+    def make_end(k: int) -> SectionEnd:
+        return SectionEnd("hopf", curve.equations.motion(curve.points[k].unknowns), 1j, curve.points[k], k)
+
+    ((start, end),) = find_rideable_parts_of_section(curve, (make_end(last - 4), make_end(last + 4)))
+    assert (start.cause, end.cause) == ("hopf", "rear rim touches twice")
+    assert end.motion.rear_rate == pytest.approx(grazing.motion.rear_rate, rel=1e-12)
+    assert find_rideable_parts_of_section(curve, (make_end(last + 1), make_end(last + 5))) == []

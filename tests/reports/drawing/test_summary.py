@@ -95,6 +95,14 @@ def test_what_spoils_a_row_is_said(change: dict[str, Any], words: list[str]) -> 
     assert f"- {line}" in text(**change)
 
 
+def test_the_friction_that_rolling_needs_is_said_once() -> None:
+    """By the reference's forces, for engines without a limit of friction too."""
+    assert "coefficient of friction" not in text()
+    measured = {"reference": ALONE | {"required_friction": 0.95923}, "exudyn": MEASURED}
+    lines = make_summary("A ride", measured, {}, [], -0.4, 20.0).splitlines()
+    assert lines.count("Rolling without slip needs a coefficient of friction of up to 0.959.") == 1
+
+
 def test_a_failure_and_the_stability_are_said() -> None:
     assert text().startswith("# A ride\n")
     assert "- mujoco-native did not run: no such thing" in text()

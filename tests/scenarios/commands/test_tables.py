@@ -105,7 +105,8 @@ def show_all_families(console: Console) -> None:
 
 def show_critical_shapes(console: Console) -> None:
     keys = ("alpha", "rear_rate", "lean", "steer")
-    shape = dict(zip(keys, NUMBERS, strict=True))
+    shape: dict[str, Any] = dict(zip(keys, NUMBERS, strict=True))
+    shape |= {"physical": False, "unphysical_because": ["the ground pulls the rear wheel: -1 N"]}
     show_critical(
         console,
         {

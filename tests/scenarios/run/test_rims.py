@@ -64,6 +64,16 @@ def test_a_start_in_a_bowl_tighter_than_a_wheel_is_refused(alpha: float) -> None
         make_start(scenario)
 
 
+def test_a_start_with_overlapping_wheels_is_refused() -> None:
+    """Radii of 0.3 m and 0.35 m on a wheelbase of 0.6 m; turned aside, the front wheel passes the rear one."""
+    case = str(CASES / "straight.toml")
+    _, scenario = load_scenario(case, {"bicycle.wheelbase": 0.6})
+    with pytest.raises(ScenarioError, match=r"^motion: the wheels overlap by 47\.9 mm at a steer of 0 rad$"):
+        make_start(scenario)
+    _, turned = load_scenario(case, {"bicycle.wheelbase": 0.6, "perturbation.steer": 0.1})
+    make_start(turned)
+
+
 @pytest.mark.parametrize("name", library_names())
 def test_the_library_rides_to_its_end(name: str) -> None:
     _, scenario = load_scenario(name)
