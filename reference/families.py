@@ -193,8 +193,8 @@ def trace_all(
     """
     equations = Steady(bicycle, surface, inputs)
     if inputs.steer_torque != 0:
-        absent = dict.fromkeys(FAMILIES, _explain_numbers(inputs))
-        return search_curves(bicycle, surface, [], longest, inputs), absent
+        curves = search_curves(bicycle, surface, [], longest, inputs)
+        return curves, {number: _explain_numbers(inputs) for number in FAMILIES}
     curves, absent = trace_families(bicycle, surface, longest)
     curves += search_curves(bicycle, surface, curves, longest)
     # Damping changes the eigenvalues of the motions, not the curves.
