@@ -26,6 +26,13 @@ def examine(engine: str, **factors: float) -> ConformanceReport:
     return examine_engine(Taking(load_engine(engine), before, lambda trajectory, *_: trajectory))
 
 
+def test_a_mirrored_steer_torque_is_named() -> None:
+    report = examine("exudyn", steer_torque=-1)
+    assert [check.name for check in report.failed] == ["order on plane, with inputs"]
+    assert "steer_torque looks mirrored: " in "\n".join(report.failed[0].found)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["exudyn", "mujoco-native"])
 @pytest.mark.parametrize(
     ("factors", "named"),

@@ -42,7 +42,7 @@ def integral(time: np.ndarray, rate: float, decay: float) -> np.ndarray:
     """The integral of the squared steer rate of `swinging` from 0."""
 
     def antiderivative(t: np.ndarray) -> np.ndarray:
-        # rate'^2 = exp(-2 decay t) (a + b cos(2 rate t) + c sin(2 rate t)), integrated as the real part of exponentials.
+        # The squared rate is exp(-2 decay t) (a + b cos(2 rate t) + c sin(2 rate t)): a sum of exponentials.
         a, b = (rate**2 + decay**2) / 2, (rate**2 - decay**2) / 2
         z = -2 * decay + 2j * rate
         return np.real(-a / (2 * decay) * np.exp(-2 * decay * t) + (b + 1j * rate * decay) / z * np.exp(z * t))
@@ -104,7 +104,7 @@ def driven(inputs: Inputs, engine: str = "reference", interval: float = 0.02) ->
 @pytest.mark.parametrize(
     "inputs",
     [Inputs(0.3), Inputs(rear_wheel_torque=5.0), Inputs(steer_damping=1.0), ALL],
-    ids=lambda one: one.describe(),
+    ids=["steer", "rear wheel", "damping", "all"],
 )
 def test_the_balance_of_the_reference_closes_to_its_tolerance(inputs: Inputs) -> None:
     ride = driven(inputs)
