@@ -352,6 +352,9 @@ def _replace_last_by_end(equations: Steady, points: list[Point]) -> list[Point]:
         ends = roots_along(equations, points[last:], lambda point, k=unknown: float(point.unknowns[k]), zero=STANDING)
         for place, end in ends:
             return [*points[: last + place + 1], end]
+    # A curve that starts in its static equilibrium has no change of sign there.
+    if len(points) > 1 and _is_zero(points[-2].unknowns, SIGMA) and points[-1].unknowns[SIGMA] < 0:
+        return points[:-1]
     return points
 
 
