@@ -79,7 +79,7 @@ class Problem:
             except (TypeError, ValueError) as error:
                 raise ValueError(f"{name} is {reprlib.repr(given)}; it must be an array of numbers") from error
             object.__setattr__(self, name, values)
-        inputs: object = self.inputs  # callers may not check types
+        inputs: Any = vars(self)["inputs"]  # callers may not check types
         if not isinstance(inputs, Inputs):
             raise ValueError(f"inputs is {reprlib.repr(inputs)}; it must be an Inputs")
         for name in ("q", "qd"):
