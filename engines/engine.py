@@ -79,8 +79,9 @@ class Problem:
             except (TypeError, ValueError) as error:
                 raise ValueError(f"{name} is {reprlib.repr(given)}; it must be an array of numbers") from error
             object.__setattr__(self, name, values)
-        if not isinstance(self.inputs, Inputs):
-            raise ValueError(f"inputs is {reprlib.repr(self.inputs)}; it must be an Inputs")
+        inputs: Any = vars(self)["inputs"]  # callers may not check types
+        if not isinstance(inputs, Inputs):
+            raise ValueError(f"inputs is {reprlib.repr(inputs)}; it must be an Inputs")
         for name in ("q", "qd"):
             values = getattr(self, name)
             if values.shape != (9,) or not np.all(np.isfinite(values)):
@@ -433,7 +434,7 @@ def engine_names() -> list[str]:
     return sorted(_find_entry_points(), key=lambda name: (name != REFERENCE, name))
 
 
-def load_engine(name: str) -> Engine:
+def load_engine(name: str) -> GuardedEngine:
     """Load an engine by name.
 
     Raises

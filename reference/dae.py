@@ -94,6 +94,7 @@ def residual(
     qdd: np.ndarray,
     p: np.ndarray,
     force: np.ndarray,
+    *,
     inputs: Inputs = NO_INPUTS,
 ) -> np.ndarray:
     """Compute the residual of all 21 equations (Eq. 8).

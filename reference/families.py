@@ -192,8 +192,8 @@ def trace_all(
     """
     equations = Steady(bicycle, surface, inputs)
     if inputs.steer_torque != 0:
-        absent = dict.fromkeys(FAMILIES, _explain_numbers(inputs))
-        return search_curves(bicycle, surface, [], longest, inputs), absent
+        curves = search_curves(bicycle, surface, [], longest, inputs)
+        return curves, {number: _explain_numbers(inputs) for number in FAMILIES}
     curves, absent = trace_families(bicycle, surface, longest)
     curves += search_curves(bicycle, surface, curves, longest)
     # Damping changes the eigenvalues of the motions, not the curves.
@@ -350,6 +350,9 @@ def _replace_last_by_end(equations: Steady, points: list[Point]) -> list[Point]:
         ends = roots_along(equations, points[last:], lambda point, k=unknown: float(point.unknowns[k]), zero=STANDING)
         for place, end in ends:
             return [*points[: last + place + 1], end]
+    # A curve that starts in its static equilibrium has no change of sign there.
+    if len(points) > 1 and _is_zero(points[-2].unknowns, SIGMA) and points[-1].unknowns[SIGMA] < 0:
+        return points[:-1]
     return points
 
 

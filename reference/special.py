@@ -141,7 +141,8 @@ def _name_points(family: Family, points: list[tuple[str, CircularMotion]]) -> It
     end is the wheel that runs backward.
     """
     pivot = "H" if family.numbers == (4,) else "G (H)" if 4 in family.numbers else "G"
-    letters = {"static": "A", "pivot": pivot}
+    # The paper's motions are hands-free.
+    letters = {} if family.equations.inputs.steer_torque else {"static": "A", "pivot": pivot}
     cusps = [motion for kind, motion in points if kind == "cusp" and abs(motion.lean) > SMALL_LEAN]
     special, ends = None, family.ends
     if family.number == 2 and cusps and ("large circle" in ends or "edge" in ends):

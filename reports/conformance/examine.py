@@ -17,7 +17,16 @@ from ...engines.guard import GuardedEngine, call_engine
 from ...reference.bicycle import Bicycle
 from .forces import check_forces
 from .maps import check_maps
-from .motions import GROUNDS, OTHER_BICYCLE, SAMPLES, TransientMotion, make_motion, make_problem, output_interval
+from .motions import (
+    EXAMINED_INPUTS,
+    GROUNDS,
+    OTHER_BICYCLE,
+    SAMPLES,
+    TransientMotion,
+    make_motion,
+    make_problem,
+    output_interval,
+)
 from .order import CLAIM, check_order
 from .protocol import check_settings, guard_engine, step_noise_of
 from .refusals import check_refusals, suits
@@ -161,6 +170,7 @@ class _Examination:
         for ground in suitable:
             if ground not in accepted:
                 yield skip_check(f"order on {ground}", CLAIM, "it refuses this ground")
+        yield from self.check_inputs(accepted[0], _has_wrong_map(checks))
 
     @property
     def interval(self) -> float:
@@ -213,6 +223,17 @@ class _Examination:
         else:
             yield check_bits(first, again.trajectory)
         yield check_own_work(first, self.engine.name)
+
+    def check_inputs(self, ground: str, map_is_wrong: bool) -> Iterator[ConformanceCheck]:
+        """Check a ride with torques and steer damping, if the engine declares that it applies them."""
+        if not self.engine.takes_inputs:
+            yield skip_check("inputs", "it applies torques and steer damping", "it does not set takes_inputs")
+            return
+        motion = make_motion(ground, Bicycle(), self.interval, inputs=EXAMINED_INPUTS)
+        ride, faults = self.try_ride(motion)
+        yield make_check(f"ride on {motion.name}", _RIDE, faults)
+        if ride is not None:
+            yield self.check_order(ride, map_is_wrong)
 
     def check_order(self, ride: Ride, map_is_wrong: bool) -> ConformanceCheck:
         """Check the order of convergence of a ride, and what it converges to, on rides with other steps."""

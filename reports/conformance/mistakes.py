@@ -1,8 +1,8 @@
-"""Rides with a wrong model of the ground or of the bicycle, predicted by the reference.
+"""Rides with a wrong model of the ground, of the bicycle or of the inputs, predicted by the reference.
 
-An engine may ignore a ground's curvature, read its heights in another order, or ride the benchmark's bicycle whatever
-bicycle the problem has. The reference simulates the problem with each of these mistakes, and the engine's ride is
-compared with these rides, as it is with those of wrong maps.
+An engine may ignore a ground's curvature, read its heights in another order, ride the benchmark's bicycle whatever
+bicycle the problem has, or apply a torque the wrong way. The reference simulates the problem with each of these
+mistakes, and the engine's ride is compared with these rides, as it is with those of wrong maps.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from ...engines.engine import Problem
 from ...reference.bicycle import Bicycle
 from ...reference.height_field import HeightField
+from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.surface import Paraboloid, Plane, Surface
 from .explain import EXPLAINED
 from .motions import TransientMotion
@@ -74,6 +75,19 @@ def _make_mistakes(problem: Problem) -> Iterator[tuple[str, Problem]]:
             if getattr(problem.bicycle, field.name) != usual:
                 changed = replace(problem.bicycle, **{field.name: usual})
                 yield f"{field.name} looks to be the benchmark's", replace(problem, bicycle=changed)
+    for what, inputs in _mistake_inputs(problem.inputs):
+        yield what, replace(problem, inputs=inputs)
+
+
+def _mistake_inputs(inputs: Inputs) -> Iterator[tuple[str, Inputs]]:
+    if inputs != NO_INPUTS:
+        yield "it applies no inputs", NO_INPUTS
+    for field in fields(Inputs):
+        value = getattr(inputs, field.name)
+        if value != 0:
+            yield f"{field.name} looks to be left out", replace(inputs, **{field.name: 0.0})
+            if field.name != "steer_damping":  # which is never negative
+                yield f"{field.name} looks mirrored", replace(inputs, **{field.name: -value})
 
 
 def _mistake_ground(surface: Surface) -> Iterator[tuple[str, Surface]]:

@@ -13,6 +13,7 @@ from ...reference.bicycle import Bicycle
 from ...reference.contact import observe
 from ...reference.dae import consistent_state
 from ...reference.height_field import HeightField
+from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.kinematics import FRONT_ANGLE, REAR_ANGLE, body_positions, body_quaternions
 from ...reference.simulate import simulate
 from ...reference.stability import growth_rate, linearise
@@ -48,6 +49,10 @@ OTHER_BICYCLE = replace(
 )
 
 
+# Each changes the ride by at least some percent, so that no mistake in one is hidden by the error of a step.
+EXAMINED_INPUTS = Inputs(steer_torque=4.0, rear_wheel_torque=10.0, steer_damping=5.0)
+
+
 @dataclass(frozen=True, eq=False)
 class TransientMotion:
     """A problem and the reference's ride for it.
@@ -73,8 +78,9 @@ class TransientMotion:
 
     @property
     def name(self) -> str:
-        """Name of the ground, with a note if the bicycle is not the benchmark's."""
-        return self.ground if self.problem.bicycle == Bicycle() else f"{self.ground}, another bicycle"
+        """Name of the ground, with notes if the bicycle is not the benchmark's and if there are inputs."""
+        bicycle = "" if self.problem.bicycle == Bicycle() else ", another bicycle"
+        return f"{self.ground}{bicycle}" + ("" if self.problem.inputs == NO_INPUTS else ", with inputs")
 
     @property
     def size(self) -> float:
@@ -101,7 +107,7 @@ def awkward_interval(interval: float) -> float:
 
 
 @lru_cache(maxsize=16)
-def make_problem(ground: str, bicycle: Bicycle, interval: float, samples: int) -> Problem:
+def make_problem(ground: str, bicycle: Bicycle, interval: float, samples: int, inputs: Inputs = NO_INPUTS) -> Problem:
     """Make a problem of a transient on one of the `GROUNDS`, in which the bicycle leans, steers and turns.
 
     Parameters
@@ -112,17 +118,20 @@ def make_problem(ground: str, bicycle: Bicycle, interval: float, samples: int) -
         Time between outputs [s].
     samples : int
         Number of outputs after the start.
+    inputs : Inputs
     """
     surface = GROUNDS[ground]()
     rates = (0.4, -0.5, _REAR_RATE)
     q, qd = consistent_state(bicycle, surface, (1.3, -0.7), 0.15, -0.12, rates, yaw=2.2)
     # A wheel is symmetric about its axle, so that its angle is free.
     q[[REAR_ANGLE, FRONT_ANGLE]] = 0.7, -0.4
-    return Problem(bicycle, surface, q, qd, interval * np.arange(samples + 1))
+    return Problem(bicycle, surface, q, qd, interval * np.arange(samples + 1), inputs)
 
 
 @lru_cache(maxsize=16)
-def make_motion(ground: str, bicycle: Bicycle, interval: float, samples: int = SAMPLES) -> TransientMotion:
+def make_motion(
+    ground: str, bicycle: Bicycle, interval: float, samples: int = SAMPLES, inputs: Inputs = NO_INPUTS
+) -> TransientMotion:
     """Make a problem with `make_problem` and simulate it with the reference.
 
     Raises
@@ -130,7 +139,7 @@ def make_motion(ground: str, bicycle: Bicycle, interval: float, samples: int = S
     RuntimeError
         If the reference does not ride to the end.
     """
-    problem = make_problem(ground, bicycle, interval, samples)
+    problem = make_problem(ground, bicycle, interval, samples, inputs)
     exact = _simulate_reference(problem)
     shifted = _simulate_reference(replace(problem, q=_ABOVE * problem.q, qd=_ABOVE * problem.qd))
     upright = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.0, 0.0, (0.0, 0.0, _REAR_RATE))
@@ -141,7 +150,7 @@ def make_motion(ground: str, bicycle: Bicycle, interval: float, samples: int = S
 
 def _simulate_reference(problem: Problem) -> Trajectory:
     bicycle, surface = problem.bicycle, problem.surface
-    found = simulate(bicycle, surface, problem.q, problem.qd, problem.times)
+    found = simulate(bicycle, surface, problem.q, problem.qd, problem.times, inputs=problem.inputs)
     if found.ended is not None:
         raise RuntimeError(f"the reference ends at {found.time[-1]:.6g} s: {found.ended}")
     contact = observe(bicycle, surface, found.q, found.qd, found.contact)

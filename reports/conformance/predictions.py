@@ -84,11 +84,12 @@ def simulate_start(start: Problem) -> Iterator[PreciseMotion]:
     step = float(start.times[1]) / round(float(start.times[1]) / _STEP)
 
     def simulate_projected() -> PreciseMotion:
-        return simulate(start.bicycle, start.surface, start.q, start.qd, start.times, tolerance=1e-9)
+        state = (start.bicycle, start.surface, start.q, start.qd, start.times)
+        return simulate(*state, tolerance=1e-9, inputs=start.inputs)
 
     def simulate_as_it_is(problem: Problem) -> PreciseMotion:
         state = (problem.bicycle, problem.surface, problem.q, problem.qd, problem.times)
-        return simulate_modified_euler(*state, step=step)
+        return simulate_modified_euler(*state, step=step, inputs=problem.inputs)
 
     for ride in (
         simulate_projected,

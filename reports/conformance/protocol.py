@@ -44,8 +44,11 @@ def guard_engine(engine: Engine | str) -> tuple[GuardedEngine | None, Conformanc
             wrong.append(f"its {name} cannot be read: {why_failed(error)}")
     if wrong:
         return None, make_check("protocol", claim, wrong)
-    guarded = GuardedEngine(inner, **{fact: members[fact] for fact in _FACTS})
+    takes = call_engine(getattr, inner, "takes_inputs", False)
+    guarded = GuardedEngine(inner, **{fact: members[fact] for fact in _FACTS}, takes_inputs=takes is True)
     wrong = [*_list_fact_faults(guarded), *_list_call_faults(members)]
+    if not isinstance(takes, bool):
+        wrong.append(f"its takes_inputs is {takes!r}; it must be True or False")
     model = guarded.settings
     usable = isinstance(model, type) and issubclass(model, BaseModel) and isinstance(guarded.gives, tuple)
     return guarded if usable else None, make_check("protocol", claim, wrong)

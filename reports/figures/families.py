@@ -77,7 +77,7 @@ def solution_figure(
     figure = new_figure(3.75)
     panels = figure.subplots(1, 2)
     for axes, angle, tag in zip(panels, ANGLES, "ab", strict=True):
-        _draw_frame(axes, angle, front_radius)
+        _draw_frame(axes, angle, front_radius, mirrored=any(curve.steer.min() < 0 for curve in drawn))
         axes.text(
             0.03, 0.965, f"({tag})  {_describe_ground(document)}", transform=axes.transAxes, va="top", fontsize=8.5
         )
@@ -134,9 +134,11 @@ def _describe_ground(document: Mapping[str, Any]) -> str:
     return "α = 0" if alpha == 0 else f"α = {fraction if simple else f'{alpha:.6g}'} m⁻¹"
 
 
-def _draw_frame(axes: Axes, angle: str, front_radius: float) -> None:
+def _draw_frame(axes: Axes, angle: str, front_radius: float, mirrored: bool) -> None:
+    """Draw the axes; where turns to both sides differ, steers are of either sign."""
     axes.set_xlim(0, np.pi / 2)
-    axes.set_ylim(*RANGES[angle])
+    low, high = RANGES[angle]
+    axes.set_ylim(-high if mirrored else low, high)
     axes.set_xlabel("arctan($R_f$ |$ω_f$| / 4 m/s) [rad]")
     axes.set_ylabel(ANGLES[angle])
     axes.xaxis.set_major_locator(MultipleLocator(0.25))

@@ -178,9 +178,11 @@ def _find_curve_limits(family: Mapping[str, Any], speed: np.ndarray) -> tuple[Na
         lean, steer = points["lean"][index], points["steer"][index]
         if end == "flat":
             name, angles = ("E", (np.pi / 2, np.pi)) if lean > 0 else ("F", (-np.pi / 2, 0.0))
+            if steer < 0:  # left and right exchanged, as a steer torque has it
+                name, angles = "", (np.pi / 2, 0.0) if lean > 0 else (-np.pi / 2, -np.pi)
             found.append(NamedPoint(name, end, np.pi / 2, *angles, True, index == 0))
         elif end == "large circle" and not solved:
-            letter = "B" if steer < np.pi / 2 else "C"
+            letter = "B" if abs(steer) < np.pi / 2 else "C"
             name = letter if index == fastest else ""
             found.append(NamedPoint(name, end, float(speed[index]), lean, steer, True, index == 0))
     return tuple(found)

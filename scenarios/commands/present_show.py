@@ -33,6 +33,8 @@ def _show_engine(console: Console, document: Mapping[str, Any]) -> None:
         _print_below(console, f"announced by the package {document['package']}", indent=0)
     gives = ", ".join(document["gives"]) or "nothing"
     _print_below(console, f"gives, beside coordinates and poses: {gives}", indent=0)
+    takes = "torques and steer damping" if document["takes_inputs"] else "none"
+    _print_below(console, f"inputs that it applies: {takes}", indent=0)
     console.print()
     _print_line(console, f"[engines.{document['name']}]", "bold")
     _show_fields(console, document["settings"])

@@ -41,7 +41,8 @@ def list_command(as_json: JsonOption = False) -> None:
     for name in installed_engines():
         try:
             engine = load_engine(name)
-            engines.append({"name": name, "version": engine.version, "gives": list(engine.gives)})
+            given = {"gives": list(engine.gives), "takes_inputs": engine.takes_inputs}
+            engines.append({"name": name, "version": engine.version, **given})
         except ValueError as error:
             engines.append({"name": name, "version": None, "gives": [], "error": " ".join(str(error).split())})
     with ending_with(0):

@@ -97,6 +97,7 @@ def _describe_engine(name: str) -> dict[str, Any]:
         "package": package_of(name),
         "description": describe_engine(engine),
         "gives": list(engine.gives),
+        "takes_inputs": engine.takes_inputs,
         "settings": {key: field.as_json() for key, field in list_fields(settings).items()},
     }
 

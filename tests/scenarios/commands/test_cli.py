@@ -49,7 +49,7 @@ def test_list_names_every_scenario_and_engine(velodrome) -> None:
 
 
 CIRCULAR_FIELDS = {
-    *("alpha", "family", "rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "position"),
+    *("alpha", "family", "inputs", "rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "position"),
     *("contact_point", "contact_force", "normal_force", "energy", "residual", "eigenvalues", "jacobian"),
     *("lyapunov_stable", "physical", "unphysical_because", "required_friction"),
 }

@@ -246,7 +246,7 @@ def test_any_value_anywhere_is_taken_or_refused_in_one_line(value: Any, key: str
     assert refusal.startswith("a.toml: ")
     assert "\n" not in refusal
     # Only what has a default can be anything: an empty table, or nothing where that may be left out.
-    assert scenario is None or key in ("tags", "perturbation", "gate", "criterion", "bicycle", "engines")
+    assert scenario is None or key in ("tags", "perturbation", "gate", "criterion", "bicycle", "inputs", "engines")
 
 
 @pytest.mark.parametrize(

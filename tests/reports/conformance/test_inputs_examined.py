@@ -1,0 +1,66 @@
+"""The examination rides with inputs where an engine says that it takes them, and names what is wrong of them."""
+
+from dataclasses import dataclass, replace
+
+import pytest
+from planting import Planted, same
+
+from velodrome.engines.engine import Problem, load_engine
+from velodrome.testing import ConformanceReport, examine_engine
+
+
+@dataclass(frozen=True)
+class Taking(Planted):
+    """An engine that says that it takes inputs."""
+
+    takes_inputs = True
+
+
+def examine(engine: str, **factors: float) -> ConformanceReport:
+    """Examine an engine whose inputs are multiplied by factors on the way in."""
+
+    def before(problem: Problem) -> Problem:
+        changed = {name: factor * getattr(problem.inputs, name) for name, factor in factors.items()}
+        return replace(problem, inputs=replace(problem.inputs, **changed))
+
+    return examine_engine(Taking(load_engine(engine), before, lambda trajectory, *_: trajectory))
+
+
+def test_a_mirrored_steer_torque_is_named() -> None:
+    report = examine("exudyn", steer_torque=-1)
+    assert [check.name for check in report.failed] == ["order on plane, with inputs"]
+    assert "steer_torque looks mirrored: " in "\n".join(report.failed[0].found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["exudyn", "mujoco-native"])
+@pytest.mark.parametrize(
+    ("factors", "named"),
+    [
+        ({"steer_torque": -1}, "steer_torque looks mirrored: "),
+        ({"rear_wheel_torque": -1}, "rear_wheel_torque looks mirrored: "),
+        ({"steer_damping": 0}, "steer_damping looks to be left out: "),
+        ({"steer_torque": 0, "rear_wheel_torque": 0, "steer_damping": 0}, "it applies no inputs: "),
+    ],
+)
+def test_a_wrong_input_is_named(engine: str, factors: dict, named: str) -> None:
+    report = examine(engine, **factors)
+    assert [check.name for check in report.failed] == ["order on plane, with inputs"]
+    assert named in "\n".join(report.failed[0].found)
+
+
+def test_an_engine_that_takes_them_rightly_passes_and_one_that_says_nothing_is_not_asked() -> None:
+    names = {check.name: check.outcome for check in examine("exudyn").checks}
+    assert names["ride on plane, with inputs"] == names["order on plane, with inputs"] == "passed"
+    silent = examine_engine(Planted(load_engine("exudyn"), same, lambda trajectory, *_: trajectory))
+    assert silent.passed
+    assert {check.name: check.outcome for check in silent.checks}["inputs"] == "skipped"
+
+
+def test_takes_inputs_must_be_true_or_false() -> None:
+    @dataclass(frozen=True)
+    class Perhaps(Planted):
+        takes_inputs = "perhaps"
+
+    report = examine_engine(Perhaps(load_engine("exudyn"), same, lambda trajectory, *_: trajectory))
+    assert "its takes_inputs is 'perhaps'; it must be True or False" in report.failed[0].found
