@@ -63,8 +63,8 @@ def require_inertia(bicycle: Bicycle, surface: Surface, q: np.ndarray) -> None:
     rates = vectors[:, 0] / sizes
     ratio = " : ".join(f"{rate:.4g}" for rate in rates / rates[np.abs(rates).argmax()] + 0.0)
     raise ValueError(
-        "the equations of motion are singular: a combination of lean, steer and rolling has no inertia: with their rates "
-        f"in the ratio {ratio}, every mass stays where it is"
+        "the equations of motion are singular: a combination of lean, steer and rolling has no inertia: with their "
+        f"rates in the ratio {ratio}, every mass stays where it is"
     )
 
 
@@ -98,4 +98,3 @@ def require_inertia_upright(bicycle: Bicycle) -> None:
     """Refuse a bicycle whose equations of motion are singular where it runs upright, see `require_inertia`."""
     place = (float(bicycle.reference_point[0]), 0.0)
     require_inertia(bicycle, Plane(), consistent_state(bicycle, Plane(), place, 0.0, 0.0, (0.0, 0.0, 1.0))[0])
-

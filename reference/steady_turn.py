@@ -34,7 +34,7 @@ _ANGLES = [VARIABLES.index("lean"), VARIABLES.index("steer")]
 _ACCELERATIONS = [VARIABLES.index("lean_rate"), VARIABLES.index("steer_rate")]
 _MOST = 25  # iterations of Newton's method
 _LARGEST_STEP = 0.1  # [rad] of an iteration
-# Iterations end where the step is round-off times a condition number of 1e2 to 1e4, as in `velodrome.reference.stability`.
+# Iterations end where the step is round-off times a condition number of 1e2 to 1e4, as of eigenvalues in `stability`.
 _CONVERGED = 1e-11
 # At a relative distance d from the speed at which circles branch off straight motion their angles are about the root
 # of d. With d known to 1e-15, smaller angles cannot be told from straight motion.

@@ -33,7 +33,8 @@ def bicycle_command(
     import numpy as np
     from rich.console import Console
 
-    from ..studies import find_bicycle, study_bicycle, write_bicycle
+    from ..scenario import find_bicycle
+    from ..studies import study_bicycle, write_bicycle
     from .present_bicycle import show_bicycle
 
     study = study_bicycle(find_bicycle(source), np.array(parse_speeds(speeds)))

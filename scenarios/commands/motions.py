@@ -10,12 +10,15 @@ import typer
 from .options import (
     STARTING,
     AlphaOption,
+    BicycleOption,
     GroundOption,
     JsonOption,
+    answering_missing_motion,
     ending_with,
     parse_angles,
     parse_ground,
     print_json,
+    read_bicycle,
 )
 
 
@@ -24,21 +27,27 @@ def circular_command(
     alpha: AlphaOption = None,
     surface: GroundOption = None,
     family: Annotated[int | None, typer.Option(help="Solution family, 1 to 4.")] = None,
-    near: Annotated[str | None, typer.Option(metavar="LEAN,STEER", help="Angles it is near to [rad].")] = None,
+    near: Annotated[
+        str | None,
+        typer.Option(metavar="LEAN,STEER", help="Angles it is near to [rad]; on the plane 0,0 is straight motion."),
+    ] = None,
+    bicycle: BicycleOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """One circular motion: its 21 constants, contact forces, eigenvalues, verdict on stability."""
+    """One circular motion: its 21 constants, contact forces, eigenvalues, verdict on stability.
+
+    If there is no such motion, the exit status is 1; --json then gives the reason, no-such-motion or search-failed.
+    """
     from rich.console import Console
 
-    from ...reference.bicycle import Bicycle
     from ..motions import solve_circular
     from ..scenario import make_bowl
     from .present_motions import show_circular
     from .progress import show_working
 
-    angles, ground = parse_angles(near), parse_ground(alpha, surface)
-    with show_working(STARTING):
-        found = solve_circular(Bicycle(), make_bowl(ground), rear_rate, family, angles).as_json()
+    angles, ground, source = parse_angles(near), parse_ground(alpha, surface), read_bicycle(bicycle)
+    with answering_missing_motion(as_json), show_working(STARTING):
+        found = solve_circular(source.bicycle, make_bowl(ground), rear_rate, family, angles).as_json(source.name)
     with ending_with(0):
         if as_json:
             print_json(found)
@@ -49,19 +58,21 @@ def circular_command(
 def families_command(
     alpha: AlphaOption = None,
     surface: GroundOption = None,
+    bicycle: BicycleOption = None,
     out: Annotated[Path | None, typer.Option(help="Folder for families.json and the figure families.png.")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """The four solution families by continuation: special points, stable sections."""
     from rich.console import Console
 
-    from ..motions import families_document, write_families
+    from ..motions import follow_families, write_families
+    from ..scenario import make_bowl
     from .present_motions import show_families
     from .progress import show_working
 
-    ground = parse_ground(alpha, surface)
+    ground, source = parse_ground(alpha, surface), read_bicycle(bicycle)
     with show_working(STARTING):
-        document = families_document(ground)
+        document = follow_families(source.bicycle, make_bowl(ground)).as_json(source.name)
     if out is not None:
         write_families(document, out)
     with ending_with(0):
@@ -71,17 +82,17 @@ def families_command(
             show_families(Console(), document)
 
 
-def critical_command(as_json: JsonOption = False) -> None:
+def critical_command(bicycle: BicycleOption = None, as_json: JsonOption = False) -> None:
     """The critical α: cusps collide, families merge, their last stable sections vanish."""
     from rich.console import Console
 
-    from ...reference.bicycle import Bicycle
     from ..motions import find_critical_shapes
     from .present_motions import show_critical
     from .progress import ProgressBars
 
+    source = read_bicycle(bicycle)
     with ProgressBars() as progress:
-        document = find_critical_shapes(Bicycle(), progress.watch).as_json()
+        document = find_critical_shapes(source.bicycle, progress.watch).as_json(source.name)
     with ending_with(0):
         if as_json:
             print_json(document)
@@ -95,6 +106,7 @@ def atlas_command(
     ] = Path("atlas"),
     size: Annotated[int, typer.Option(help="Number of motions, roughly.")] = 400_000,
     largest: Annotated[float, typer.Option(help="Largest alpha [1/m], at most 1.")] = 1.0,
+    bicycle: BicycleOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Stability of all circular motions over alpha and rear rate: data, boundaries, figures (half a minute)."""
@@ -104,8 +116,9 @@ def atlas_command(
     from .present_motions import show_atlas
     from .progress import ProgressBars
 
+    source = read_bicycle(bicycle)
     with ProgressBars() as progress:
-        document = make_atlas(out, size, largest, lambda done: progress.watch("atlas", done, 1.0))
+        document = make_atlas(source, out, size, largest, lambda done: progress.watch("atlas", done, 1.0))
     with ending_with(0):
         if as_json:
             print_json(document)

@@ -14,12 +14,14 @@ from ...reference.critical import CriticalPoint, last_stable, reconnections
 from ...reference.curve import Samples
 from ...reference.families import FAMILIES, Family, trace_all
 from ...reference.modes import MODES, follow_modes
+from ...reference.regularity import require_inertia_in_turns
 from ...reference.sections import SectionEnd, sample_family, stable_sections
 from ...reference.special import SpecialPoint, special_points
 from ...reference.standing import motion_stands, stands
 from ...reference.surface import Surface, SurfaceOfRevolution
+from ..error import ScenarioError
 from ..files import make_folder, write_json
-from ..scenario import make_bowl, name_surface
+from ..scenario import make_bowl, name_bicycle, name_surface
 
 # Longest step along the arc: 100 to 300 points per family. No known stable section is shorter than three steps.
 LONGEST_DRAWN_STEP = 0.05
@@ -102,6 +104,7 @@ class SolutionFamilies:
 
     Attributes
     ----------
+    bicycle : Bicycle
     surface : SurfaceOfRevolution
     curves : tuple of FamilyCurve
         The families by number, then further curves, each with the number of the family that it was a part of.
@@ -109,14 +112,16 @@ class SolutionFamilies:
         Reasons by number, for families that have no curve on this ground.
     """
 
+    bicycle: Bicycle
     surface: SurfaceOfRevolution
     curves: tuple[FamilyCurve, ...]
     absent: dict[int, str]
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the JSON document of `velodrome families`."""
+    def as_json(self, bicycle_name: str | None = None) -> dict[str, Any]:
+        """Return the JSON document of `velodrome families`; see `name_bicycle` for the name."""
         return {
             **name_surface(self.surface),
+            **name_bicycle(self.bicycle, bicycle_name),
             "modes": list(MODES),  # names of the columns of eigenvalues
             "families": [curve.as_json() for curve in self.curves],
             "absent": {str(number): reason for number, reason in self.absent.items()},
@@ -129,6 +134,7 @@ class CriticalShapes:
 
     Attributes
     ----------
+    bicycle : Bicycle
     cusp_collision : CriticalPoint or None
         The point at which the cusps of families 2 and 4 meet; None if they do not meet.
     last_stable : dict
@@ -138,6 +144,7 @@ class CriticalShapes:
         The points at which families exchange parts, sorted by alpha.
     """
 
+    bicycle: Bicycle
     cusp_collision: CriticalPoint | None
     last_stable: dict[int, CriticalPoint | None]
     merging: tuple[CriticalPoint, ...]
@@ -157,9 +164,10 @@ class CriticalShapes:
             ]
         )
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the JSON document of `velodrome critical`."""
+    def as_json(self, bicycle_name: str | None = None) -> dict[str, Any]:
+        """Return the JSON document of `velodrome critical`; see `name_bicycle` for the name."""
         return {
+            **name_bicycle(self.bicycle, bicycle_name),
             "cusp_collision": _entry_or_null(self.cusp_collision),
             "last_stable": {str(number): _entry_or_null(point) for number, point in self.last_stable.items()},
             "merging": [{"families": list(point.families)} | critical_entry(point) for point in self.merging],
@@ -177,9 +185,23 @@ def follow_families(bicycle: Bicycle, surface: SurfaceOfRevolution) -> SolutionF
     Returns
     -------
     SolutionFamilies
+
+    Raises
+    ------
+    ScenarioError
+        If the bicycle's equations of motion are singular.
     """
+    check_inertia(bicycle)
     curves, absent = trace_all(bicycle, surface, LONGEST_DRAWN_STEP)
-    return SolutionFamilies(surface=surface, curves=tuple(map(examine_curve, curves)), absent=absent)
+    return SolutionFamilies(bicycle=bicycle, surface=surface, curves=tuple(map(examine_curve, curves)), absent=absent)
+
+
+def check_inertia(bicycle: Bicycle) -> None:
+    """Raise a ScenarioError if a bicycle's equations of motion are singular in turns."""
+    try:
+        require_inertia_in_turns(bicycle)
+    except ValueError as error:
+        raise ScenarioError(f"bicycle: {error}") from error
 
 
 def examine_curve(family: Family) -> FamilyCurve:
@@ -236,7 +258,7 @@ def find_critical_shapes(bicycle: Bicycle, watch: Callable[[str, float, float], 
         watch("last stable", float(number), float(len(FAMILIES)))
         stable[number] = last_stable(bicycle, number)
     collision = next((point for point in merging if point.families == (2, 4)), None)
-    return CriticalShapes(cusp_collision=collision, last_stable=stable, merging=tuple(merging))
+    return CriticalShapes(bicycle=bicycle, cusp_collision=collision, last_stable=stable, merging=tuple(merging))
 
 
 def critical_entry(point: CriticalPoint) -> dict[str, Any]:
@@ -269,7 +291,7 @@ def write_families(document: Mapping[str, Any], out: Path) -> None:
 
     make_folder(out)
     write_json(out / "families.json", document)
-    family_figure(out / "families.png", document, Bicycle().front_wheel_radius)
+    family_figure(out / "families.png", document, document["bicycle"]["parameters"]["front_wheel_radius"])
 
 
 def _can_stand(family: Family, ends: tuple[SectionEnd, SectionEnd]) -> bool:
