@@ -115,7 +115,8 @@ def solve_steady_turn(
     angles, converged = np.array([lean, steer]), False
     for _ in range(_MOST):
         try:
-            q, qd = consistent_state(bicycle, Plane(), (0.0, 0.0), *map(float, angles), (0.0, 0.0, rear_rate))
+            lean, steer = map(float, angles)
+            q, qd = consistent_state(bicycle, Plane(), (0.0, 0.0), lean, steer, (0.0, 0.0, rear_rate))
             reduced = linearise(bicycle, Plane(), q, qd)
         except ValueError:
             return None

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MultipleLocator
 
-from .labels import Badge, Label, place_labels
+from .labels import Badge, Label, name_other_bicycle, place_labels
 from .solution_curve import NamedPoint, SolutionCurve, find_limits, find_named_points, make_curves, scaled_speed
 from .style import FAMILY_COLOURS, GREY, INK, new_figure, use_style, write_figure
 
@@ -73,7 +73,12 @@ def solution_figure(
     for axes, angle, tag in zip(panels, ANGLES, "ab", strict=True):
         _draw_frame(axes, angle, front_radius)
         axes.text(
-            0.03, 0.965, f"({tag})  {_describe_ground(document)}", transform=axes.transAxes, va="top", fontsize=8.5
+            0.03,
+            0.965,
+            f"({tag})  {_describe_ground(document)}{name_other_bicycle(document)}",
+            transform=axes.transAxes,
+            va="top",
+            fontsize=8.5,
         )
         for curve in drawn:
             _draw_curve(axes, curve, angle)

@@ -117,7 +117,7 @@ def atlas_command(
     from .progress import ProgressBars
 
     source = read_bicycle(bicycle)
-    with ProgressBars() as progress:
+    with answering_missing_motion(as_json), ProgressBars() as progress:
         document = make_atlas(source, out, size, largest, lambda done: progress.watch("atlas", done, 1.0))
     with ending_with(0):
         if as_json:

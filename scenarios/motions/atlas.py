@@ -11,7 +11,7 @@ import numpy as np
 
 from ...reference.atlas import ATLAS_SIZE, Atlas, Boundary, compute_atlas, spacing
 from ...reference.stability import VARIABLES
-from ..error import ScenarioError
+from ..error import MissingMotionError, ScenarioError
 from ..files import make_folder, write_json
 from ..scenario import BicycleFile, name_bicycle
 from .families import check_inertia, critical_entry
@@ -63,6 +63,8 @@ def make_atlas(
 
     Raises
     ------
+    MissingMotionError
+        If the bicycle has none of the families.
     ScenarioError
         If the size or the largest alpha is out of range, the bicycle's equations are singular, or the folder cannot be
         made.
@@ -76,7 +78,10 @@ def make_atlas(
     check_inertia(source.bicycle)
     make_folder(out)
     alphas, longest = spacing(size, largest)
-    found = compute_atlas(source.bicycle, alphas, longest, lambda fraction: progress(0.9 * fraction))
+    try:
+        found = compute_atlas(source.bicycle, alphas, longest, lambda fraction: progress(0.9 * fraction))
+    except ValueError as error:
+        raise MissingMotionError(f"no atlas of {source.name}: {error}", "no-such-motion") from error
     columns, document = atlas_columns(found), atlas_document(found, source.name)
     write_atlas(columns, out / "atlas.parquet", {"longest_step": longest, "bicycle": asdict(found.bicycle)})
     write_json(out / "boundaries.json", document)

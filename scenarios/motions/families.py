@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...reference.bicycle import Bicycle
-from ...reference.critical import CriticalPoint, last_stable, reconnections
+from ...reference.critical import CriticalPoint, describe_gaps, last_stable, reconnections
 from ...reference.curve import Samples
 from ...reference.families import FAMILIES, Family, trace_all
 from ...reference.modes import MODES, follow_modes
@@ -142,12 +142,17 @@ class CriticalShapes:
         has no stable section.
     merging : tuple of CriticalPoint
         The points at which families exchange parts, sorted by alpha.
+    not_found : dict
+        By number of a family that could not be followed at every alpha, or of which a point could not be solved: the
+        reason. Families are those of the benchmark; on another bicycle they may end, and what happens on curves
+        without a number is not looked for.
     """
 
     bicycle: Bicycle
     cusp_collision: CriticalPoint | None
     last_stable: dict[int, CriticalPoint | None]
     merging: tuple[CriticalPoint, ...]
+    not_found: dict[int, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         def show(point: CriticalPoint | None) -> str:
@@ -161,6 +166,7 @@ class CriticalShapes:
                 f"  cusps of families 2 and 4 meet: {show(self.cusp_collision)}",
                 f"  last stable section vanishes: {last}",
                 f"  families exchange parts: {merging or 'none'}",
+                *(f"  family {number} not followed: {reason}" for number, reason in self.not_found.items()),
             ]
         )
 
@@ -171,6 +177,7 @@ class CriticalShapes:
             "cusp_collision": _entry_or_null(self.cusp_collision),
             "last_stable": {str(number): _entry_or_null(point) for number, point in self.last_stable.items()},
             "merging": [{"families": list(point.families)} | critical_entry(point) for point in self.merging],
+            "not_found": {str(number): reason for number, reason in self.not_found.items()},
         }
 
 
@@ -252,13 +259,30 @@ def find_critical_shapes(bicycle: Bicycle, watch: Callable[[str, float, float], 
     -------
     CriticalShapes
     """
+    check_inertia(bicycle)
     merging = reconnections(bicycle, lambda alpha: watch("merging", alpha, 1.0))
-    stable = {}
+    stable: dict[int, CriticalPoint | None] = {}
+    not_found: dict[int, str] = {}
     for number in FAMILIES:
         watch("last stable", float(number), float(len(FAMILIES)))
-        stable[number] = last_stable(bicycle, number)
+        reasons = []
+        try:
+            stable[number] = last_stable(bicycle, number)
+        except ValueError as error:
+            stable[number] = None
+            reasons.append(str(error))
+        gaps = describe_gaps(bicycle, number)
+        reasons += [] if gaps is None else [gaps]
+        if reasons:
+            not_found[number] = "; ".join(reasons)
     collision = next((point for point in merging if point.families == (2, 4)), None)
-    return CriticalShapes(bicycle=bicycle, cusp_collision=collision, last_stable=stable, merging=tuple(merging))
+    return CriticalShapes(
+        bicycle=bicycle,
+        cusp_collision=collision,
+        last_stable=stable,
+        merging=tuple(merging),
+        not_found=not_found,
+    )
 
 
 def critical_entry(point: CriticalPoint) -> dict[str, Any]:

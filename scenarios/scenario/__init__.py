@@ -1,7 +1,7 @@
 """Scenario files: their schema, surfaces, engine settings and start."""
 
 from .bicycle_file import BicycleFile, read_bicycle_file
-from .bicycle_source import find_bicycle, insert_bicycle_file, name_bicycle
+from .bicycle_source import BENCHMARK, find_bicycle, insert_bicycle_file, name_bicycle
 from .engine_settings import configure_engine, installed_engines, list_engine_faults, refuse_engine
 from .parameters import PARAMETERS
 from .resolved import resolve_scenario
@@ -32,6 +32,7 @@ from .table import (
 )
 
 __all__ = [
+    "BENCHMARK",
     "BICYCLE_FILE",
     "OF_THE_MOTION",
     "PARAMETERS",
