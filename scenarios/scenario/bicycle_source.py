@@ -41,7 +41,7 @@ def find_bicycle(source: str, folder: Path | None = None, opened: tuple[Path, ..
     path = Path(source) if folder is None else folder / source
     if source in list_library():
         path = LIBRARY / f"{source}.toml"
-    elif not path.suffix and not path.exists():
+    elif not source or (not path.suffix and not path.exists()):
         raise ScenarioError(
             f"no bicycle {show_value(repr(source))}: give {BENCHMARK}, a bicycle file (BicycleParameters or TOML), "
             f"or a scenario ({suggest_name(source, [BENCHMARK, *list_library()])})"

@@ -69,6 +69,7 @@ def make_start(scenario: Scenario) -> Start:
         # Unrealistic parameters may overflow in between; the results are checked.
         with np.errstate(all="ignore"):
             family, motion, q, qd = _compute_undisturbed(scenario, bicycle, surface)
+            require_inertia(bicycle, surface, q)
             rate = _compute_growth_rate(scenario, bicycle, surface, q, qd)
             undisturbed, (q, qd) = (q, qd), _disturb_state(scenario, bicycle, surface, q, qd)
             require_inertia(bicycle, surface, q)
