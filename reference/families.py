@@ -479,10 +479,10 @@ def find_motion(
         searched = "Newton's method from there, the curves of the families, and " + describe_search()
         if family is not None:
             searched = f"the curves of family {family}"
-        place = "" if nearest is None else f"the nearest is at {nearest[1].lean:.6g}, {nearest[1].steer:.6g}; "
+        parts = [] if nearest is None else [f"the nearest is at {nearest[1].lean:.6g}, {nearest[1].steer:.6g}"]
         if _is_near_straight(near) and not is_level(surface):
-            place = f"no motion is straight on ground that is not level; {place}"
-        reason = f"{place}searched were {searched}" + (f"; {_join_failures(failures)}" if failures else "")
+            parts.insert(0, "no motion is straight on ground that is not level")
+        reason = "; ".join([*parts, f"searched were {searched}", *([_join_failures(failures)] if failures else [])])
         raise _not_found(f"{wanted} within {_NEAR_ENOUGH} rad of near = {near[0]:g}, {near[1]:g}", reason, failures)
     require_standing(bicycle, surface, nearest[1])
     return nearest
@@ -503,8 +503,8 @@ def _not_found(wanted: str, reason: str, failures: Mapping[int, ValueError]) -> 
     Where an anchor was lost, its curve has not been searched. Where it ended in a fold, this bicycle has no such curve.
     """
     if all(isinstance(error, NoSuchMotion) for error in failures.values()):
-        return NoSuchMotion(f"no circular motion found with {wanted}: {reason}")
-    return SearchFailed(f"no circular motion found with {wanted}, but the search is not complete: {reason}")
+        return NoSuchMotion(f"no circular motion found with {wanted}; {reason}")
+    return SearchFailed(f"no circular motion found with {wanted}, but the search is not complete; {reason}")
 
 
 def _motions_from(

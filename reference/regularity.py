@@ -12,15 +12,16 @@ import numpy as np
 from .bicycle import Bicycle
 from .dae import consistent_state, contact_parameters, mass_matrix
 from .kernels import dynamics as kernel
-from .kinematics import constants
+from .kinematics import FRONT_ANGLE, LEAN, REAR_ANGLE, STEER, constants
 from .surface import Plane, Surface
 
-MOTIONS = ("lean", "steer", "rolling")  # in the order of `kernels.dynamics.INDEPENDENT`
+MOTIONS = ("lean", "steer", "rolling")
 _WHY = {
     "lean": "every mass stays where it is as the bicycle leans",
     "steer": "neither the front assembly nor what its steering moves has inertia about the steering axis",
     "rolling": "no mass moves as the wheels roll",
 }
+_UNDETERMINED = 1e-3  # relative round-off of velocities
 # A state without any symmetry, for what must hold wherever a bicycle rides [rad].
 _SOME_LEAN, _SOME_STEER = 0.3, 0.4
 
@@ -47,8 +48,8 @@ def require_inertia(bicycle: Bicycle, surface: Surface, q: np.ndarray) -> None:
         If the equations are singular. The message names the motion without inertia.
     """
     velocities, error = _find_velocities(bicycle, surface, q)
-    if not np.all(np.isfinite(velocities)):
-        return  # the speeds are not determined, which is another fault
+    if error > _UNDETERMINED:
+        return  # rolling does not determine the speeds, which is another fault
     mass = mass_matrix(bicycle, q)
     sizes = np.abs(velocities) @ np.sqrt(np.diag(mass).clip(0))
     sizes = np.where(sizes > 0, sizes, 1.0)
@@ -69,16 +70,24 @@ def require_inertia(bicycle: Bicycle, surface: Surface, q: np.ndarray) -> None:
 
 
 def _find_velocities(bicycle: Bicycle, surface: Surface, q: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the velocities (3, 9) of the `MOTIONS` at unit rates, and their round-off relative to their size."""
+    """Return the velocities (3, 9) of the `MOTIONS` at unit rates, and their round-off relative to their size.
+
+    The third motion is at unit rate of the wheel whose rate determines the other speeds better: a pivoting bicycle has
+    no rear rate.
+    """
     c, p = constants(bicycle), contact_parameters(bicycle, surface, q)
-    function, parameters = surface.function.real, surface.parameters
     rows = np.empty((6, 9))
-    kernel.rolling(q, np.zeros(9), p, function, parameters, c, rows, np.empty(6), np.empty(6))
-    error = 12 * float(np.linalg.cond(rows[:, kernel.DEPENDENT])) * float(np.finfo(float).eps)
+    kernel.rolling(q, np.zeros(9), p, surface.function.real, surface.parameters, c, rows, np.empty(6), np.empty(6))
+    found = []
+    for spin in (REAR_ANGLE, FRONT_ANGLE):
+        given = [LEAN, STEER, spin]
+        solved = [k for k in range(9) if k not in given]
+        found.append((float(np.linalg.cond(rows[:, solved])), given, solved))
+    condition, given, solved = min(found)
     velocities = np.zeros((3, 9))
-    for k, coordinate in enumerate(kernel.INDEPENDENT):
-        velocities[k, coordinate] = 1.0
-        kernel.complete_velocity(q, velocities[k], p, function, parameters, c)
+    velocities[:, given] = np.eye(3)
+    velocities[:, solved] = -np.linalg.lstsq(rows[:, solved], rows[:, given], rcond=None)[0].T
+    error = 12 * condition * float(np.finfo(float).eps)
     length = bicycle.wheelbase + bicycle.rear_wheel_radius + bicycle.front_wheel_radius
     sizes = np.array([length] * 3 + [1.0] * 6)  # m/s and rad/s at 1 rad/s
     return np.where(np.abs(velocities) > error * sizes, velocities, 0.0), error

@@ -56,12 +56,12 @@ def straight_motions(bicycle: Bicycle, surface: SurfaceOfRevolution, rear_rate: 
     """
     for steer in (0.0, np.pi):
         try:
-            yield straight_motion(bicycle, surface, rear_rate, steer)
+            yield make_straight_motion(bicycle, surface, rear_rate, steer)
         except ValueError:
             continue  # reversed, a wheel may not reach the ground
 
 
-def straight_motion(
+def make_straight_motion(
     bicycle: Bicycle, surface: SurfaceOfRevolution, rear_rate: float, steer: float = 0.0
 ) -> CircularMotion:
     """Return the straight upright motion on level ground at a steer of 0 or pi.

@@ -15,10 +15,10 @@ from .options import (
     JsonOption,
     answering_missing_motion,
     ending_with,
+    load_bicycle,
     parse_angles,
     parse_ground,
     print_json,
-    read_bicycle,
 )
 
 
@@ -45,7 +45,7 @@ def circular_command(
     from .present_motions import show_circular
     from .progress import show_working
 
-    angles, ground, source = parse_angles(near), parse_ground(alpha, surface), read_bicycle(bicycle)
+    angles, ground, source = parse_angles(near), parse_ground(alpha, surface), load_bicycle(bicycle)
     with answering_missing_motion(as_json), show_working(STARTING):
         found = solve_circular(source.bicycle, make_bowl(ground), rear_rate, family, angles).as_json(source.name)
     with ending_with(0):
@@ -70,7 +70,7 @@ def families_command(
     from .present_motions import show_families
     from .progress import show_working
 
-    ground, source = parse_ground(alpha, surface), read_bicycle(bicycle)
+    ground, source = parse_ground(alpha, surface), load_bicycle(bicycle)
     with show_working(STARTING):
         document = follow_families(source.bicycle, make_bowl(ground)).as_json(source.name)
     if out is not None:
@@ -90,7 +90,7 @@ def critical_command(bicycle: BicycleOption = None, as_json: JsonOption = False)
     from .present_motions import show_critical
     from .progress import ProgressBars
 
-    source = read_bicycle(bicycle)
+    source = load_bicycle(bicycle)
     with ProgressBars() as progress:
         document = find_critical_shapes(source.bicycle, progress.watch).as_json(source.name)
     with ending_with(0):
@@ -116,7 +116,7 @@ def atlas_command(
     from .present_motions import show_atlas
     from .progress import ProgressBars
 
-    source = read_bicycle(bicycle)
+    source = load_bicycle(bicycle)
     with answering_missing_motion(as_json), ProgressBars() as progress:
         document = make_atlas(source, out, size, largest, lambda done: progress.watch("atlas", done, 1.0))
     with ending_with(0):

@@ -49,7 +49,7 @@ TracebackOption = Annotated[
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else.")]
 
 
-def read_bicycle(source: str | None) -> BicycleFile:
+def load_bicycle(source: str | None) -> BicycleFile:
     """Return the bicycle that --bicycle names, the benchmark bicycle if it is not given."""
     from ..scenario import find_bicycle
 

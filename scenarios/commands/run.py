@@ -19,10 +19,10 @@ from .options import (
     TracebackOption,
     answering_missing_motion,
     ending_with,
+    load_bicycle,
     parse_changes,
     print_json,
     print_traceback,
-    read_bicycle,
     showing_traceback,
 )
 
@@ -107,7 +107,7 @@ def run_command(
         raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
     changes = parse_changes(change, duration)
     installed_engines()  # raises here if two packages announce one engine, which is not a fault of a scenario
-    other = None if bicycle is None else read_bicycle(bicycle).bicycle
+    other = None if bicycle is None else load_bicycle(bicycle).bicycle
     with answering_missing_motion(as_json), showing_traceback(traceback), show_working(STARTING):
         plans = [_plan_source(source, changes, engine, other) for source in dict.fromkeys(sources)]
     console = Console(stderr=as_json)

@@ -16,10 +16,10 @@ from .options import (
     TracebackOption,
     answering_missing_motion,
     ending_with,
+    load_bicycle,
     parse_changes,
     print_json,
     print_traceback,
-    read_bicycle,
     show_written,
     showing_traceback,
 )
@@ -85,7 +85,7 @@ def precision_command(
     from .progress import ProgressBars
 
     changes = parse_changes(change, duration)
-    other = None if bicycle is None else read_bicycle(bicycle).bicycle
+    other = None if bicycle is None else load_bicycle(bicycle).bicycle
     name, loaded = load_scenario(scenario, changes, "--set", other)
     if out is not None:
         make_folder(out)  # first, so that no work is lost if it fails

@@ -11,7 +11,7 @@ from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.families import find_motion
 from velodrome.reference.missing_motion import NoSuchMotion
 from velodrome.reference.stability import free_eigenvalues, growth_rate, linearise
-from velodrome.reference.steady_turn import solve_steady_turn, straight_motion
+from velodrome.reference.steady_turn import make_straight_motion, solve_steady_turn
 from velodrome.reference.surface import Paraboloid, Plane
 from velodrome.reference.upright import canonical_matrices, capsize_speed, stable_speeds
 
@@ -31,7 +31,7 @@ def test_straight_motion_has_the_eigenvalues_and_the_verdict_of_the_linear_equat
     bicycle: Bicycle, speed: float
 ) -> None:
     rate = speed / bicycle.rear_wheel_radius
-    motion = straight_motion(bicycle, Plane(), rate)
+    motion = make_straight_motion(bicycle, Plane(), rate)
     assert (motion.yaw_rate, motion.lean, motion.steer) == (0.0, 0.0, 0.0)
     assert motion.residual < 1e-14
     values = linearise(bicycle, Plane(), *motion.state()).eigenvalues
@@ -47,7 +47,7 @@ def test_straight_motion_has_the_eigenvalues_and_the_verdict_of_the_linear_equat
 
 @pytest.mark.parametrize("bicycle", BICYCLES.values(), ids=BICYCLES)
 def test_the_ground_carries_a_straight_bicycle(bicycle: Bicycle) -> None:
-    motion = straight_motion(bicycle, Plane(), 15.0)
+    motion = make_straight_motion(bicycle, Plane(), 15.0)
     weight = bicycle.mass * bicycle.gravity
     # Static moments about the rear contact.
     front = sum(bicycle.body_mass(body) * bicycle.centre(body)[0] for body in ("rear_frame", "front_frame"))

@@ -122,7 +122,7 @@ def test_a_search_that_broke_off_is_told_from_one_that_found_nothing(
     monkeypatch.setattr(families, "_follow_families", lambda *_: [])
     result = velodrome("circular", "--alpha", "0.005", "--rear-rate", "18", "--family", "2", "--json")
     assert (result.status, result.json()["reason"]) == (1, "search-failed")
-    assert "the search is not complete: family 2: its anchor is lost" in result.json()["message"]
+    assert "the search is not complete; family 2: its anchor is lost" in result.json()["message"]
 
 
 SINGULAR = SKATE, "front_frame_mass = 1.0", "front_frame_mass = 0.0"
