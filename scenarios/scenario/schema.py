@@ -23,8 +23,8 @@ from .table import Table, Texts, join_complaints, list_complaints, read_toml, se
 # Tables of a scenario that determine its motion.
 OF_THE_MOTION = ("surface", "motion", "perturbation", "bicycle")
 
-
-BICYCLE_FILE = "bicycle file, from the scenario's folder, that gives all other parameters; read as the scenario is"
+# Description of the key `file`.
+BICYCLE_FILE = "bicycle file, from the scenario's folder, that gives every parameter not named beside it"
 
 # Larger than any value of a real bicycle, and small enough that products do not overflow.
 _Moderate = Annotated[float, Field(ge=-1e6, le=1e6)]
