@@ -12,13 +12,13 @@ import numpy as np
 from ...reference.bicycle import Bicycle
 from ...reference.critical import CriticalPoint, describe_gaps, last_stable, reconnections
 from ...reference.curve import Samples
-from ...reference.families import FAMILIES, Family, trace_all
+from ...reference.families import FAMILIES, Family, trace, trace_all
 from ...reference.modes import MODES, follow_modes
 from ...reference.regularity import require_inertia_in_turns
 from ...reference.sections import SectionEnd, sample_family, stable_sections
 from ...reference.special import SpecialPoint, special_points
 from ...reference.standing import motion_stands, stands
-from ...reference.surface import Surface, SurfaceOfRevolution
+from ...reference.surface import Paraboloid, Surface, SurfaceOfRevolution
 from ..error import ScenarioError
 from ..files import make_folder, write_json
 from ..scenario import make_bowl, name_bicycle, name_surface
@@ -275,7 +275,7 @@ def find_critical_shapes(bicycle: Bicycle, watch: Callable[[str, float, float], 
         reasons += [] if gaps is None else [gaps]
         if reasons:
             not_found[number] = "; ".join(reasons)
-    collision = next((point for point in merging if point.families == (2, 4)), None)
+    collision = next((point for point in merging if _do_cusps_meet(bicycle, point)), None)
     return CriticalShapes(
         bicycle=bicycle,
         cusp_collision=collision,
@@ -283,6 +283,22 @@ def find_critical_shapes(bicycle: Bicycle, watch: Callable[[str, float, float], 
         merging=tuple(merging),
         not_found=not_found,
     )
+
+
+def _do_cusps_meet(bicycle: Bicycle, point: CriticalPoint) -> bool:
+    """Return whether the cusps D and I meet in a point where families 2 and 4 touch.
+
+    Curves of another bicycle may touch in other points. Both cusps are there at a smaller alpha, if they are to meet.
+    """
+    if point.families != (2, 4):
+        return False
+    names = set()
+    for number in point.families:
+        try:
+            names |= {one.name for one in special_points(trace(bicycle, Paraboloid(0.98 * point.alpha), number))}
+        except ValueError:
+            return False
+    return {"D", "I"} <= names
 
 
 def critical_entry(point: CriticalPoint) -> dict[str, Any]:

@@ -72,6 +72,7 @@ def test_critical_shapes_are_the_reference_modules(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(rooms_families, "reconnections", reconnections)
     monkeypatch.setattr(rooms_families, "last_stable", lambda bicycle, number: point if number == 2 else None)
+    monkeypatch.setattr(rooms_families, "describe_gaps", lambda bicycle, number: "no curve" if number == 1 else None)
     told: list[tuple[str, float, float]] = []
     heavy = velodrome.Bicycle(rear_frame_mass=95.0)
     found = velodrome.critical(bicycle=heavy, progress=lambda *seen: told.append(seen))
@@ -84,9 +85,12 @@ def test_critical_shapes_are_the_reference_modules(monkeypatch: pytest.MonkeyPat
         "  cusps of families 2 and 4 meet: 0.012",
         "  last stable section vanishes: family 1 none, family 2 0.012, family 3 none, family 4 none",
         "  families exchange parts: families 2 and 4 0.012",
+        "  family 1 not followed: no curve",
     ]
     document = found.as_json()
     assert document["last_stable"]["1"] is None
+    assert document["not_found"] == {"1": "no curve"}
+    assert document["bicycle"]["parameters"]["rear_frame_mass"] == 95.0
     assert document["cusp_collision"]["alpha"] == document["last_stable"]["2"]["alpha"] == 0.012
 
 
