@@ -85,8 +85,8 @@ def make_start(scenario: Scenario) -> Start:
 
 def describe_missing_motion(error: NoSuchMotion | SearchFailed, place: str = "") -> MissingMotionError:
     """Return the error for users of a search without a result; ``place`` precedes its message."""
-    reason = "no-such-motion" if isinstance(error, NoSuchMotion) else "search-failed"
-    return MissingMotionError(f"{place}{error}", reason)
+    message = f"{place}{error}"
+    return MissingMotionError(message, "no-such-motion" if isinstance(error, NoSuchMotion) else "search-failed")
 
 
 def output_times(simulation: Simulation) -> np.ndarray:
