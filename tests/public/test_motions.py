@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -104,3 +106,22 @@ def test_a_solution_is_shown_in_a_few_lines_and_compared_by_identity() -> None:
     assert lines[0] == "CircularSolution: family 2, alpha 0.005 1/m"
     assert "lean 0.737443, steer 2.83701" in lines[2]
     assert "  Lyapunov stable: growth rate -" in lines[-1]
+
+
+def test_a_bicycle_may_be_a_file_or_a_scenarios() -> None:
+    source = str(Path(__file__).parents[1] / "cases" / "tms-exact.toml")
+    found = velodrome.circular(alpha=0.0, rear_rate=40.0, near=(0.0, 0.0), bicycle=source)
+    assert (found.bicycle.front_wheel_mass, found.motion.yaw_rate, found.family) == (0.0, 0.0, None)
+    assert found.motion.is_straight
+    assert repr(found).startswith("CircularSolution: straight, alpha 0 1/m")
+    with pytest.raises(velodrome.ScenarioError, match=r"nowhere\.txt: there is no such file"):
+        velodrome.circular(alpha=0.0, rear_rate=40.0, near=(0.0, 0.0), bicycle=Path("nowhere.txt"))
+
+
+def test_a_missing_motion_has_a_reason() -> None:
+    with pytest.raises(velodrome.MissingMotionError, match="no circular motion found") as told:
+        velodrome.circular(alpha=0.005, rear_rate=500.0, family=2)
+    assert told.value.reason == "no-such-motion"
+    assert told.value.as_json() == {"reason": "no-such-motion", "message": str(told.value)}
+    again = pickle.loads(pickle.dumps(told.value))
+    assert (str(again), again.reason) == (str(told.value), "no-such-motion")
