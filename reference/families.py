@@ -482,7 +482,8 @@ def find_motion(
         parts = [] if nearest is None else [f"the nearest is at {nearest[1].lean:.6g}, {nearest[1].steer:.6g}"]
         if _is_near_straight(near) and not is_level(surface):
             parts.insert(0, "no motion is straight on ground that is not level")
-        reason = "; ".join([*parts, f"searched were {searched}", *([_join_failures(failures)] if failures else [])])
+        parts.append(f"searched were {searched}, on circles of up to {FARTHEST:g} m")
+        reason = "; ".join([*parts, *([_join_failures(failures)] if failures else [])])
         raise _not_found(f"{wanted} within {_NEAR_ENOUGH} rad of near = {near[0]:g}, {near[1]:g}", reason, failures)
     require_standing(bicycle, surface, nearest[1])
     return nearest
@@ -526,8 +527,10 @@ def _motions_from(
             motion = equations.motion(unknowns)
         except ValueError:
             continue
-        # In these unknowns, positions from the centre, a larger circle is not determined, and need not be a solution.
-        if above_ground(equations, unknowns) and np.hypot(*unknowns[:2]) <= FARTHEST:
+        # In these unknowns, positions from the centre, a larger circle is not determined by the plane, and need not be
+        # a solution; the steady turn above is.
+        too_large = is_level(surface) and np.hypot(*unknowns[:2]) > FARTHEST
+        if above_ground(equations, unknowns) and not too_large:
             reached.append(motion)
     for k, motion in enumerate(reached):
         if not any(_same_angles(motion, other) for other in (*known, *reached[:k])):
