@@ -70,15 +70,12 @@ def solution_figure(
     points += find_limits(drawn)
     figure = new_figure(3.75)
     panels = figure.subplots(1, 2)
+    if other := name_other_bicycle(document):
+        figure.suptitle(other, x=0.01, ha="left", fontsize=9)
     for axes, angle, tag in zip(panels, ANGLES, "ab", strict=True):
         _draw_frame(axes, angle, front_radius)
         axes.text(
-            0.03,
-            0.965,
-            f"({tag})  {_describe_ground(document)}{name_other_bicycle(document)}",
-            transform=axes.transAxes,
-            va="top",
-            fontsize=8.5,
+            0.03, 0.965, f"({tag})  {_describe_ground(document)}", transform=axes.transAxes, va="top", fontsize=8.5
         )
         for curve in drawn:
             _draw_curve(axes, curve, angle)

@@ -22,11 +22,11 @@ _LEADER = 17.0  # distance from which a label is connected to its point by a lin
 
 
 def name_other_bicycle(document: Mapping[str, Any]) -> str:
-    """Return what a title adds to name the bicycle of a document; nothing for the benchmark bicycle."""
+    """Return a title that names the bicycle of a document; an empty one for the benchmark bicycle."""
     bicycle = document["bicycle"]
     if bicycle["parameters"] == asdict(Bicycle()):
         return ""
-    return f", bicycle {bicycle['name'] or 'without a name'}"[:_LONGEST_NAME]
+    return f"bicycle {bicycle['name'] or 'without a name'}"[:_LONGEST_NAME]
 
 
 @dataclass(frozen=True)
