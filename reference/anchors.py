@@ -60,6 +60,7 @@ from .kernels import dynamics as kernel
 from .kernels.curve import CHOSEN
 from .kernels.steady import STANDING, UNKNOWNS
 from .kinematics import body_positions, constants
+from .missing_motion import NoSuchMotion, SearchFailed
 from .surface import Plane, SurfaceOfRevolution, evaluate, is_level
 
 # (lean, steer) of A, D and G on the level plane, as printed (Xiong et al. 2020, section 3.2).
@@ -180,13 +181,15 @@ def _carry(
             if step < _SHORTEST_STEP:
                 # At a distance d before a fold the smallest singular value has fallen by the root of d.
                 fold = _least_singular_value(path(reached), u, condition) < 0.05 * regular
-                how = "ends in a fold" if fold else "is lost"
-                raise ValueError(f"its anchor {how} {100 * reached:.4g} % of the way to {describe_place(reached)}")
+                way = f"{100 * reached:.4g} % of the way to {describe_place(reached)}"
+                if fold:
+                    raise NoSuchMotion(f"its anchor ends in a fold {way}")
+                raise SearchFailed(f"its anchor is lost {way}")
             continue
         (u, iterations), reached = carried, wanted
         step *= 1.5 if iterations <= 5 else 1.0
     if u[SIGMA] < 0:
-        raise ValueError(f"its anchor is no motion at {describe_place(1.0)}: the squared speed would be negative")
+        raise NoSuchMotion(f"its anchor is no motion at {describe_place(1.0)}: the squared speed would be negative")
     return u
 
 
@@ -461,7 +464,7 @@ def _find_other_pivot(bicycle: Bicycle, surface: SurfaceOfRevolution) -> np.ndar
         points = follow_curve(branch.equations, branch.unknowns, towards)
         for u in crossings(branch.equations, points, _anchor_condition(None)):
             return u
-    raise ValueError(f"there is no pivoting motion on {surface}")
+    raise NoSuchMotion(f"there is no pivoting motion on {surface}")
 
 
 def _radius_condition(radius: float) -> Callable[[np.ndarray], Condition]:

@@ -63,7 +63,8 @@ class Boundary:
     ends : list of (SectionEnd, SectionEnd)
         At each alpha, in the order of the family's points.
     vanishing : CriticalPoint or None
-        Where both ends meet and the section vanishes as alpha grows; None where it reaches the last alpha.
+        Where both ends meet and the section vanishes as alpha grows; None where it reaches the last alpha, and where
+        the point is not solved.
     """
 
     family: int
@@ -74,7 +75,7 @@ class Boundary:
 
 @dataclass(frozen=True)
 class Absence:
-    """A family that has no curve at an alpha, and why."""
+    """A family that has no curve at an alpha, or a point of it that is not solved there, and why."""
 
     alpha: float
     family: int
@@ -152,6 +153,11 @@ def compute_atlas(
     Returns
     -------
     Atlas
+
+    Raises
+    ------
+    ValueError
+        If no family has a curve at any alpha.
     """
     curves: list[AtlasCurve] = []
     absent: list[Absence] = []
@@ -163,10 +169,12 @@ def compute_atlas(
             except ValueError as error:
                 absent.append(Absence(alpha, family, str(error)))
         progress(0.9 * (k + 1) / len(alphas))
+    if not curves:
+        raise ValueError(f"the bicycle has none of the families: {absent[0].reason}")
     largest = float(alphas[-1])
     touching = reconnections(bicycle, largest=largest)
     progress(0.95)
-    boundaries = [boundary for family in FAMILIES for boundary in _follow_boundaries(bicycle, curves, family)]
+    boundaries = [boundary for family in FAMILIES for boundary in _follow_boundaries(bicycle, curves, family, absent)]
     progress(1.0)
     return Atlas(bicycle, np.asarray(alphas, float), curves, absent, boundaries, touching)
 
@@ -200,16 +208,24 @@ def _carry_anchor(bicycle: Bicycle, alpha: float, number: int, known: tuple[floa
     return anchor(bicycle, Paraboloid(alpha), number, rear_rate)
 
 
-def _follow_boundaries(bicycle: Bicycle, curves: list[AtlasCurve], number: int) -> list[Boundary]:
-    """Follow the stable sections of a family, each from its first alpha to its last."""
+def _follow_boundaries(
+    bicycle: Bicycle, curves: list[AtlasCurve], number: int, absent: list[Absence]
+) -> list[Boundary]:
+    """Follow the stable sections of a family, each from its first alpha to its last.
+
+    A point at which the last one vanishes, and which cannot be solved, is added to ``absent``.
+    """
     found: list[Boundary] = []
     current: list[Boundary] = []
     before = None
     for curve in (curve for curve in curves if curve.family == number):
         if len(curve.sections) != len(current):
             if before is not None and current and not curve.sections:
-                closing = vanishing_between(bicycle, number, before.alpha, curve.alpha)
-                found[-1] = replace(found[-1], vanishing=closing)
+                try:
+                    closing = vanishing_between(bicycle, number, before.alpha, curve.alpha)
+                    found[-1] = replace(found[-1], vanishing=closing)
+                except ValueError as error:
+                    absent.append(Absence(before.alpha, number, str(error)))
             current = [Boundary(number, [], [], None) for _ in curve.sections]
             found += current
         for boundary, ends in zip(current, curve.sections, strict=True):

@@ -18,6 +18,7 @@ from .kernels import curve
 from .kernels import steady as kernel
 from .kernels.pose import aligned
 from .kinematics import constants
+from .missing_motion import NoSuchMotion
 from .surface import SurfaceOfRevolution
 
 LEAN, PITCH, STEER, YAW_SPEED, REAR_SPEED, FRONT_SPEED, SIGMA = range(3, 10)
@@ -46,6 +47,9 @@ class CircularMotion:
     residual : float
         Largest of the 21 equations: forces in units of the weight, lengths in m, rolling speeds as fractions of
         the root of the sum of the squared rates.
+    straight_speed : float
+        Forward speed of a straight motion, the limit of ever larger circles, whose yaw rate is zero [m/s]; D is then
+        given from the rear contact. Zero on a circle.
     """
 
     position: np.ndarray
@@ -58,13 +62,20 @@ class CircularMotion:
     contact: np.ndarray
     force: np.ndarray
     residual: float
+    straight_speed: float = 0.0
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the motion is straight, without a centre to turn about."""
+        return self.straight_speed > 0
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates and rates at yaw 0 and wheel angles 0, shapes (9,)."""
         x, y, z = self.position
         q = np.array([x, y, z, 0.0, self.lean, self.pitch, self.steer, 0.0, 0.0])
         w = self.yaw_rate
-        return q, np.array([-w * y, w * x, 0.0, w, 0.0, 0.0, 0.0, self.rear_rate, self.front_rate])
+        forward = self.straight_speed if self.is_straight else -w * y
+        return q, np.array([forward, w * x, 0.0, w, 0.0, 0.0, 0.0, self.rear_rate, self.front_rate])
 
 
 class Expansion(NamedTuple):
@@ -101,7 +112,7 @@ class Steady:
 
     Raises
     ------
-    ValueError
+    NoSuchMotion
         If there is a torque on the rear wheel, with which no wheel rolls steadily.
     """
 
@@ -112,7 +123,7 @@ class Steady:
     def __post_init__(self) -> None:
         torque = self.inputs.rear_wheel_torque
         if torque != 0:
-            raise ValueError(
+            raise NoSuchMotion(
                 f"no circular motion exists with a rear-wheel torque of {torque!r} N m: a rolling wheel would gain the "
                 "power torque x rear rate, and nothing takes it up; it would be steady only where the rear wheel "
                 "stands. rear_wheel_torque = 0 has circular motions"

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ _STEP = 1e-6  # relative step of central differences; their errors affect only t
 _SCAN = np.linspace(0.0, 1.0, 41)
 _BRACKET = 2e-3
 _SECTION_BRACKET = 2e-7
+_NEAR_BRACKET = 1e3 * _SECTION_BRACKET  # a section whose ends are too near to be seen is longer gone than the bracket
 
 
 @dataclass(frozen=True)
@@ -107,11 +109,43 @@ def _passing_families(bicycle: Bicycle, motion: CircularMotion, low: float, high
     return tuple(passing)
 
 
-def _trace_ends(bicycle: Bicycle, alpha: float, number: int) -> tuple[str, str] | None:
+@lru_cache(maxsize=1024)
+def _follow_at(bicycle: Bicycle, alpha: float, number: int) -> tuple[tuple[str, str] | None, str]:
+    """Return the ends of a family, or None and the reason if it cannot be followed."""
     try:
-        return trace(bicycle, Paraboloid(alpha), number).ends
-    except ValueError:
+        return trace(bicycle, Paraboloid(alpha), number).ends, ""
+    except ValueError as error:
+        return None, str(error)
+
+
+def _trace_ends(bicycle: Bicycle, alpha: float, number: int) -> tuple[str, str] | None:
+    return _follow_at(bicycle, alpha, number)[0]
+
+
+def describe_gaps(bicycle: Bicycle, number: int, largest: float = 1.0) -> str | None:
+    """Say at which of the scanned alpha a family cannot be followed, so that nothing critical of it is found there.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    number : int
+        Family.
+    largest : float
+        Largest alpha scanned [1/m].
+
+    Returns
+    -------
+    str or None
+        None where it is followed at every alpha.
+    """
+    grid = [float(alpha) for alpha in _SCAN if alpha <= largest]
+    lost = [alpha for alpha in grid if _trace_ends(bicycle, alpha, number) is None]
+    if not lost:
         return None
+    reason = _follow_at(bicycle, lost[0], number)[1]
+    if len(lost) == len(grid):
+        return f"no curve at any alpha from 0 to {largest:g}: {reason}"
+    return f"no curve at {len(lost)} of {len(grid)} alpha from {lost[0]:g} to {lost[-1]:g}: {reason}"
 
 
 def _bracket_changes(
@@ -204,7 +238,7 @@ def last_stable(bicycle: Bicycle, number: int, largest: float = 1.0) -> Critical
     Raises
     ------
     ValueError
-        If the family is still stable at the largest alpha.
+        If the family is still stable at the largest alpha, or `vanishing_between` raises it.
     """
     grid = [0.0, 0.0025, 0.005, 0.0075, *(float(alpha) for alpha in _SCAN[1:] if alpha <= largest)]
     grid = sorted({*grid, 0.01, 0.015, 0.02, 0.03, 0.035, 0.04})
@@ -214,7 +248,7 @@ def last_stable(bicycle: Bicycle, number: int, largest: float = 1.0) -> Critical
     low = stable[-1]
     high = next((alpha for alpha in grid if alpha > low), None)
     if high is None:
-        raise ValueError(f"family {number} is stable beyond alpha = {largest!r}")
+        raise ValueError(f"it is stable beyond alpha = {largest:g}")
     return vanishing_between(bicycle, number, low, high)
 
 
@@ -232,11 +266,31 @@ def vanishing_between(bicycle: Bicycle, number: int, stable: float, unstable: fl
     Returns
     -------
     CriticalPoint
+
+    Raises
+    ------
+    ValueError
+        If the family cannot be followed up to that point, or the point cannot be solved.
     """
     while abs(unstable - stable) > _SECTION_BRACKET:
         middle = 0.5 * (stable + unstable)
         stable, unstable = (middle, unstable) if _find_sections(bicycle, middle, number) else (stable, middle)
-    return _solve_vanishing(bicycle, number, stable)
+    where = f"its last stable section vanishes at alpha = {stable:.6g}"
+    if _trace_ends(bicycle, unstable, number) is None:
+        reason = _follow_at(bicycle, unstable, number)[1]
+        raise ValueError(f"it is stable up to alpha = {stable:.6g}, beyond which it has no curve: {reason}")
+    try:
+        point = _solve_vanishing(bicycle, number, stable)
+    except (ValueError, np.linalg.LinAlgError) as error:
+        if _trace_ends(bicycle, unstable, number) != _trace_ends(bicycle, stable, number):
+            raise ValueError(
+                f"it loses its last stable section at alpha = {stable:.6g} with a part of its curve"
+            ) from error
+        how = "its equations are singular" if isinstance(error, np.linalg.LinAlgError) else str(error)
+        raise ValueError(f"{where}, but the point is not solved: {how}") from error
+    if abs(point.alpha - stable) > _NEAR_BRACKET:
+        raise ValueError(f"{where}, but the point solved for is another one, at {point.alpha:.6g}")
+    return point
 
 
 def _find_sections(bicycle: Bicycle, alpha: float, number: int) -> list[tuple[SectionEnd, SectionEnd]]:
@@ -270,7 +324,7 @@ def _solve_vanishing(bicycle: Bicycle, number: int, alpha: float) -> CriticalPoi
         for value in linearise(bicycle, surface, *end.motion.state()).eigenvalues
         if value.imag > 1e-3 and abs(value.imag - imaginary) > 1e-6
     ]
-    kind = "tangency" if abs(tracked[0] - tracked[1]) < 0.5 * min(others) else "crossing"
+    kind = "tangency" if abs(tracked[0] - tracked[1]) < 0.5 * min(others, default=np.inf) else "crossing"
 
     def growth(x: np.ndarray, imaginary: float) -> float:
         values = eigenvalues(float(x[0]), float(x[1]))[1]
@@ -297,6 +351,8 @@ def _solve_vanishing(bicycle: Bicycle, number: int, alpha: float) -> CriticalPoi
         # The derivative along the arc is known to 1e-6; alpha depends on it in second order only.
         if abs(step[1]) < 1e-12 and abs(step[0]) < 1e-5:
             break
+    else:
+        raise ValueError("Newton's method does not converge")
     motion, _ = eigenvalues(float(x[0]), float(x[1]))
     # Growth rate at the point. At a tangency its slope is the other equation, whose round-off moves the point only
     # along the arc.

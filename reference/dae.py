@@ -76,7 +76,56 @@ def dynamics(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, 
     qdd, force, rate = np.empty(9), np.empty(6), np.empty(6)
     function, parameters = surface.function.real, surface.parameters
     kernel.accelerations(q, qd, p, function, parameters, constants(bicycle, inputs), qdd, force, rate)
+    if not np.all(np.isfinite(qdd)):
+        qdd, force = _solve_bordered(bicycle, surface, q, qd, p, inputs)
     return Dynamics(qdd, force.reshape(2, 3), p.reshape(2, 3), rate.reshape(2, 3))
+
+
+def _solve_bordered(
+    bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, p: np.ndarray, inputs: Inputs
+) -> tuple[np.ndarray, np.ndarray]:
+    """Solve the 15 x 15 system as a whole, where the mass matrix of the tree has no inverse.
+
+    Bodies without inertia make that matrix singular. The whole system is regular where every motion that the
+    constraints allow has inertia, see `velodrome.reference.regularity.require_inertia`.
+    """
+    mass, bias, rows, gamma = _bordered_parts(bicycle, surface, q, qd, p, inputs)
+    system = np.block([[mass, -rows.T], [rows, np.zeros((6, 6))]])
+    solution = np.linalg.solve(system, np.concatenate([-bias, -gamma]))
+    return solution[:9], solution[9:]
+
+
+def _bordered_parts(
+    bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, p: np.ndarray, inputs: Inputs = NO_INPUTS
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return M (9, 9), h (9,) less the inputs, J (6, 9), gamma (6,) of M qdd + h = J^T F, J qdd + gamma = 0."""
+    mass, bias, rows, gamma, rate = np.empty((9, 9)), np.empty(9), np.empty((6, 9)), np.empty(6), np.empty(6)
+    c = constants(bicycle, inputs)
+    kernel.mass_and_bias(q, qd, c, mass, bias)
+    kernel.rolling(q, qd, p, surface.function.real, surface.parameters, c, rows, gamma, rate)
+    return mass, bias, rows, gamma
+
+
+def steady_forces(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Compute the contact forces of a state without accelerations.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    surface : Surface
+    q, qd : ndarray, shape (9,)
+        Generalised coordinates and rates.
+    p : ndarray, shape (6,)
+        Contact parameters.
+
+    Returns
+    -------
+    ndarray, shape (2, 3)
+        Forces of the ground on the rear and the front wheel in inertial axes [N].
+    """
+    _, bias, rows, _ = _bordered_parts(bicycle, surface, q, qd, p)
+    # Nine equations for six forces, which are consistent where the accelerations are zero.
+    return np.linalg.lstsq(rows.T, bias, rcond=None)[0].reshape(2, 3)
 
 
 def mass_matrix(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:

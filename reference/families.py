@@ -7,7 +7,7 @@ family that it was a part of.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import islice
@@ -44,9 +44,11 @@ from .continuation import (
 )
 from .inputs import NO_INPUTS, Inputs
 from .kernels.steady import STANDING, direction
+from .missing_motion import NoSuchMotion, SearchFailed
 from .rideability import assess_motions
 from .search import describe_search, guesses_at, is_on_curve, search_starts
-from .surface import SurfaceOfRevolution, has_tip
+from .steady_turn import solve_steady_turn, straight_motions
+from .surface import SurfaceOfRevolution, has_tip, is_level
 
 FAMILIES = (1, 2, 3, 4)
 
@@ -448,21 +450,26 @@ def find_motion(
         1 to 4. Without ``near``, the solution nearest to the family's anchor along the curve is returned.
     near : tuple of float, optional
         Lean and steer [rad]. The nearest of all solutions (of the family, if given) is returned. Without ``family``
-        it may be on a curve that has no number.
+        it may be on a curve that has no number, or straight.
     inputs : Inputs
-        Held constant. With a steer torque no curve has a number.
+        Held constant. With a steer torque no curve has a number, and no motion is straight.
 
     Returns
     -------
     family : int or None
-        None on a curve without a number.
+        None on a curve without a number, and for a straight motion.
     motion : CircularMotion
-        Whether it can be ridden says `velodrome.reference.rideability.explain_motion`.
+        On level ground it may be straight, upright with a steer of 0 or pi. Whether it can be ridden says
+        `velodrome.reference.rideability.explain_motion`.
 
     Raises
     ------
+    NoSuchMotion
+        If the search is complete and finds no such motion.
+    SearchFailed
+        If it finds none, and the curve of a family could not be searched.
     ValueError
-        If there is no such motion, or an argument is invalid.
+        If an argument is invalid.
     """
     Steady(bicycle, surface, inputs)  # refuses inputs with which there is no circular motion
     held = Inputs(steer_torque=inputs.steer_torque)  # damping acts in no circular motion
@@ -477,27 +484,29 @@ def find_motion(
     if family is not None and held != NO_INPUTS:
         raise ValueError(f"{_explain_numbers(held)}; give the lean and steer that the motion is near to, and no family")
     found: list[tuple[int | None, CircularMotion]] = []
-    failures = []
+    failures: dict[int, ValueError] = {}
     numbers = FAMILIES if held == NO_INPUTS else ()
     for number in numbers if family is None else (family,):
         try:
             met = _yield_motions(bicycle, surface, number, rear_rate)
             found += [(number, motion) for motion in (islice(met, 1) if near is None else met)]
         except ValueError as error:
-            failures.append(f"family {number}: {error}")
+            failures[number] = error
     wanted = f"rear rate {rear_rate!r} rad/s on {surface}"
     if held != NO_INPUTS:
         wanted += f" under {held.describe()}"
     if near is None:
         if not found:
-            reason = "; ".join(failures) or "its curves, as followed from their anchors, do not reach it"
-            raise ValueError(f"no circular motion found with {wanted} in family {family}: {reason}")
+            reason = _join_failures(failures) or "its curves, as followed from their anchors, do not reach it"
+            raise _not_found(f"{wanted} in family {family}", reason, failures)
         return found[0]
 
     def distance(item: tuple[int | None, CircularMotion]) -> float:
         return float(np.hypot(item[1].lean - near[0], item[1].steer - near[1]))
 
     if family is None:
+        if is_level(surface) and held == NO_INPUTS:
+            found += [(None, motion) for motion in straight_motions(bicycle, surface, rear_rate)]
         found += _motions_from(Steady(bicycle, surface, held), rear_rate, near, [motion for _, motion in found])
         if all(distance(item) > _MEANT for item in found):
             found += _motions_without_number(Steady(bicycle, surface, held), rear_rate)
@@ -507,13 +516,32 @@ def find_motion(
         searched = f"Newton's method from there, {curves}{describe_search(held)}"
         if family is not None:
             searched = f"the curves of family {family}"
-        place = "" if nearest is None else f"; the nearest is at {nearest[1].lean:.6g}, {nearest[1].steer:.6g}"
-        lost = "".join(f"; {failure}" for failure in failures)
-        raise ValueError(
-            f"no circular motion found with {wanted} within {_NEAR_ENOUGH} rad of near = {near[0]:g}, {near[1]:g}"
-            f"{place}; searched were {searched}{lost}"
-        )
+        parts = [] if nearest is None else [f"the nearest is at {nearest[1].lean:.6g}, {nearest[1].steer:.6g}"]
+        if _is_near_straight(near) and not is_level(surface):
+            parts.insert(0, "no motion is straight on ground that is not level")
+        parts.append(f"searched were {searched}, on circles of up to {FARTHEST:g} m")
+        reason = "; ".join([*parts, *([_join_failures(failures)] if failures else [])])
+        raise _not_found(f"{wanted} within {_NEAR_ENOUGH} rad of near = {near[0]:g}, {near[1]:g}", reason, failures)
     return nearest
+
+
+def _is_near_straight(near: tuple[float, float]) -> bool:
+    """Return whether angles are near those of upright straight motion, the handlebar forward or reversed."""
+    return min(np.hypot(near[0], abs(near[1]) - steer) for steer in (0.0, np.pi)) <= _NEAR_ENOUGH
+
+
+def _join_failures(failures: Mapping[int, ValueError]) -> str:
+    return "; ".join(f"family {number}: {error}" for number, error in failures.items())
+
+
+def _not_found(wanted: str, reason: str, failures: Mapping[int, ValueError]) -> NoSuchMotion | SearchFailed:
+    """Return the error of a search without a result.
+
+    Where an anchor was lost, its curve has not been searched. Where it ended in a fold, this bicycle has no such curve.
+    """
+    if all(isinstance(error, NoSuchMotion) for error in failures.values()):
+        return NoSuchMotion(f"no circular motion found with {wanted}; {reason}")
+    return SearchFailed(f"no circular motion found with {wanted}, but the search is not complete; {reason}")
 
 
 def _motions_from(
@@ -521,13 +549,24 @@ def _motions_from(
 ) -> Iterator[tuple[None, CircularMotion]]:
     """Yield motions of a rear rate that Newton's method finds from two angles, other than the known ones."""
     condition = rear_rate_condition(rear_rate)
-    for guess in guesses_at(equations.bicycle, equations.surface, *near, equations.inputs):
+    bicycle, surface, inputs = equations.bicycle, equations.surface, equations.inputs
+    reached: list[CircularMotion] = []
+    if is_level(surface):
+        turn = solve_steady_turn(bicycle, surface, rear_rate, *near, inputs)
+        reached += [] if turn is None else [turn]
+    for guess in guesses_at(bicycle, surface, *near, inputs):
         try:
             unknowns, _ = newton(equations, guess, condition, most=25)
             motion = equations.motion(unknowns)
         except ValueError:
             continue
-        if above_ground(equations, unknowns) and not any(_same_angles(motion, other) for other in known):
+        # In these unknowns, positions from the centre, a larger circle is not determined by the plane, and need not be
+        # a solution; the steady turn above is.
+        too_large = is_level(surface) and np.hypot(*unknowns[:2]) > FARTHEST
+        if above_ground(equations, unknowns) and not too_large:
+            reached.append(motion)
+    for k, motion in enumerate(reached):
+        if not any(_same_angles(motion, other) for other in (*known, *reached[:k])):
             yield None, motion
 
 

@@ -31,7 +31,7 @@ from .commands import (
     sweep_command,
     view_command,
 )
-from .error import ScenarioError
+from .error import MissingMotionError, ScenarioError
 
 # Environment variable that the shell sets when it asks for completions.
 _COMPLETING = "_VELODROME_COMPLETE"
@@ -91,11 +91,16 @@ def supervised_main() -> NoReturn:
 
 
 def main() -> NoReturn:
-    """Run the command in this process; bad input ends with one line on stderr and exit status 2."""
+    """Run the command in this process; bad input ends with one line on stderr and exit status 2.
+
+    A motion that is not there is no bad input: its line ends with exit status 1.
+    """
     status = 0
     try:
         _refuse_empty_out(sys.argv[1:])
         status = app(sys.argv[1:] or ["--help"], standalone_mode=False)
+    except MissingMotionError as error:
+        _complain(str(error), status=1)
     except ScenarioError as error:
         _complain(str(error))
     except typer.TyperException as error:

@@ -10,7 +10,7 @@ from fields import list_fields
 from pydantic import BaseModel
 
 from velodrome.reference.bicycle import Bicycle
-from velodrome.scenarios.scenario import PARAMETERS
+from velodrome.scenarios.scenario import BICYCLE_FILE, PARAMETERS
 from velodrome.scenarios.scenario.schema import Scenario
 from velodrome.scenarios.scenario.surfaces import SurfaceTable
 from velodrome.scenarios.sweep.file import Hypercube, SweepFile
@@ -58,7 +58,7 @@ def describe_scenario_file() -> str:
 
 def list_parameters() -> str:
     """Markdown of the bicycle's parameters with the benchmark's values."""
-    lines = ["| parameter | benchmark | meaning |", "| --- | ---: | --- |"]
+    lines = ["| parameter | benchmark | meaning |", "| --- | ---: | --- |", f"| `file` | none | {BICYCLE_FILE} |"]
     for name, parameter in PARAMETERS.items():
         unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
         lines.append(f"| `{name}` | {Bicycle.__dataclass_fields__[name].default!r} | {parameter.meaning}{unit} |")

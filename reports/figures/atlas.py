@@ -19,7 +19,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from ...reference.families import FAMILIES
-from .labels import Label, place_labels
+from .labels import Label, name_other_bicycle, place_labels
 from .style import FAMILY_COLOURS, GREY, INK, new_figure, use_style, write_figure
 
 Columns = Mapping[str, np.ndarray]
@@ -57,7 +57,7 @@ def growth_figure(path: Path, columns: Columns, document: Mapping[str, Any]) -> 
         _draw_colour_bar(figure, panels)
         figure.legend(handles=list(_growth_legend(document)), loc="outside lower center", ncols=2)
         title = "Circular motions and the growth rate of disturbances (of several at one rate the least is shown)"
-        figure.suptitle(title, x=0.01, ha="left", fontsize=9)
+        figure.suptitle(_add_bicycle(title, document), x=0.01, ha="left", fontsize=9)
         # Labels come last, since all other items move the axes.
         for axes, family in zip(panels.flat, FAMILIES, strict=True):
             _label_alphas(axes, _critical_points(document, family), "rear_rate")
@@ -104,8 +104,14 @@ def stable_figure(path: Path, columns: Columns, document: Mapping[str, Any]) -> 
         for axes, name in zip(panels, ("rear_rate", "lean"), strict=True):
             _label_alphas(axes, [b["vanishing"] for b in document["stable"] if b["vanishing"] is not None], name)
         figure.legend(handles=list(_stable_legend(columns, document)), loc="outside lower center", ncols=3)
-        figure.suptitle("Stable circular motions of the hands-free bicycle", x=0.01, ha="left", fontsize=10)
+        title = _add_bicycle("Stable circular motions of the hands-free bicycle", document)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=10)
         write_figure(path, figure)
+
+
+def _add_bicycle(title: str, document: Mapping[str, Any]) -> str:
+    """Return a title with a line for the document's bicycle, unless it is the benchmark."""
+    return "\n".join(filter(None, (title, name_other_bicycle(document))))
 
 
 def sheet(columns: Columns, family: int, alphas: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MultipleLocator
 
-from .labels import Badge, Label, place_labels
+from .labels import Badge, Label, name_other_bicycle, place_labels
 from .solution_curve import NamedPoint, SolutionCurve, find_limits, find_named_points, make_curves, scaled_speed
 from .style import FAMILY_COLOURS, GREY, INK, new_figure, use_style, write_figure
 
@@ -76,6 +76,8 @@ def solution_figure(
     points += find_limits(drawn)
     figure = new_figure(3.75)
     panels = figure.subplots(1, 2)
+    if other := name_other_bicycle(document):
+        figure.suptitle(other, x=0.01, ha="left", fontsize=9)
     for axes, angle, tag in zip(panels, ANGLES, "ab", strict=True):
         _draw_frame(axes, angle, front_radius, mirrored=any(curve.steer.min() < 0 for curve in drawn))
         axes.text(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -11,11 +11,22 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.text import Annotation
 
+from ...reference.bicycle import Bicycle
+
+_LONGEST_NAME = 40  # largest number of characters that name a bicycle
 _REACHES = (8.0, 11.0, 15.0, 20.0, 26.0)  # distances of a label from its point that are tried [pt]
 _DIRECTIONS = np.radians(np.arange(45.0, 405.0, 22.5))  # beginning at the upper right, where readers expect it
 _MARGIN = 1.5  # kept free around a label [pt]
 _SPACING = 2.0  # of the points that represent a curve [pt]
 _LEADER = 17.0  # distance from which a label is connected to its point by a line [pt]
+
+
+def name_other_bicycle(document: Mapping[str, Any]) -> str:
+    """Return a title that names the bicycle of a document; an empty one for the benchmark bicycle."""
+    bicycle = document["bicycle"]
+    if bicycle["parameters"] == asdict(Bicycle()):
+        return ""
+    return f"bicycle {bicycle['name'] or 'without a name'}"[:_LONGEST_NAME]
 
 
 @dataclass(frozen=True)

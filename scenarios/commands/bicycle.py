@@ -34,7 +34,8 @@ def bicycle_command(
     import numpy as np
     from rich.console import Console
 
-    from ..studies import find_bicycle, study_bicycle, write_bicycle
+    from ..scenario import find_bicycle
+    from ..studies import study_bicycle, write_bicycle
     from .present_bicycle import show_bicycle
 
     damping = make_inputs(0.0, 0.0, steer_damping).steer_damping

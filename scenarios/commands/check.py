@@ -58,6 +58,7 @@ def check_command(
         UNFINISHED_MARKDOWN,
         check_gate,
         junit_xml,
+        list_bicycle_warnings,
         markdown_page,
         refused_verdicts,
         update_baselines,
@@ -95,14 +96,19 @@ def check_command(
             raise ScenarioError(f"no baseline written: {absent[0].engine} {absent[0].reason}")
         written = [str(path) for path in update_baselines(fresh, verdicts, reason, baselines)]
     refused = refused_verdicts(verdicts) if update else []
+    warnings = list_bicycle_warnings(scenario)
     passes = not refused if update else all(verdict.passes for _, verdict in verdicts)
     with ending_with(0 if passes else 1):
         if as_json:
             rows = [{"scenario": name} | verdict.as_json() for name, verdict in verdicts]
-            print_json({"passes": passes, "updated": written, "verdicts": rows})
+            print_json({"passes": passes, "updated": written, "warnings": warnings, "verdicts": rows})
         else:
             console = Console()
             show_verdicts(console, verdicts, renewed=update)
+            for name, lines in warnings.items():
+                for line in lines:
+                    text = f"warning: {name}: {line}"
+                    console.print(text, style="yellow", markup=False, highlight=False, soft_wrap=True)
             if update and not written and not refused:
                 console.print("no baseline written: nothing moved beyond its limit")
             for name in written:

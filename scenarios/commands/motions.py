@@ -10,12 +10,15 @@ import typer
 from .options import (
     STARTING,
     AlphaOption,
+    BicycleOption,
     GroundOption,
     JsonOption,
     RearTorqueOption,
     SteerDampingOption,
     SteerTorqueOption,
+    answering_missing_motion,
     ending_with,
+    load_bicycle,
     make_inputs,
     parse_angles,
     parse_ground,
@@ -28,25 +31,32 @@ def circular_command(
     alpha: AlphaOption = None,
     surface: GroundOption = None,
     family: Annotated[int | None, typer.Option(help="Solution family, 1 to 4.")] = None,
-    near: Annotated[str | None, typer.Option(metavar="LEAN,STEER", help="Angles it is near to [rad].")] = None,
+    near: Annotated[
+        str | None,
+        typer.Option(metavar="LEAN,STEER", help="Angles it is near to [rad]; on the plane 0,0 is straight motion."),
+    ] = None,
+    bicycle: BicycleOption = None,
     steer_torque: SteerTorqueOption = 0.0,
     rear_wheel_torque: RearTorqueOption = 0.0,
     steer_damping: SteerDampingOption = 0.0,
     as_json: JsonOption = False,
 ) -> None:
-    """One circular motion: its 21 constants, contact forces, eigenvalues, verdict on stability."""
+    """One circular motion: its 21 constants, contact forces, eigenvalues, verdict on stability.
+
+    If there is no such motion, the exit status is 1; --json then gives the reason, no-such-motion or search-failed.
+    """
     from rich.console import Console
 
-    from ...reference.bicycle import Bicycle
     from ..motions import solve_circular
     from ..scenario import make_bowl
     from .present_motions import show_circular
     from .progress import show_working
 
-    angles, ground = parse_angles(near), parse_ground(alpha, surface)
+    angles, ground, source = parse_angles(near), parse_ground(alpha, surface), load_bicycle(bicycle)
     inputs = make_inputs(steer_torque, rear_wheel_torque, steer_damping)
-    with show_working(STARTING):
-        found = solve_circular(Bicycle(), make_bowl(ground), rear_rate, family, angles, inputs).as_json()
+    with answering_missing_motion(as_json), show_working(STARTING):
+        solution = solve_circular(source.bicycle, make_bowl(ground), rear_rate, family, angles, inputs)
+    found = solution.as_json(source.name)
     with ending_with(0):
         if as_json:
             print_json(found)
@@ -57,6 +67,7 @@ def circular_command(
 def families_command(
     alpha: AlphaOption = None,
     surface: GroundOption = None,
+    bicycle: BicycleOption = None,
     steer_torque: SteerTorqueOption = 0.0,
     rear_wheel_torque: RearTorqueOption = 0.0,
     steer_damping: SteerDampingOption = 0.0,
@@ -66,14 +77,15 @@ def families_command(
     """The four solution families by continuation: special points, stable sections."""
     from rich.console import Console
 
-    from ..motions import families_document, write_families
+    from ..motions import follow_families, write_families
+    from ..scenario import make_bowl
     from .present_motions import show_families
     from .progress import show_working
 
-    ground = parse_ground(alpha, surface)
+    ground, source = parse_ground(alpha, surface), load_bicycle(bicycle)
     inputs = make_inputs(steer_torque, rear_wheel_torque, steer_damping)
-    with show_working(STARTING):
-        document = families_document(ground, inputs)
+    with answering_missing_motion(as_json), show_working(STARTING):
+        document = follow_families(source.bicycle, make_bowl(ground), inputs).as_json(source.name)
     if out is not None:
         write_families(document, out)
     with ending_with(0):
@@ -83,17 +95,17 @@ def families_command(
             show_families(Console(), document)
 
 
-def critical_command(as_json: JsonOption = False) -> None:
+def critical_command(bicycle: BicycleOption = None, as_json: JsonOption = False) -> None:
     """The critical α: cusps collide, families merge, their last stable sections vanish."""
     from rich.console import Console
 
-    from ...reference.bicycle import Bicycle
     from ..motions import find_critical_shapes
     from .present_motions import show_critical
     from .progress import ProgressBars
 
+    source = load_bicycle(bicycle)
     with ProgressBars() as progress:
-        document = find_critical_shapes(Bicycle(), progress.watch).as_json()
+        document = find_critical_shapes(source.bicycle, progress.watch).as_json(source.name)
     with ending_with(0):
         if as_json:
             print_json(document)
@@ -107,6 +119,7 @@ def atlas_command(
     ] = Path("atlas"),
     size: Annotated[int, typer.Option(help="Number of motions, roughly.")] = 400_000,
     largest: Annotated[float, typer.Option(help="Largest alpha [1/m], at most 1.")] = 1.0,
+    bicycle: BicycleOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Stability of all circular motions over alpha and rear rate: data, boundaries, figures (half a minute)."""
@@ -116,8 +129,9 @@ def atlas_command(
     from .present_motions import show_atlas
     from .progress import ProgressBars
 
-    with ProgressBars() as progress:
-        document = make_atlas(out, size, largest, lambda done: progress.watch("atlas", done, 1.0))
+    source = load_bicycle(bicycle)
+    with answering_missing_motion(as_json), ProgressBars() as progress:
+        document = make_atlas(source, out, size, largest, lambda done: progress.watch("atlas", done, 1.0))
     with ending_with(0):
         if as_json:
             print_json(document)

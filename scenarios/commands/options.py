@@ -14,11 +14,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..error import ScenarioError
+from ..error import MissingMotionError, ScenarioError
+from .completion import complete_scenario
 
 if TYPE_CHECKING:
     from ...reference.inputs import Inputs
     from ...reference.surface import Surface
+    from ..scenario import BicycleFile
 
 STARTING = "computing the motion (the first time on a machine, kernels are compiled: half a minute)"
 
@@ -28,6 +30,15 @@ AlphaOption = Annotated[
 GroundOption = Annotated[
     str | None,
     typer.Option("--surface", metavar="KIND:KEY=VALUE,...", help="Another bowl instead, e.g. sphere:radius=20."),
+]
+BicycleOption = Annotated[
+    str | None,
+    typer.Option(
+        "--bicycle",
+        metavar="FILE",
+        help="Another bicycle: a bicycle file (BicycleParameters or TOML), or a scenario's; see velodrome bicycle.",
+        autocompletion=complete_scenario,
+    ),
 ]
 ChangesOption = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a field, e.g. simulation.duration=5.")
@@ -46,6 +57,31 @@ SteerDampingOption = Annotated[
     float, typer.Option(min=0, help="Coefficient of the torque against the steer rate [N m s/rad].")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else.")]
+
+
+def load_bicycle(source: str | None) -> BicycleFile:
+    """Return the bicycle that --bicycle names, the benchmark bicycle if it is not given."""
+    from ..scenario import find_bicycle
+
+    try:
+        return find_bicycle("benchmark" if source is None else source)
+    except ScenarioError as error:
+        raise ScenarioError(f"--bicycle: {error}") from error
+
+
+@contextmanager
+def answering_missing_motion(as_json: bool) -> Iterator[None]:
+    """Run the body; if it raises a `MissingMotionError` and JSON is wanted, print its document, and end the command.
+
+    Without JSON, `velodrome.scenarios.cli.main` prints the message. The exit status is 1 in both cases.
+    """
+    try:
+        yield
+    except MissingMotionError as error:
+        if not as_json:
+            raise
+        with ending_with(1):
+            print_json(error.as_json())
 
 
 def parse_changes(change: list[str] | None, duration: float | None) -> dict[str, Any]:

@@ -25,6 +25,8 @@ def show_precision(console: Console, document: Mapping[str, Any]) -> None:
     limit = "" if document["horizon"] is None else "; beyond, the motion's own instability leaves nothing to compare"
     title = f"{document['scenario']}: errors over {compared_time(document):.4g} s{limit}"
     console.print(title, style="bold", markup=False, soft_wrap=True)
+    for line in document["warnings"]:
+        console.print(f"warning: {line}", style="yellow", markup=False, highlight=False, soft_wrap=True)
     for name, entry in document["engines"].items():
         console.print()
         console.print(name, style="bold", markup=False)

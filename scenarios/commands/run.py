@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..error import ScenarioError
+from ..error import MissingMotionError, ScenarioError
 from .completion import complete_engine, complete_scenario
 from .options import (
     STARTING,
+    BicycleOption,
     ChangesOption,
     DurationOption,
     JsonOption,
     TracebackOption,
+    answering_missing_motion,
     ending_with,
+    load_bicycle,
     parse_changes,
     print_json,
     print_traceback,
@@ -24,6 +27,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
+    from ...reference.bicycle import Bicycle
     from ..run import RunOutcome, RunPlan
 
 
@@ -84,11 +88,15 @@ def run_command(
     tag: Annotated[str | None, typer.Option(help="Run all library scenarios with this tag.")] = None,
     change: ChangesOption = None,
     duration: DurationOption = None,
+    bicycle: BicycleOption = None,
     out: Annotated[Path, typer.Option(help="Folder for the run folders.")] = Path("runs"),
     traceback: TracebackOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Run scenarios in every engine from the same computed start and compare with the reference."""
+    """Run scenarios in every engine from the same computed start and compare with the reference.
+
+    --bicycle replaces a scenario's bicycle; --set bicycle.KEY=VALUE then changes single parameters of it.
+    """
     from rich.console import Console
 
     from ..run import installed_engines, run_plan
@@ -100,8 +108,9 @@ def run_command(
         raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
     changes = parse_changes(change, duration)
     installed_engines()  # raises here if two packages announce one engine, which is not a fault of a scenario
-    with showing_traceback(traceback), show_working(STARTING):
-        plans = [_plan_source(source, changes, engine) for source in dict.fromkeys(sources)]
+    other = None if bicycle is None else load_bicycle(bicycle).bicycle
+    with answering_missing_motion(as_json), showing_traceback(traceback), show_working(STARTING):
+        plans = [_plan_source(source, changes, engine, other) for source in dict.fromkeys(sources)]
     console = Console(stderr=as_json)
     outcomes = []
     for plan in plans:
@@ -125,13 +134,15 @@ def _exit_status(outcomes: Sequence[RunOutcome]) -> int:
     return 0 if all(holds) else 1
 
 
-def _plan_source(source: str, changes: dict[str, Any], wanted: list[str] | None) -> RunPlan:
+def _plan_source(source: str, changes: dict[str, Any], wanted: list[str] | None, bicycle: Bicycle | None) -> RunPlan:
     from ..run import plan_run
     from ..scenario import load_scenario
 
-    name, scenario = load_scenario(source, changes, "--set")
+    name, scenario = load_scenario(source, changes, "--set", bicycle)
     try:
         return plan_run(name, scenario, wanted)
+    except MissingMotionError as error:
+        raise MissingMotionError(f"{source}: {error}", error.reason) from error
     except ScenarioError as error:
         raise ScenarioError(f"{source}: {error}") from error
 

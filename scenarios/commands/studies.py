@@ -9,11 +9,14 @@ import typer
 
 from .completion import complete_engine, complete_scenario
 from .options import (
+    BicycleOption,
     ChangesOption,
     DurationOption,
     JsonOption,
     TracebackOption,
+    answering_missing_motion,
     ending_with,
+    load_bicycle,
     parse_changes,
     print_json,
     print_traceback,
@@ -60,6 +63,7 @@ def precision_command(
     ] = None,
     change: ChangesOption = None,
     duration: DurationOption = None,
+    bicycle: BicycleOption = None,
     levels: Annotated[
         int,
         typer.Option(
@@ -81,10 +85,11 @@ def precision_command(
     from .progress import ProgressBars
 
     changes = parse_changes(change, duration)
-    name, loaded = load_scenario(scenario, changes, "--set")
+    other = None if bicycle is None else load_bicycle(bicycle).bicycle
+    name, loaded = load_scenario(scenario, changes, "--set", other)
     if out is not None:
         make_folder(out)  # first, so that no work is lost if it fails
-    with showing_traceback(traceback), ProgressBars() as progress:
+    with answering_missing_motion(as_json), showing_traceback(traceback), ProgressBars() as progress:
         trace = print_traceback if traceback else None
         document = study_precision(name, loaded, engine, levels, eigenvalues, progress.watch, trace)
     written = [] if out is None else write_precision(document, out)

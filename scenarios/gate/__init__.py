@@ -1,6 +1,6 @@
 """The drift gate: compare gated scenarios in every engine with committed baselines."""
 
-from .checks import check_gate, refused_verdicts, update_baselines
+from .checks import check_gate, list_bicycle_warnings, refused_verdicts, update_baselines
 from .ci_files import UNFINISHED_JUNIT, UNFINISHED_MARKDOWN, junit_xml, markdown_page
 from .verdict import SHOWN, Verdict
 
@@ -11,6 +11,7 @@ __all__ = [
     "Verdict",
     "check_gate",
     "junit_xml",
+    "list_bicycle_warnings",
     "markdown_page",
     "refused_verdicts",
     "update_baselines",

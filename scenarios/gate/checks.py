@@ -145,6 +145,24 @@ def check_gate(
     return verdicts, fresh
 
 
+def list_bicycle_warnings(sources: Sequence[str] | None = None) -> dict[str, list[str]]:
+    """Return the warnings about the bicycles of gated scenarios, by the name of the scenario.
+
+    Parameters
+    ----------
+    sources : sequence of str, optional
+        As `check_gate` takes them.
+
+    Returns
+    -------
+    dict
+        Without scenarios whose bicycle is not remarkable.
+    """
+    loaded = (load_gated(source) for source in (sources or gated_names()))
+    found = {name: list(scenario.make_bicycle().warnings()) for name, scenario in loaded}
+    return {name: lines for name, lines in found.items() if lines}
+
+
 def load_gated(source: str) -> tuple[str, Scenario]:
     """Return the name of a scenario, and the scenario with the duration and output rate of the gate."""
     name, scenario = load_scenario(source)

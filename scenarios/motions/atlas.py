@@ -1,4 +1,4 @@
-"""The files of the atlas of the benchmark bicycle, which `velodrome atlas` writes."""
+"""The files of the atlas of a bicycle, which `velodrome atlas` writes."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from ...reference.atlas import ATLAS_SIZE, Atlas, Boundary, compute_atlas, spacing
-from ...reference.bicycle import Bicycle
 from ...reference.rideability import OBSTACLES
 from ...reference.stability import VARIABLES
-from ..error import ScenarioError
+from ..error import MissingMotionError, ScenarioError
 from ..files import make_folder, write_json
-from .families import critical_entry
+from ..scenario import BicycleFile, name_bicycle
+from .families import check_inertia, critical_entry
 
 SMALLEST, LARGEST = 1000, 20_000_000  # number of motions; the largest atlas takes 3 GB
 UNITS = {
@@ -37,12 +37,18 @@ _SAMPLED = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "ra
 
 
 def make_atlas(
-    out: Path, size: int = ATLAS_SIZE, largest: float = 1.0, progress: Callable[[float], None] = lambda _: None
+    source: BicycleFile,
+    out: Path,
+    size: int = ATLAS_SIZE,
+    largest: float = 1.0,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> dict[str, Any]:
     """Compute the atlas and write ``atlas.parquet``, ``boundaries.json`` and the figures into a folder.
 
     Parameters
     ----------
+    source : BicycleFile
+        The bicycle.
     out : Path
         The folder, which is made if it does not exist.
     size : int
@@ -59,8 +65,11 @@ def make_atlas(
 
     Raises
     ------
+    MissingMotionError
+        If the bicycle has none of the families.
     ScenarioError
-        If the size or the largest alpha is out of range, or the folder cannot be made.
+        If the size or the largest alpha is out of range, the bicycle's equations are singular, or the folder cannot be
+        made.
     """
     from ...reports.figures import growth_figure, stable_figure
 
@@ -68,10 +77,14 @@ def make_atlas(
         raise ScenarioError(f"--size {size}: an atlas has from {SMALLEST} to {LARGEST} motions")
     if not 0 < largest <= 1:
         raise ScenarioError(f"--largest {largest!r}: it must lie above 0 and not above 1, in 1/m")
+    check_inertia(source.bicycle)
     make_folder(out)
     alphas, longest = spacing(size, largest)
-    found = compute_atlas(Bicycle(), alphas, longest, lambda fraction: progress(0.9 * fraction))
-    columns, document = atlas_columns(found), atlas_document(found)
+    try:
+        found = compute_atlas(source.bicycle, alphas, longest, lambda fraction: progress(0.9 * fraction))
+    except ValueError as error:
+        raise MissingMotionError(f"no atlas of {source.name}: {error}", "no-such-motion") from error
+    columns, document = atlas_columns(found), atlas_document(found, source.name)
     # Bit k of the column `obstacles` says whether a motion meets obstacle k.
     facts = {"longest_step": longest, "bicycle": asdict(found.bicycle), "obstacles": list(OBSTACLES)}
     write_atlas(columns, out / "atlas.parquet", facts)
@@ -125,9 +138,10 @@ def write_atlas(columns: dict[str, np.ndarray], path: Path, facts: dict[str, Any
     )
 
 
-def atlas_document(found: Atlas) -> dict[str, Any]:
+def atlas_document(found: Atlas, bicycle_name: str | None = None) -> dict[str, Any]:
     """Return the document of the atlas: boundaries of the stable sections, critical points and absent families."""
     return {
+        **name_bicycle(found.bicycle, bicycle_name),
         "alphas": found.alphas.tolist(),
         "motions": found.size,
         "stable": [_describe_boundary(boundary) for boundary in found.boundaries],

@@ -13,11 +13,13 @@ from ...reference.contact import observe
 from ...reference.families import find_motion
 from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.kinematics import YAW
+from ...reference.missing_motion import NoSuchMotion, SearchFailed
+from ...reference.regularity import require_inertia, require_inertia_in_turns
 from ...reference.rideability import assess_state, explain_motion
 from ...reference.stability import growth_rate, linearise
 from ...reference.surface import SurfaceOfRevolution
 from ..error import ScenarioError
-from ..scenario import name_surface, show_value
+from ..scenario import describe_missing_motion, name_bicycle, name_surface, show_value
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -26,12 +28,13 @@ class CircularSolution:
 
     Parameters
     ----------
+    bicycle : Bicycle
     motion : CircularMotion
         The 21 constants of the motion (Xiong et al. 2020, Eqs. 9-14).
     surface : SurfaceOfRevolution
         The ground.
     family : int or None
-        Number of the family, 1 to 4; None for a curve without a number.
+        Number of the family, 1 to 4; None for a curve without a number, and for a straight motion.
     contact_point : numpy.ndarray, shape (2, 3)
         Contact points of the rear and the front wheel in the heading frame [m].
     normal_force : numpy.ndarray, shape (2,)
@@ -53,6 +56,7 @@ class CircularSolution:
         Inputs that are held in the motion.
     """
 
+    bicycle: Bicycle = field(repr=False)
     motion: CircularMotion
     surface: SurfaceOfRevolution = field(repr=False)
     family: int | None
@@ -89,9 +93,10 @@ class CircularSolution:
         stable = "Lyapunov stable" if self.lyapunov_stable else "not Lyapunov stable"
         ground = name_surface(self.surface)
         where = f"alpha {ground['alpha']:g} 1/m" if ground["alpha"] is not None else show_value(repr(self.surface))
+        kind = "straight" if motion.is_straight else f"family {self.family}"
         return "\n".join(
             [
-                f"CircularSolution: family {self.family}, {where}",
+                f"CircularSolution: {kind}, {where}",
                 *([f"  inputs: {self.inputs.describe()}"] if self.inputs != NO_INPUTS else []),
                 f"  rates [rad/s]: {rates}",
                 f"  angles [rad]: {angles}",
@@ -107,12 +112,13 @@ class CircularSolution:
             return f"cannot be ridden: {'; '.join(self.unphysical_because)}"
         return f"can be ridden with a coefficient of friction of {self.required_friction:.6g}"
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the JSON document of `velodrome circular`."""
+    def as_json(self, bicycle_name: str | None = None) -> dict[str, Any]:
+        """Return the JSON document of `velodrome circular`; see `name_bicycle` for the name."""
         motion = self.motion
         names = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch")
         return {
             **name_surface(self.surface),
+            **name_bicycle(self.bicycle, bicycle_name),
             "family": self.family,
             "inputs": asdict(self.inputs),
             **{name: getattr(motion, name) for name in names},
@@ -162,18 +168,25 @@ def solve_circular(
 
     Raises
     ------
-    ScenarioError
+    MissingMotionError
         If there is no such motion.
+    ScenarioError
+        If an argument is invalid, or the bicycle's equations of motion are singular.
     """
     try:
+        require_inertia_in_turns(bicycle)
         number, motion = find_motion(bicycle, surface, rear_rate, family, near, inputs)
         q, qd = motion.state()
+        require_inertia(bicycle, surface, q)
         reduced = linearise(bicycle, surface, q, qd, inputs)
+    except (NoSuchMotion, SearchFailed) as error:
+        raise describe_missing_motion(error) from error
     except ValueError as error:
         raise ScenarioError(str(error)) from error
     contact = observe(bicycle, surface, q[None], qd[None])
     rideability = assess_state(bicycle, surface, q, motion.contact, motion.force)
     return CircularSolution(
+        bicycle=bicycle,
         motion=motion,
         surface=surface,
         family=number,

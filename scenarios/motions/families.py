@@ -10,20 +10,22 @@ from typing import Any
 import numpy as np
 
 from ...reference.bicycle import Bicycle
-from ...reference.critical import CriticalPoint, last_stable, reconnections
+from ...reference.critical import CriticalPoint, describe_gaps, last_stable, reconnections
 from ...reference.curve import Samples
-from ...reference.families import FAMILIES, Family, trace_all
+from ...reference.families import FAMILIES, Family, trace, trace_all
 from ...reference.inputs import NO_INPUTS, Inputs
+from ...reference.missing_motion import NoSuchMotion
 from ...reference.modes import MODES, follow_modes
+from ...reference.regularity import require_inertia_in_turns
 from ...reference.rideability import Rideability
 from ...reference.rideable_parts import PartEnd, assess_family, find_rideable_parts, find_rideable_parts_of_section
 from ...reference.sections import SectionEnd, sample_family, stable_sections
 from ...reference.special import SpecialPoint, special_points
-from ...reference.surface import Surface, SurfaceOfRevolution
+from ...reference.surface import Paraboloid, Surface, SurfaceOfRevolution
 from ...reports.measure import to_number
 from ..error import ScenarioError
 from ..files import make_folder, write_json
-from ..scenario import make_bowl, name_surface
+from ..scenario import describe_missing_motion, make_bowl, name_bicycle, name_surface
 
 # Longest step along the arc: 100 to 300 points per family. No known stable section is shorter than three steps.
 LONGEST_DRAWN_STEP = 0.05
@@ -131,6 +133,7 @@ class SolutionFamilies:
 
     Attributes
     ----------
+    bicycle : Bicycle
     surface : SurfaceOfRevolution
     curves : tuple of FamilyCurve
         The families by number, then further curves, each with the number of the family that it was a part of.
@@ -140,15 +143,17 @@ class SolutionFamilies:
         Inputs that are held in all motions. With a steer torque no curve has a number.
     """
 
+    bicycle: Bicycle
     surface: SurfaceOfRevolution
     curves: tuple[FamilyCurve, ...]
     absent: dict[int, str]
     inputs: Inputs = NO_INPUTS
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the JSON document of `velodrome families`."""
+    def as_json(self, bicycle_name: str | None = None) -> dict[str, Any]:
+        """Return the JSON document of `velodrome families`; see `name_bicycle` for the name."""
         return {
             **name_surface(self.surface),
+            **name_bicycle(self.bicycle, bicycle_name),
             "inputs": asdict(self.inputs),
             "modes": list(MODES),  # names of the columns of eigenvalues
             "families": [curve.as_json() for curve in self.curves],
@@ -162,6 +167,7 @@ class CriticalShapes:
 
     Attributes
     ----------
+    bicycle : Bicycle
     cusp_collision : CriticalPoint or None
         The point at which the cusps of families 2 and 4 meet; None if they do not meet.
     last_stable : dict
@@ -169,11 +175,17 @@ class CriticalShapes:
         has no stable section.
     merging : tuple of CriticalPoint
         The points at which families exchange parts, sorted by alpha.
+    not_found : dict
+        By number of a family that could not be followed at every alpha, or of which a point could not be solved: the
+        reason. Families are those of the benchmark; on another bicycle they may end, and what happens on curves
+        without a number is not looked for.
     """
 
+    bicycle: Bicycle
     cusp_collision: CriticalPoint | None
     last_stable: dict[int, CriticalPoint | None]
     merging: tuple[CriticalPoint, ...]
+    not_found: dict[int, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         def show(point: CriticalPoint | None) -> str:
@@ -189,15 +201,18 @@ class CriticalShapes:
                 f"  cusps of families 2 and 4 meet: {show(self.cusp_collision)}",
                 f"  last stable section vanishes: {last}",
                 f"  families exchange parts: {merging or 'none'}",
+                *(f"  family {number} not followed: {reason}" for number, reason in self.not_found.items()),
             ]
         )
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the JSON document of `velodrome critical`."""
+    def as_json(self, bicycle_name: str | None = None) -> dict[str, Any]:
+        """Return the JSON document of `velodrome critical`; see `name_bicycle` for the name."""
         return {
+            **name_bicycle(self.bicycle, bicycle_name),
             "cusp_collision": _entry_or_null(self.cusp_collision),
             "last_stable": {str(number): _entry_or_null(point) for number, point in self.last_stable.items()},
             "merging": [{"families": list(point.families)} | critical_entry(point) for point in self.merging],
+            "not_found": {str(number): reason for number, reason in self.not_found.items()},
         }
 
 
@@ -217,14 +232,27 @@ def follow_families(bicycle: Bicycle, surface: SurfaceOfRevolution, inputs: Inpu
 
     Raises
     ------
-    ScenarioError
+    MissingMotionError
         If there is a torque on the rear wheel, with which there is no circular motion.
+    ScenarioError
+        If the bicycle's equations of motion are singular.
     """
+    check_inertia(bicycle)
     try:
         curves, absent = trace_all(bicycle, surface, LONGEST_DRAWN_STEP, inputs)
+    except NoSuchMotion as error:
+        raise describe_missing_motion(error) from error
+    return SolutionFamilies(
+        bicycle=bicycle, surface=surface, curves=tuple(map(examine_curve, curves)), absent=absent, inputs=inputs
+    )
+
+
+def check_inertia(bicycle: Bicycle) -> None:
+    """Raise a ScenarioError if a bicycle's equations of motion are singular in turns."""
+    try:
+        require_inertia_in_turns(bicycle)
     except ValueError as error:
-        raise ScenarioError(str(error)) from error
-    return SolutionFamilies(surface=surface, curves=tuple(map(examine_curve, curves)), absent=absent, inputs=inputs)
+        raise ScenarioError(f"bicycle: {error}") from error
 
 
 def examine_curve(family: Family) -> FamilyCurve:
@@ -280,13 +308,46 @@ def find_critical_shapes(bicycle: Bicycle, watch: Callable[[str, float, float], 
     -------
     CriticalShapes
     """
+    check_inertia(bicycle)
     merging = reconnections(bicycle, lambda alpha: watch("merging", alpha, 1.0))
-    stable = {}
+    stable: dict[int, CriticalPoint | None] = {}
+    not_found: dict[int, str] = {}
     for number in FAMILIES:
         watch("last stable", float(number), float(len(FAMILIES)))
-        stable[number] = last_stable(bicycle, number)
-    collision = next((point for point in merging if point.families == (2, 4)), None)
-    return CriticalShapes(cusp_collision=collision, last_stable=stable, merging=tuple(merging))
+        reasons = []
+        try:
+            stable[number] = last_stable(bicycle, number)
+        except ValueError as error:
+            stable[number] = None
+            reasons.append(str(error))
+        gaps = describe_gaps(bicycle, number)
+        reasons += [] if gaps is None else [gaps]
+        if reasons:
+            not_found[number] = "; ".join(reasons)
+    collision = next((point for point in merging if _do_cusps_meet(bicycle, point)), None)
+    return CriticalShapes(
+        bicycle=bicycle,
+        cusp_collision=collision,
+        last_stable=stable,
+        merging=tuple(merging),
+        not_found=not_found,
+    )
+
+
+def _do_cusps_meet(bicycle: Bicycle, point: CriticalPoint) -> bool:
+    """Return whether the cusps D and I meet in a point where families 2 and 4 touch.
+
+    Curves of another bicycle may touch in other points. Both cusps are there at a smaller alpha, if they are to meet.
+    """
+    if point.families != (2, 4):
+        return False
+    names = set()
+    for number in point.families:
+        try:
+            names |= {one.name for one in special_points(trace(bicycle, Paraboloid(0.98 * point.alpha), number))}
+        except ValueError:
+            return False
+    return {"D", "I"} <= names
 
 
 def critical_entry(point: CriticalPoint) -> dict[str, Any]:
@@ -321,7 +382,7 @@ def write_families(document: Mapping[str, Any], out: Path) -> None:
 
     make_folder(out)
     write_json(out / "families.json", document)
-    family_figure(out / "families.png", document, Bicycle().front_wheel_radius)
+    family_figure(out / "families.png", document, document["bicycle"]["parameters"]["front_wheel_radius"])
 
 
 def _describe_section(start: SectionEnd, end: SectionEnd, parts: Sequence[tuple[PartEnd, PartEnd]]) -> dict[str, Any]:

@@ -1,10 +1,12 @@
 """Scenario files: their schema, surfaces, engine settings and start."""
 
 from .bicycle_file import BicycleFile, read_bicycle_file
+from .bicycle_source import BENCHMARK, find_bicycle, insert_bicycle_file, name_bicycle
 from .engine_settings import configure_engine, installed_engines, list_engine_faults, refuse_engine
 from .parameters import PARAMETERS
 from .resolved import resolve_scenario
 from .schema import (
+    BICYCLE_FILE,
     OF_THE_MOTION,
     CircularTable,
     Gate,
@@ -15,7 +17,7 @@ from .schema import (
     read_scenario_file,
     validate_scenario,
 )
-from .start import Start, make_start, output_times
+from .start import Start, describe_missing_motion, make_start, output_times
 from .surfaces import make_bowl, name_surface, parse_surface
 from .table import (
     Table,
@@ -30,6 +32,8 @@ from .table import (
 )
 
 __all__ = [
+    "BENCHMARK",
+    "BICYCLE_FILE",
     "OF_THE_MOTION",
     "PARAMETERS",
     "BicycleFile",
@@ -41,8 +45,11 @@ __all__ = [
     "Table",
     "Texts",
     "configure_engine",
+    "describe_missing_motion",
     "error_place",
+    "find_bicycle",
     "format_validation_error",
+    "insert_bicycle_file",
     "installed_engines",
     "join_complaints",
     "library_names",
@@ -51,6 +58,7 @@ __all__ = [
     "load_scenario",
     "make_bowl",
     "make_start",
+    "name_bicycle",
     "name_surface",
     "output_times",
     "parse_surface",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -14,6 +15,7 @@ from ...reference.inputs import Inputs
 from ..error import ScenarioError
 from ..names import LIBRARY as LIBRARY
 from ..names import list_library
+from .bicycle_source import FILE, insert_bicycle_file
 from .engine_settings import list_engine_faults
 from .parameters import PARAMETERS
 from .surfaces import SurfaceTable
@@ -22,6 +24,8 @@ from .table import Table, Texts, join_complaints, list_complaints, read_toml, se
 # Tables of a scenario that determine its motion.
 OF_THE_MOTION = ("surface", "motion", "perturbation", "bicycle", "inputs")
 
+# Description of the key `file`.
+BICYCLE_FILE = "bicycle file, from the scenario's folder, that gives every parameter not named beside it"
 
 # Larger than any value of a real bicycle, and small enough that products do not overflow.
 _Moderate = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -141,6 +145,7 @@ def _list_parameters(schema: dict[str, Any]) -> None:
         name: value | {"default": getattr(benchmark, name), "description": meaning, "unit": unit}
         for name, (unit, meaning) in PARAMETERS.items()
     }
+    schema["properties"][FILE] = {"type": "string", "description": BICYCLE_FILE}
     schema["additionalProperties"] = False
 
 
@@ -243,7 +248,10 @@ def library_names() -> list[str]:
 
 
 def load_scenario(
-    source: str, changes: Mapping[str, Any] | None = None, given_by: str = "changes:"
+    source: str,
+    changes: Mapping[str, Any] | None = None,
+    given_by: str = "changes:",
+    bicycle: Bicycle | None = None,
 ) -> tuple[str, Scenario]:
     """Read a scenario by library name or path, apply changes, and validate the result.
 
@@ -255,6 +263,8 @@ def load_scenario(
         Dotted key to value, e.g. ``{"simulation.duration": 5.0}``.
     given_by : str
         What the changes were given by, for errors: an argument or an option.
+    bicycle : Bicycle, optional
+        Replaces the scenario's bicycle, its whole table ``[bicycle]``, before the changes apply.
 
     Returns
     -------
@@ -281,12 +291,19 @@ def load_scenario(
         data = read_toml(text)
     except ValueError as error:
         raise ScenarioError(f"{show_value(source)}: not valid TOML: {show_value(str(error))}") from error
+    if bicycle is not None:
+        data = {**data, "bicycle": asdict(bicycle)}
     faults = []
     for key, value in (changes or {}).items():
         try:
-            data = set_keys(data, {key: value})
+            data = set_keys(data, {key: _locate_change(key, value, bicycle)})
         except ValueError as error:
             faults.append(f"{given_by} {error}")
+    try:
+        data = insert_bicycle_file(data, LIBRARY if name == source else Path(source).parent)
+    except ScenarioError as error:
+        faults.append(str(error) if f"bicycle.{FILE}" in (changes or {}) else f"{show_value(source)}: {error}")
+        data = {**data, "bicycle": {key: value for key, value in data["bicycle"].items() if key != FILE}}
     try:
         scenario = validate_scenario(data, source)
     except ScenarioError as error:
@@ -297,6 +314,21 @@ def load_scenario(
         if not faults:
             return name, scenario
     raise ScenarioError(join_complaints(faults))
+
+
+def _locate_change(key: str, value: Any, bicycle: Bicycle | None) -> Any:
+    """Return the value of a change; a bicycle file is named from the working folder, not from the scenario's.
+
+    Raises
+    ------
+    ValueError
+        If the change names a bicycle file, and the scenario's bicycle has been replaced by another one already.
+    """
+    if key != f"bicycle.{FILE}":
+        return value
+    if bicycle is not None:
+        raise ValueError(f"{key}: the bicycle is given already")
+    return str(Path(value).absolute()) if isinstance(value, str) and Path(value).is_file() else value
 
 
 def validate_scenario(data: Mapping[str, Any], source: str) -> Scenario:

@@ -13,12 +13,14 @@ from ...reference.circular import CircularMotion
 from ...reference.dae import consistent_state
 from ...reference.families import find_motion
 from ...reference.kinematics import LEAN, REAR_ANGLE, STEER, YAW, body_positions
+from ...reference.missing_motion import NoSuchMotion, SearchFailed
+from ...reference.regularity import require_inertia
 from ...reference.rideability import require_standing
 from ...reference.rim import require_clear_rims
 from ...reference.stability import growth_rate, linearise
 from ...reference.surface import Plane, Surface, SurfaceOfRevolution, evaluate
 from ...reference.wheel_overlap import require_separate_wheels
-from ..error import ScenarioError
+from ..error import MissingMotionError, ScenarioError
 from .schema import CircularTable, Scenario, Simulation, UprightTable
 from .surfaces import make_bowl
 
@@ -38,6 +40,7 @@ class Start:
     family : int or None
         Family of the circular motion; None for an upright start.
     motion : CircularMotion or None
+        None for an upright start.
     growth_rate : float
         Largest real part of the motion's eigenvalues that symmetry does not fix [1/s]. On ground without symmetry,
         where no motion is steady, the value is that of the same start on the level plane. Of a straight start with
@@ -59,25 +62,37 @@ def make_start(scenario: Scenario) -> Start:
 
     Raises
     ------
+    MissingMotionError
+        If there is no such motion.
     ScenarioError
-        If there is no such motion, or its disturbed state cannot be reached, has a rim inside the ground or
-        wheels that overlap.
+        If its disturbed state cannot be reached, has a rim inside the ground, wheels that overlap, or singular
+        equations.
     """
     bicycle, surface = scenario.make_bicycle(), scenario.surface.make()
     try:
         # Unrealistic parameters may overflow in between; the results are checked.
         with np.errstate(all="ignore"):
             family, motion, q, qd = _compute_undisturbed(scenario, bicycle, surface)
+            require_inertia(bicycle, surface, q)
             rate = _compute_growth_rate(scenario, bicycle, surface, q, qd)
             undisturbed, (q, qd) = (q, qd), _disturb_state(scenario, bicycle, surface, q, qd)
+            require_inertia(bicycle, surface, q)
             require_clear_rims(bicycle, surface, q)
             require_separate_wheels(bicycle, q)
+    except (NoSuchMotion, SearchFailed) as error:
+        raise describe_missing_motion(error, "motion: ") from error
     except (ValueError, ArithmeticError) as error:
         raise ScenarioError(f"motion: {error}") from error
     times = output_times(scenario.simulation)
     size = float(np.hypot(*motion.position[:2])) if motion is not None else bicycle.wheelbase
     problem = Problem(bicycle, surface, q, qd, times, scenario.make_inputs())
     return Start(problem, undisturbed, family, motion, rate, size)
+
+
+def describe_missing_motion(error: NoSuchMotion | SearchFailed, place: str = "") -> MissingMotionError:
+    """Return the error for users of a search without a result; ``place`` precedes its message."""
+    message = f"{place}{error}"
+    return MissingMotionError(message, "no-such-motion" if isinstance(error, NoSuchMotion) else "search-failed")
 
 
 def output_times(simulation: Simulation) -> np.ndarray:
@@ -105,7 +120,8 @@ def _compute_undisturbed(
         where, inputs = (bicycle, make_bowl(surface)), scenario.make_inputs()
         family, motion = _find_motion(*where, table.rear_rate, table.family, near, inputs)  # type: ignore[arg-type]
         require_standing(bicycle, surface, motion)
-        return family, motion, *motion.state()
+        # A straight motion is an upright start: it has no circle.
+        return family, None if motion.is_straight else motion, *motion.state()
     rates = (0.0, 0.0, table.speed / bicycle.rear_wheel_radius)
     # Where the disturbed bicycle stands: there may be no ground at the origin.
     place = (float(bicycle.reference_point[0]) + scenario.perturbation.x, scenario.perturbation.y)

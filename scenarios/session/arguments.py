@@ -15,7 +15,7 @@ from ...reference.bicycle import Bicycle
 from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.surface import Surface
 from ..error import ScenarioError
-from ..scenario import parse_surface, show_value
+from ..scenario import find_bicycle, parse_surface, show_value
 
 
 def read_path(name: str, value: Any) -> Path:
@@ -215,17 +215,24 @@ def read_ground(alpha: Any, surface: Any) -> Surface | float:
 
 
 def read_bicycle(bicycle: Any) -> Bicycle:
-    """Return the bicycle, the benchmark bicycle if it is None.
+    """Return the bicycle, the benchmark bicycle if it is None, that of a file if it is a path.
 
     Raises
     ------
     ScenarioError
-        If it is no bicycle.
+        If it is no bicycle, or the file cannot be read.
     """
     if bicycle is None:
         return Bicycle()
+    if isinstance(bicycle, str | os.PathLike):
+        source = str(read_path("bicycle", bicycle))
+        try:
+            return find_bicycle(source).bicycle
+        except ScenarioError as error:
+            named = f"bicycle is {show_value(repr(source))}; it must be a Bicycle or the path of a bicycle file"
+            raise ScenarioError(f"{named}: {error}") from error
     if not isinstance(bicycle, Bicycle):
-        raise _refuse("bicycle", bicycle, "it must be a Bicycle, such as Bicycle(trail=0.1)")
+        raise _refuse("bicycle", bicycle, "it must be a Bicycle, such as Bicycle(trail=0.1), or a bicycle file")
     return bicycle
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 from ...reference.bicycle import Bicycle
 from ...reference.inputs import Inputs
@@ -34,7 +35,7 @@ def circular(
     surface: Surface | str | None = None,
     family: int | None = None,
     near: tuple[float, float] | None = None,
-    bicycle: Bicycle | None = None,
+    bicycle: Bicycle | str | Path | None = None,
     inputs: Inputs | None = None,
 ) -> CircularSolution:
     """Compute one circular motion, hands-free or with constant inputs, its contact forces and its stability.
@@ -51,9 +52,9 @@ def circular(
     family : int, optional
         Solution family, 1 to 4. Either this or ``near`` is needed; both if the family has several motions.
     near : tuple of float, optional
-        Lean and steer that the motion is near to [rad].
-    bicycle : Bicycle, optional
-        The benchmark bicycle if not given.
+        Lean and steer that the motion is near to [rad]; on the level plane (0, 0) is straight motion.
+    bicycle : Bicycle, str or Path, optional
+        A bicycle, or a bicycle file as `velodrome bicycle` reads it; the benchmark bicycle if not given.
     inputs : Inputs, optional
         Torques and steer damping that are held; none if not given. With a steer torque the families have no numbers,
         and ``near`` is needed.
@@ -64,8 +65,10 @@ def circular(
 
     Raises
     ------
+    MissingMotionError
+        If there is no such motion.
     ScenarioError
-        If there is no such motion, an argument has a wrong type or value, or the ground is given twice, not at all or
+        If an argument has a wrong type or value, or the ground is given twice, not at all or
         is no surface of revolution.
 
     Examples
@@ -87,7 +90,7 @@ def families(
     *,
     alpha: float | None = None,
     surface: Surface | str | None = None,
-    bicycle: Bicycle | None = None,
+    bicycle: Bicycle | str | Path | None = None,
     inputs: Inputs | None = None,
 ) -> SolutionFamilies:
     """Follow the four families of circular motions, with special points and stable sections.
@@ -98,8 +101,8 @@ def families(
         Shape of the bowl z = alpha (x^2 + y^2) [1/m]; 0 is the level plane. Either this or ``surface`` is needed.
     surface : Surface or str, optional
         Another surface of revolution about z, or the text that names it, such as ``"sphere:radius=20"``.
-    bicycle : Bicycle, optional
-        The benchmark bicycle if not given.
+    bicycle : Bicycle, str or Path, optional
+        A bicycle, or a bicycle file as `velodrome bicycle` reads it; the benchmark bicycle if not given.
     inputs : Inputs, optional
         Torques and steer damping that are held; none if not given. With a steer torque no curve has a number.
 
@@ -126,7 +129,7 @@ def families(
 
 
 def critical(
-    *, bicycle: Bicycle | None = None, progress: Callable[[str, float, float], None] | None = None
+    *, bicycle: Bicycle | str | Path | None = None, progress: Callable[[str, float, float], None] | None = None
 ) -> CriticalShapes:
     """Compute the critical shapes of the paraboloid; this takes half a minute.
 
@@ -134,8 +137,8 @@ def critical(
 
     Parameters
     ----------
-    bicycle : Bicycle, optional
-        The benchmark bicycle if not given.
+    bicycle : Bicycle, str or Path, optional
+        A bicycle, or a bicycle file as `velodrome bicycle` reads it; the benchmark bicycle if not given.
     progress : callable, optional
         Called with the name of the stage, the value reached and the largest value.
 

@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from ...engines.engine import Settings
+from ...reference.bicycle import Bicycle
 from ..run import RunPlan, RunResult, measure_run, plan_run, ride_plan, store_run, write_run_recording
 from ..scenario import Scenario, load_scenario
 from .arguments import (
     ignore_progress,
     plain_value,
+    read_bicycle,
     read_changes,
     read_engines,
     read_path,
@@ -30,6 +32,7 @@ def run(
     out: str | Path | None = None,
     settings: Mapping[str, Mapping[str, Any] | Settings] | None = None,
     changes: Mapping[str, Any] | None = None,
+    bicycle: Bicycle | str | Path | None = None,
     progress: Callable[[str, float, float], None] | None = None,
 ) -> Run:
     """Run a scenario in every engine from the same computed start and compare the results with the reference.
@@ -49,6 +52,9 @@ def run(
         Settings by engine, as a mapping or an instance of its `Settings`. They override the scenario's.
     changes : mapping, optional
         Fields of the scenario to override, by dotted key, such as ``{"perturbation.lean_rate": 0.2}``.
+    bicycle : Bicycle, str or Path, optional
+        A bicycle, or a bicycle file as `velodrome bicycle` reads it, that replaces the scenario's; ``changes`` of
+        single parameters apply to it.
     progress : callable, optional
         Called with the engine at work, the simulated time that it has reached and the duration [s]. An exception that
         it raises ends the run and is raised unchanged, so that a run can be cancelled.
@@ -60,8 +66,10 @@ def run(
 
     Raises
     ------
+    MissingMotionError
+        If the motion does not exist.
     ScenarioError
-        If an argument has a wrong type or value, or the motion does not exist: one line that names the argument.
+        If an argument has a wrong type or value: one line that names the argument.
     KeyboardInterrupt
         If Ctrl-C was pressed or ``progress`` raised it; with ``out`` the engines that were done are in the run folder.
     Exception
@@ -83,7 +91,8 @@ def run(
     fields = read_changes(changes)
     if duration is not None:
         fields["simulation.duration"] = plain_value(duration)
-    name, resolved = load_scenario(str(scenario), fields)
+    other = None if bicycle is None else read_bicycle(bicycle)
+    name, resolved = load_scenario(str(scenario), fields, bicycle=other)
     plan = plan_run(name, _with_settings(resolved, given), wanted)
     if into is None:
         folder, result = None, measure_run(plan, ride_plan(plan, watch, ignore_progress))

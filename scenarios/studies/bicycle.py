@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...engines.names import suggest_name
-from ...reference.bicycle import Bicycle
+from ...reference.regularity import require_inertia_upright
 from ...reference.upright import (
     CanonicalMatrices,
     StabilityChange,
@@ -24,9 +23,7 @@ from ...reference.upright import (
 )
 from ..error import ScenarioError
 from ..files import make_folder, write_json
-from ..scenario import BicycleFile, library_names, load_scenario, read_bicycle_file, read_toml, show_value
-
-BENCHMARK = "benchmark"
+from ..scenario import BicycleFile
 
 
 @dataclass(frozen=True)
@@ -94,40 +91,6 @@ def _split_complex(values: np.ndarray) -> list[list[list[float]]]:
     return [[[value.real, value.imag] for value in row] for row in values.tolist()]
 
 
-def find_bicycle(source: str) -> BicycleFile:
-    """Find a bicycle by name, or read it from a bicycle file or a scenario.
-
-    Parameters
-    ----------
-    source : str
-        ``benchmark``, a bicycle file (see `read_bicycle_file`), or a scenario by library name or path.
-
-    Raises
-    ------
-    ScenarioError
-        If the source cannot be found or read.
-    """
-    if source == BENCHMARK:
-        return BicycleFile(BENCHMARK, Bicycle(), convention="the suite's names, z up")
-    path = Path(source)
-    if path.suffix == ".toml" and path.is_file():
-        try:
-            is_scenario = bool({"motion", "simulation"} & set(read_toml(path.read_text(encoding="utf-8-sig"))))
-        except (OSError, ValueError):
-            is_scenario = False  # `read_bicycle_file` reports the fault
-        if not is_scenario:
-            return read_bicycle_file(path)
-    elif path.suffix or path.exists():
-        return read_bicycle_file(path)
-    elif source not in library_names():
-        raise ScenarioError(
-            f"no bicycle {show_value(repr(source))}: give {BENCHMARK}, a bicycle file (BicycleParameters or TOML), "
-            f"or a scenario ({suggest_name(source, [BENCHMARK, *library_names()])})"
-        )
-    name, scenario = load_scenario(source)
-    return BicycleFile(name, scenario.make_bicycle(), convention="the suite's names, z up")
-
-
 def study_bicycle(source: BicycleFile, speeds: np.ndarray, steer_damping: float = 0.0) -> BicycleStudy:
     """Compute a bicycle's canonical matrices, its eigenvalues over speed, and where its stability changes.
 
@@ -146,10 +109,11 @@ def study_bicycle(source: BicycleFile, speeds: np.ndarray, steer_damping: float 
     Raises
     ------
     ScenarioError
-        If the equations of lean and steer are singular.
+        If the equations of lean and steer are singular; it names the motion without inertia.
     """
     matrices = canonical_matrices(source.bicycle, steer_damping)
     try:
+        require_inertia_upright(source.bicycle)
         eigenvalues = matrices.eigenvalues(speeds)
         followed, modes = name_modes(matrices, speeds)
     except ValueError as error:

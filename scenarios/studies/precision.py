@@ -19,7 +19,7 @@ from ...reports.measure import Identified, Level, comparison_horizon, eigenvalue
 from ..error import ScenarioError
 from ..files import make_folder, write_json
 from ..run import RunPlan, RunWatch, Trace, claimed_noise, library_versions, measure_one, plan_run
-from ..scenario import Scenario, Start
+from ..scenario import Scenario, Start, name_bicycle
 
 COARSEST = 4.0  # factor on the scenario's step
 STEP_LEVELS = 5
@@ -279,6 +279,7 @@ def _make_document(
         engines[engine] = entry
     return {
         "scenario": name,
+        **name_bicycle(problem.bicycle),
         "duration": _duration(problem),
         "horizon": horizon,
         "growth_rate": start.growth_rate,

@@ -14,6 +14,7 @@ from ..scenario import (
     Scenario,
     Table,
     Texts,
+    insert_bicycle_file,
     join_complaints,
     list_complaints,
     load_scenario,
@@ -167,7 +168,7 @@ def read_sweep(path: Path) -> tuple[SweepFile, dict[str, Any]]:
 def _base(source: Any, path: Path) -> Scenario | None:
     """Return the base scenario; None where its entry is neither text nor a table."""
     if isinstance(source, dict):
-        return validate_scenario(source, "its tables")
+        return validate_scenario(insert_bicycle_file(source, path.parent), "its tables")
     if not isinstance(source, str):
         return None
     return load_scenario(str(path.parent / source) if source.endswith(".toml") else source)[1]

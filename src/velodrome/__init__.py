@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from .reference.surface import Surface as Surface
     from .reference.surface import SurfaceOfRevolution as SurfaceOfRevolution
     from .reference.surface import surface_function as surface_function
+    from .scenarios.error import MissingMotionError as MissingMotionError
     from .scenarios.error import ScenarioError as ScenarioError
     from .scenarios.motions import CircularSolution as CircularSolution
     from .scenarios.motions import CriticalShapes as CriticalShapes
@@ -68,6 +69,7 @@ __all__ = [
     "Inputs",
     "Linearisation",
     "MetricsTable",
+    "MissingMotionError",
     "Paraboloid",
     "Plane",
     "PolynomialProfile",
@@ -115,7 +117,7 @@ _HOMES = {
     ".reference.profile": ("PolynomialProfile", "SplineProfile"),
     ".reference.stability": ("Linearisation", "linearise"),
     ".reference.surface": ("Paraboloid", "Plane", "Surface", "SurfaceOfRevolution", "surface_function"),
-    ".scenarios.error": ("ScenarioError",),
+    ".scenarios.error": ("MissingMotionError", "ScenarioError"),
     ".scenarios.motions": ("CircularSolution", "CriticalShapes", "FamilyCurve", "SolutionFamilies"),
     ".scenarios.session": ("MetricsTable", "Run", "circular", "critical", "families", "load", "run"),
 }

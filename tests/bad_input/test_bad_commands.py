@@ -91,6 +91,7 @@ GROUNDS = [
     *("profile:coefficients=[" + ",".join(["1e6"] * 1000) + "]", "height-field:heights=[[1.0]],spacing=1.0"),
     *("sphere:radius=" + "[" * 3000, "sphere:radius=" + "9" * 5000),
 ]
+TOO_TIGHT = ("sphere:radius=1e-300", GROUNDS[18])
 NEAR = ["", ",", "1", "1,2,3", "a,b", "nan,1", "1e400,0", "1,2\n", "1e300,1e300"]
 
 number, text = st.sampled_from(NUMBERS), st.sampled_from(TEXTS)
@@ -196,8 +197,9 @@ def test_every_bad_setting_is_refused(value: str, folder: Path) -> None:
 def test_every_bad_ground_is_refused(value: str, folder: Path) -> None:
     where = ["--surface", value, "--rear-rate", "18", "--family", "2"]
     status, stdout, stderr = called(["circular", *where], folder)
-    # The plane may be written with nothing after the colon.
-    assert (status, stdout == "") == ((0, False) if value == "plane:" else (2, True))
+    # The plane may be written with nothing after the colon; two of the bowls are possible, but nothing rides in them.
+    expected = 0 if value == "plane:" else 1 if value in TOO_TIGHT else 2
+    assert (status, stdout == "") == (expected, status != 0)
     assert status == 0 or is_one_line(stderr.removesuffix("\n"))
 
 

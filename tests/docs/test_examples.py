@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import runpy
 import shlex
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ import pytest
 import typer
 from pages import DOCS, ROOT, Block, blocks, source_pages
 
+from velodrome.reference.bicycle import Bicycle
 from velodrome.scenarios.cli import app
-from velodrome.scenarios.scenario import read_toml, validate_scenario
+from velodrome.scenarios.scenario import insert_bicycle_file, read_toml, validate_scenario
 from velodrome.scenarios.sweep.file import SweepFile
 
 # Pages whose code takes more than some seconds, and figures other than the first ride's.
@@ -76,7 +78,7 @@ def test_there_are_commands_to_look_at() -> None:
 
 
 @pytest.mark.parametrize("block", TOML, ids=[block.name for block in TOML])
-def test_a_scenario_or_a_sweep_is_valid(block: Block) -> None:
+def test_a_scenario_or_a_sweep_is_valid(block: Block, tmp_path: Path) -> None:
     data = read_toml(block.text)
     if "scenario" in data:
         SweepFile.model_validate(data)
@@ -88,4 +90,7 @@ def test_a_scenario_or_a_sweep_is_valid(block: Block) -> None:
         "motion": {"kind": "upright", "speed": 5.0},
         "simulation": {"duration": 1.0},
     }
-    validate_scenario({**whole, **data}, block.name)
+    if "file" in data.get("bicycle", {}):
+        lines = (f"{name} = {value!r}" for name, value in asdict(Bicycle()).items())
+        (tmp_path / data["bicycle"]["file"]).write_text("\n".join(lines), encoding="utf-8")
+    validate_scenario(insert_bicycle_file({**whole, **data}, tmp_path), block.name)

@@ -116,6 +116,7 @@ DOCUMENTS = {
     "list": ["list --json"],
     "run": [f"{RUN} runs"],
     "circular": ["circular --alpha 0.005 --rear-rate 18 --family 1 --json"],
+    "missing-motion": ["circular --alpha 0.005 --rear-rate 500 --family 2 --json"],
     "families": ["families --alpha 0.005 --json"],
     "manifest": [f"{RUN} runs"],
     "bicycle": ["bicycle --json"],
@@ -130,7 +131,7 @@ DOCUMENTS = {
     "atlas": ["atlas --size 2000 --json"],
     "paper": ["paper --json"],
 }
-QUICK = ("list", "circular", "manifest", "run", "bicycle", "show")
+QUICK = ("list", "circular", "missing-motion", "manifest", "run", "bicycle", "show")
 # What is null or absent in these documents, and other ways to say no.
 SOMETIMES = ("absent", "the reason", "Verdicts", "As in", "that differ", "criterion")
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -74,6 +76,7 @@ def test_critical_shapes_are_the_reference_modules(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(rooms_families, "reconnections", reconnections)
     monkeypatch.setattr(rooms_families, "last_stable", lambda bicycle, number: point if number == 2 else None)
+    monkeypatch.setattr(rooms_families, "describe_gaps", lambda bicycle, number: "no curve" if number == 1 else None)
     told: list[tuple[str, float, float]] = []
     heavy = velodrome.Bicycle(rear_frame_mass=95.0)
     found = velodrome.critical(bicycle=heavy, progress=lambda *seen: told.append(seen))
@@ -87,11 +90,14 @@ def test_critical_shapes_are_the_reference_modules(monkeypatch: pytest.MonkeyPat
         "  last stable section vanishes: family 1 none, family 2 0.012 (cannot be ridden), family 3 none, "
         "family 4 none",
         "  families exchange parts: families 2 and 4 0.012 (cannot be ridden)",
+        "  family 1 not followed: no curve",
     ]
     document = found.as_json()
     assert document["last_stable"]["1"] is None
     assert document["cusp_collision"]["unphysical_because"] == ["the wheels overlap by 1 mm"]
     assert not document["cusp_collision"]["physical"]
+    assert document["not_found"] == {"1": "no curve"}
+    assert document["bicycle"]["parameters"]["rear_frame_mass"] == 95.0
     assert document["cusp_collision"]["alpha"] == document["last_stable"]["2"]["alpha"] == 0.012
 
 
@@ -105,3 +111,22 @@ def test_a_solution_is_shown_in_a_few_lines_and_compared_by_identity() -> None:
     assert lines[0] == "CircularSolution: family 2, alpha 0.005 1/m"
     assert "lean 0.737443, steer 2.83701" in lines[2]
     assert "  Lyapunov stable: growth rate -" in lines[-1]
+
+
+def test_a_bicycle_may_be_a_file_or_a_scenarios() -> None:
+    source = str(Path(__file__).parents[1] / "cases" / "tms-exact.toml")
+    found = velodrome.circular(alpha=0.0, rear_rate=40.0, near=(0.0, 0.0), bicycle=source)
+    assert (found.bicycle.front_wheel_mass, found.motion.yaw_rate, found.family) == (0.0, 0.0, None)
+    assert found.motion.is_straight
+    assert repr(found).startswith("CircularSolution: straight, alpha 0 1/m")
+    with pytest.raises(velodrome.ScenarioError, match=r"nowhere\.txt: there is no such file"):
+        velodrome.circular(alpha=0.0, rear_rate=40.0, near=(0.0, 0.0), bicycle=Path("nowhere.txt"))
+
+
+def test_a_missing_motion_has_a_reason() -> None:
+    with pytest.raises(velodrome.MissingMotionError, match="no circular motion found") as told:
+        velodrome.circular(alpha=0.005, rear_rate=500.0, family=2)
+    assert told.value.reason == "no-such-motion"
+    assert told.value.as_json() == {"reason": "no-such-motion", "message": str(told.value)}
+    again = pickle.loads(pickle.dumps(told.value))
+    assert (str(again), again.reason) == (str(told.value), "no-such-motion")

@@ -91,7 +91,7 @@ def test_circular_rounds_to_the_printed_eigenvalues(name: str, stable: bool, vel
 
 def test_circular_has_exactly_its_fields_in_full_precision(velodrome) -> None:
     found = velodrome("circular", *Q2, "--family", "2", "--json").json()
-    assert set(found) == CIRCULAR_FIELDS | {"schema_version"}
+    assert set(found) == CIRCULAR_FIELDS | {"schema_version", "bicycle", "warnings"}
     _, motion = find_motion(Bicycle(), Paraboloid(0.005), 18.0, 2)
     for field in ("front_rate", "yaw_rate", "lean", "steer", "pitch", "residual"):
         assert found[field] == getattr(motion, field), field
@@ -218,7 +218,6 @@ CIRCULAR = ("circular", "--alpha", "0.005")
         ((*RUN, "--set", "engines.exudyn.step=0.003"), ["q2", "engines.exudyn", "0.0025"]),
         ((*RUN, "--set", "engines.exudyn.stepp=0.001"), ["engines.exudyn", "'stepp'", "step"]),
         ((*RUN, "--set", "surface.alpha=-1"), ["surface.alpha", "-1"]),
-        ((*RUN, "--set", "motion.rear_rate=500"), ["q2", "no circular motion", "500"]),
         ((*RUN, "--set", "perturbation.lean=3"), ["q2", "below the ground"]),
         (("run", "q2", "--duration", "0.1", "--out", "file"), ["file", "cannot be made"]),
         (("run", "q2", "--duration", "0.1", "--out", ""), ["--out: it is empty; name a folder"]),
@@ -230,7 +229,6 @@ CIRCULAR = ("circular", "--alpha", "0.005")
         ((*CIRCULAR, "--rear-rate", "0", "--family", "2"), ["rear rate", "0.0", "positive"]),
         ((*CIRCULAR, "--rear-rate", "nan", "--family", "2"), ["--rear-rate", "10000"]),
         ((*CIRCULAR, "--rear-rate", "1e300", "--family", "2"), ["--rear-rate", "10000"]),
-        ((*CIRCULAR, "--rear-rate", "500", "--family", "2", "--json"), ["no circular motion", "500.0"]),
         ((*CIRCULAR, "--rear-rate", "18", "--family", "5"), ["family", "5", "1, 2, 3 or 4"]),
         ((*CIRCULAR, "--rear-rate", "18", "--near", "0.7"), ["--near 0.7", "LEAN,STEER"]),
         ((*CIRCULAR, "--rear-rate", "18", "--near", "a,b"), ["--near a,b", "LEAN,STEER"]),

@@ -28,7 +28,7 @@ from velodrome.scenarios.compare import diff_runs, read_pair
 from velodrome.scenarios.gate import Verdict
 from velodrome.scenarios.motions import families_document, solve_circular
 from velodrome.scenarios.run import RunOutcome, RunPlan, plan_run, run_plan
-from velodrome.scenarios.scenario import BicycleFile, load_scenario, make_bowl
+from velodrome.scenarios.scenario import BicycleFile, load_scenario, make_bowl, name_bicycle
 from velodrome.scenarios.studies import BicycleStudy, study_bicycle
 
 # The longest names of the suite's own engines, and one that rich would read as markup.
@@ -80,7 +80,7 @@ def show_study(console: Console) -> None:
         "window": 1.5,
     }
     engines = dict.fromkeys(LONG_NAMES, entry)
-    show_precision(console, {"scenario": "q1", "horizon": None, "duration": 1.5, "engines": engines})
+    show_precision(console, {"scenario": "q1", "warnings": [], "horizon": None, "duration": 1.5, "engines": engines})
 
 
 def show_sweep(console: Console) -> None:
@@ -110,6 +110,8 @@ def show_critical_shapes(console: Console) -> None:
     show_critical(
         console,
         {
+            **name_bicycle(Bicycle()),
+            "not_found": {},
             "cusp_collision": shape,
             "last_stable": {"1": None, "2": shape},
             "merging": [shape | {"families": [1, 3]}, shape | {"families": [1]}],
@@ -122,7 +124,8 @@ def show_regions(console: Console) -> None:
         {"family": 2, "alpha": [0.000123456, 1], "vanishing": {"alpha": 0.0333487046243, "rear_rate": 13.8896236}},
         {"family": 12, "alpha": [0.0001, 1], "vanishing": None},
     ]
-    show_atlas(console, {"stable": regions, "motions": 400000}, Path("atlas"))
+    document = {**name_bicycle(Bicycle()), "alphas": [0.0, 1.0], "absent": [], "stable": regions, "motions": 400000}
+    show_atlas(console, document, Path("atlas"))
 
 
 def show_motion(console: Console) -> None:

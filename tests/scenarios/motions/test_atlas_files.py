@@ -12,12 +12,15 @@ from velodrome.engines.storage import METADATA_KEY
 from velodrome.reference.bicycle import Bicycle
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.motions.atlas import UNITS, make_atlas
+from velodrome.scenarios.scenario import BicycleFile
+
+BENCHMARK = BicycleFile("benchmark", Bicycle())
 
 
 def test_an_atlas_is_written_whole(tmp_path: Path) -> None:
     done: list[float] = []
     out = tmp_path / "new" / "atlas"
-    document = make_atlas(out, size=2000, largest=0.02, progress=done.append)
+    document = make_atlas(BENCHMARK, out, size=2000, largest=0.02, progress=done.append)
     assert done == sorted(done)
     assert done[-1] == 1.0
     assert sorted(path.name for path in out.iterdir()) == [
@@ -57,11 +60,11 @@ def test_an_atlas_is_written_whole(tmp_path: Path) -> None:
 )
 def test_impossible_atlases_are_refused(tmp_path: Path, size: int, largest: float, words: str) -> None:
     with pytest.raises(ScenarioError, match=words):
-        make_atlas(tmp_path / "atlas", size, largest)
+        make_atlas(BENCHMARK, tmp_path / "atlas", size, largest)
     assert not (tmp_path / "atlas").exists()
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(ScenarioError, match="cannot be made"):
-        make_atlas(tmp_path / "file" / "atlas", 2000)
+        make_atlas(BENCHMARK, tmp_path / "file" / "atlas", 2000)

@@ -1,0 +1,109 @@
+"""Straight motion and its neighbours on the level plane, held against Meijaard's linear equations and the families."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.families import find_motion
+from velodrome.reference.missing_motion import NoSuchMotion
+from velodrome.reference.stability import free_eigenvalues, growth_rate, linearise
+from velodrome.reference.steady_turn import make_straight_motion, solve_steady_turn
+from velodrome.reference.surface import Paraboloid, Plane
+from velodrome.reference.upright import canonical_matrices, capsize_speed, stable_speeds
+
+MASSLESS = {f"{wheel}_wheel_{what}": 0.0 for wheel in ("rear", "front") for what in ("mass", "Ixx", "Iyy")}
+BICYCLES = {
+    "benchmark": Bicycle(),
+    "trail": replace(Bicycle(), trail=0.2),
+    "negative trail": replace(Bicycle(), trail=-0.1),
+    "massless wheels": replace(Bicycle(), **MASSLESS),
+}
+CAPSIZE = capsize_speed(canonical_matrices(Bicycle())) or np.nan
+
+
+@pytest.mark.parametrize("bicycle", BICYCLES.values(), ids=BICYCLES)
+@pytest.mark.parametrize("speed", [1.0, 5.0, 8.0])
+def test_straight_motion_has_the_eigenvalues_and_the_verdict_of_the_linear_equations(
+    bicycle: Bicycle, speed: float
+) -> None:
+    rate = speed / bicycle.rear_wheel_radius
+    motion = make_straight_motion(bicycle, Plane(), rate)
+    assert (motion.yaw_rate, motion.lean, motion.steer) == (0.0, 0.0, 0.0)
+    assert motion.residual < 1e-14
+    values = linearise(bicycle, Plane(), *motion.state()).eigenvalues
+    matrices = canonical_matrices(bicycle)
+    expected = matrices.eigenvalues(speed)[0]
+    free = free_eigenvalues(Plane(), values, 0.0)
+    # Round-off of eigenvalues: 1e-15 times a condition number of at most 1e4.
+    np.testing.assert_allclose(np.sort_complex(free), np.sort_complex(expected), atol=1e-11 * np.abs(expected).max())
+    assert growth_rate(Plane(), values, 0.0) == pytest.approx(expected.real.max(), abs=1e-9)
+    stable = any(low < speed < high for low, high in stable_speeds(matrices))
+    assert (growth_rate(Plane(), values, 0.0) < 0) == stable
+
+
+@pytest.mark.parametrize("bicycle", BICYCLES.values(), ids=BICYCLES)
+def test_the_ground_carries_a_straight_bicycle(bicycle: Bicycle) -> None:
+    motion = make_straight_motion(bicycle, Plane(), 15.0)
+    weight = bicycle.mass * bicycle.gravity
+    # Static moments about the rear contact.
+    front = sum(bicycle.body_mass(body) * bicycle.centre(body)[0] for body in ("rear_frame", "front_frame"))
+    front = (front + bicycle.front_wheel_mass * bicycle.wheelbase) * bicycle.gravity / bicycle.wheelbase
+    np.testing.assert_allclose(motion.force, [[0, 0, weight - front], [0, 0, front]], atol=1e-12 * weight)
+
+
+def test_the_bicycle_also_runs_straight_with_its_handlebar_reversed() -> None:
+    number, motion = find_motion(Bicycle(), Plane(), 15.0, near=(0.0, np.pi - 0.01))
+    assert (number, motion.steer, motion.yaw_rate) == (None, np.pi, 0.0)
+    assert motion.front_rate < 0
+    assert np.abs(linearise(Bicycle(), Plane(), *motion.state()).field[2:]).max() < 1e-12  # it moves along x
+
+
+def test_circles_branch_off_straight_motion_with_the_root_of_the_distance() -> None:
+    """A pitchfork at the capsize speed: ever larger circles below it, none above, and no other solutions."""
+    rate, leans = CAPSIZE / Bicycle().rear_wheel_radius, []
+    distances = np.array([1e-3, 1e-4, 1e-6, 1e-8])
+    for distance in distances:
+        guess = np.sqrt(distance) * np.array([-1.5, 0.45])
+        turn = solve_steady_turn(Bicycle(), Plane(), rate * (1 - distance), *guess)
+        assert turn is not None
+        # In units of the weight, and of the circle's size times round-off.
+        assert turn.residual < 1e-15 * (1 + np.hypot(*turn.position[:2]))
+        # Straight motion is no solution of its own there.
+        assert turn.yaw_rate > 0
+        leans.append(turn.lean)
+        for sign in (1, -1):
+            assert solve_steady_turn(Bicycle(), Plane(), rate * (1 + distance), sign * 1e-3, 3e-4) is None
+    # lean = -c sqrt(d) (1 + O(d)), at 1e-8 with the capsize speed's own round-off, 1e-15 / 1e-8.
+    np.testing.assert_allclose(leans / np.sqrt(distances), leans[2] / np.sqrt(distances[2]), rtol=2e-2)
+    np.testing.assert_allclose(leans[3] / np.sqrt(distances[3]), leans[2] / np.sqrt(distances[2]), rtol=1e-4)
+
+
+@pytest.mark.parametrize("near", [(-0.02, 0.006), (0.02, -0.006)])
+def test_a_large_circle_is_the_one_that_its_family_leads_to(near: tuple[float, float]) -> None:
+    rate = CAPSIZE / Bicycle().rear_wheel_radius * (1 - 1e-4)
+    _, followed = find_motion(Bicycle(), Plane(), rate, family=1)
+    _, found = find_motion(Bicycle(), Plane(), rate, near=near)
+    side = np.sign(near[0]) * np.sign(followed.lean)  # families turn to the left
+    # On a circle of 243 m the family's unknowns are known to 1e-13 of it, angles to its inverse times that.
+    assert (found.lean, found.steer) == pytest.approx((side * followed.lean, side * followed.steer), abs=1e-9)
+    assert found.yaw_rate == pytest.approx(side * followed.yaw_rate, abs=1e-9)
+
+
+@pytest.mark.parametrize("excess", [1e-4, 1e-6, 1e-8])
+def test_no_large_circle_is_made_up_where_there_is_none(excess: float) -> None:
+    """Newton's method in positions converges there to circles of kilometres, which are no solutions."""
+    rate = CAPSIZE / Bicycle().rear_wheel_radius * (1 + excess)
+    for near in ((1e-4, 5e-5), (-1e-3, 5e-4)):
+        _, motion = find_motion(Bicycle(), Plane(), rate, near=near)
+        assert motion.is_straight
+
+
+def test_no_motion_is_straight_in_a_bowl() -> None:
+    with pytest.raises(
+        NoSuchMotion, match=r"no motion is straight on ground that is not level; the nearest is at -0\.3"
+    ):
+        find_motion(Bicycle(), Paraboloid(0.005), 19.0, near=(0.0, 0.0))
