@@ -54,7 +54,7 @@ def test_an_engine_that_takes_them_rightly_passes_and_one_that_says_nothing_is_n
     assert names["ride on plane, with inputs"] == names["order on plane, with inputs"] == "passed"
     silent = examine_engine(Planted(load_engine("exudyn"), same, lambda trajectory, *_: trajectory))
     assert silent.passed
-    assert {check.name: check.outcome for check in silent.checks}["inputs"] == "skipped"
+    assert not any("inputs" in check.name for check in silent.checks)
 
 
 def test_takes_inputs_must_be_true_or_false() -> None:
