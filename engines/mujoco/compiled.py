@@ -133,6 +133,7 @@ BLACKBOARD = np.dtype(
         ("place", np.float64, (WHEEL_COUNT, 3)),  # xi, eta, angle of the contacts
         ("gap", np.float64, WHEEL_COUNT),  # of the last evaluation; nan without a contact point
         ("force", np.float64, (WHEEL_COUNT, 3)),
+        ("normal", np.float64, (WHEEL_COUNT, 3)),  # of the ground, where forces of rolling act
         ("constrained", np.int64, (WHEEL_COUNT, 3)),  # whether to constrain the lateral, forward and normal velocity
         ("touched", np.int64, WHEEL_COUNT),  # 1: MuJoCo has asked for the contact in this evaluation; 2: it was found
         ("expected", np.int64),  # number of wheels with a contact at the present positions
@@ -142,6 +143,8 @@ BLACKBOARD = np.dtype(
         ("skipped", np.int64),  # MuJoCo left out a wheel's contact or its rows
         ("crowded", np.int64),  # MuJoCo's own constraints acted beside the forces of rolling
         ("strange", np.int64),  # another state of the same model
+        ("push", np.float64),  # largest normal force of rolling on a wheel [N]
+        ("pull", np.float64),  # largest one that holds a wheel down [N]
         ("contradiction", np.float64),  # largest residual of the forces of rolling, relative to the accelerations
     ],
     align=True,
@@ -653,6 +656,8 @@ def _fill_rows(board, k, model, data, centre, here, rows, turning, free, force, 
     velocities = rows[first : first + 3] if whole else np.empty((3, board.speeds))
     velocity, gamma = _contact_motion(board, k, model, data, centre, here, velocities, turning)
     board.gap[k] = here.gap
+    for i in range(3):
+        board.normal[k, i] = here.normal[i]
     closing = s * s * here.gap
     if whole:
         for i in range(3):
@@ -723,6 +728,10 @@ def _press(board, model, data):
     first = 0
     for k in range(board.wheels):
         first = _store_force(board, k, force, first)
+        along = 0.0
+        for i in range(3):
+            along += board.force[k, i] * board.normal[k, i]
+        board.push, board.pull = max(board.push, along), max(board.pull, -along)
 
 
 @compile_callback(CONTROL, error_model="numpy")

@@ -17,6 +17,9 @@ from .convergence import SolverConvergence, share
 # Rolling constraints that leave more than this share of the accelerations contradict each other. Consistent ones leave
 # `compiled.REFINED`; a hundredth of a degree between two axles that should be one leaves 1e-4.
 CONTRADICTION = 1e-6
+# Share of the largest normal force up to which one that pulls counts as round-off of a wheel without load.
+UNLOADED = 1e-9
+_UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
 
 class EdgeContacts(SolverConvergence):
@@ -62,14 +65,20 @@ class EdgeContacts(SolverConvergence):
     def standing(self) -> bool:
         """Return whether every wheel touches the ground, has had a contact point ever since, and the forces are right.
 
-        A wheel without a contact point moves on without contact forces.
+        A wheel without a contact point moves on without contact forces. Forces of rolling may also hold a wheel down,
+        which no ground does: it does not stand any more either.
 
         Raises
         ------
         EngineError
             If MuJoCo never called the callbacks.
         """
-        return self.complete() and bool(np.all(self.gaps() <= self._reach)) and self.find_fault() is None
+        touching = bool(np.all(self.gaps() <= self._reach))
+        return self.complete() and touching and not self.held_down() and self.find_fault() is None
+
+    def held_down(self) -> bool:
+        """Return whether forces of rolling have ever pulled a wheel towards the ground."""
+        return float(self._board["pull"][0]) > UNLOADED * float(self._board["push"][0])
 
     def complete(self) -> bool:
         """Return whether every wheel has had a contact point ever since the block began, however far away.
@@ -87,6 +96,8 @@ class EdgeContacts(SolverConvergence):
         self.look()
         if self.wrong is not None:
             return f"MuJoCo's contact solver stopped unconverged: {share(self.wrong[1])}"
+        if any(self._data.warning[kind].number for kind in _UNSTABLE):
+            return "MuJoCo's state became infinite or huge"
         record = self._board[0]
         if record["skipped"]:
             return (
