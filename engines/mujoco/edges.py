@@ -14,7 +14,7 @@ from ...reference.kinematics import WHEELS
 from ..engine import Problem
 from .callbacks import find_board
 from .edge_contacts import EdgeContacts
-from .knife_edge import rolling_forces, stiffen, watched_edges
+from .knife_edge import ALL_AXES, stiffen, watched_edges, watched_rolling
 from .ride import Rig, bodies, look_at_rims, read_contact_forces, rim_stride, set_start, wheel_geoms
 from .settings import ExactContactSettings, MultiplierSettings
 
@@ -79,5 +79,7 @@ def build_multipliers(problem: Problem, settings: MultiplierSettings) -> Rig:
         stride=rim_stride(problem, settings.step),
         look=look_at_rims(data, problem),
         forces=forces,
-        callbacks=lambda: rolling_forces(model, data, problem.surface, GROUNDS, settings.stabilisation),
+        callbacks=lambda: watched_rolling(
+            model, data, problem.surface, GROUNDS, settings.stabilisation, [ALL_AXES] * len(GROUNDS)
+        ),
     )

@@ -47,8 +47,9 @@ from .convergence import WRONG, watch_state
 from .edge_contacts import EdgeContacts
 
 ALL_AXES = (True, True, True)
-# Options of MuJoCo's solver that nearly rigid rows need; `settings.ExactContactSettings.solver_options` says why.
-LEAST_ITERATIONS, LEAST_SEARCH, LARGEST_TOLERANCE, SEARCH_SLOPE = 10_000, 200, 1e-22, 1e-14
+# Options of MuJoCo's solver that nearly rigid rows need; `settings.ExactContactSettings.solver_options` says why. With
+# rows 1e11 times as stiff as the model, the tolerance of the cost is one of the forces of (1e-20 * 1e11)^(1/2) = 3e-5.
+LEAST_ITERATIONS, LEAST_SEARCH, LARGEST_TOLERANCE, SEARCH_SLOPE = 10_000, 200, 1e-20, 1e-14
 # Flags without which the contacts, or the callback that completes them, are not computed.
 _NEEDED = {"CONTACT": "contacts", "CONSTRAINT": "constraint forces", "ACTUATION": "control callbacks"}
 
@@ -168,14 +169,37 @@ def rolling_forces(
         raise ValueError(f"constrained names {unknown[0]!r}, which is none of the wheels {', '.join(wheels)}")
     if not any(any(axes) for axes in chosen.values()):
         raise ValueError("nothing is constrained; at least one velocity of a wheel must be")
+    axes = [chosen[name] for name in wheels]
+    with watched_rolling(model, data, surface, wheels, stabilisation, axes) as contacts:
+        yield contacts
+        contacts.check()
+
+
+@contextmanager
+def watched_rolling(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    surface: Surface,
+    wheels: Mapping[str, str],
+    stabilisation: float,
+    constrained: Sequence[tuple[bool, bool, bool]],
+) -> Iterator[EdgeContacts]:
+    """Apply forces as in `rolling_forces`, but leave checks to the caller.
+
+    Parameters
+    ----------
+    model, data, surface, wheels, stabilisation
+        As in `rolling_forces`.
+    constrained : sequence
+        Which velocities of each wheel's contact are zero: lateral, forward and normal.
+    """
     with (
         claim_board(data, compiled.ROLLING) as board,
-        _write_blackboard(board, model, surface, wheels, stabilisation, [chosen[name] for name in wheels]),
+        _write_blackboard(board, model, surface, wheels, stabilisation, constrained),
         watch_state(board, model, data, WRONG),
         _record(EdgeContacts(board, model, data, [np.inf] * len(wheels))) as contacts,
     ):
         yield contacts
-        contacts.check()
 
 
 def stiffen(model: mujoco.MjModel, wheels: Mapping[str, str], softness: float) -> None:

@@ -147,7 +147,8 @@ def ride_vehicle(
             if k < samples:
                 mujoco.mj_step(model, data, steps * (k + 1) // samples - steps * k // samples)
         standing = contacts.standing()
-    return VehicleRide(*(np.array(column) for column in zip(*rows, strict=True)), standing)
+    time, position, force, gap, energy = (np.array(column) for column in zip(*rows, strict=True))
+    return VehicleRide(time, position, force, gap, energy, standing)
 
 
 def main() -> None:

@@ -185,7 +185,8 @@ def test_newton_is_right_where_wheels_slide_fly_and_fall(start, cone, softness) 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("start", [kick_sideways, spin_wheel, drop, topple])
-@pytest.mark.parametrize(("cone", "softness"), product(("elliptic", "pyramidal"), (1e-5, 1.0)))
+@pytest.mark.parametrize("softness", [1e-5, 1.0])
+@pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
 def test_conjugate_gradients_are_right_or_raise(start, cone, softness) -> None:
     newton, found = (
         watch_or_raise(start, 0.7, softness, 100, cone=cone, impratio=10, solver=solver) for solver in ("Newton", "CG")
@@ -339,7 +340,7 @@ def test_state_that_explodes_is_an_error() -> None:
 
 def bumps() -> HeightField:
     x, y = np.meshgrid(np.arange(-4.0, 4.01, 0.25), np.arange(-4.0, 4.01, 0.25), indexing="ij")
-    return HeightField(0.05 * np.sin(x) * np.cos(1.3 * y), spacing=0.25, origin=(-4.0, -4.0))
+    return HeightField((0.05 * np.sin(x) * np.cos(1.3 * y)).tolist(), spacing=0.25, origin=(-4.0, -4.0))
 
 
 @pytest.mark.parametrize("kind", ["contacts", "forces"])
