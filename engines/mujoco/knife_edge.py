@@ -45,11 +45,9 @@ from . import compiled, layout
 from .callbacks import claim_board
 from .convergence import WRONG, watch_state
 from .edge_contacts import EdgeContacts
+from .solver_limits import raise_solver_limits
 
 ALL_AXES = (True, True, True)
-# Options of MuJoCo's solver that nearly rigid rows need; `settings.ExactContactSettings.solver_options` says why. With
-# rows 1e11 times as stiff as the model, the tolerance of the cost is one of the forces of (1e-20 * 1e11)^(1/2) = 3e-5.
-LEAST_ITERATIONS, LEAST_SEARCH, LARGEST_TOLERANCE, SEARCH_SLOPE = 10_000, 200, 1e-20, 1e-14
 # Flags without which the contacts, or the callback that completes them, are not computed.
 _NEEDED = {"CONTACT": "contacts", "CONSTRAINT": "constraint forces", "ACTUATION": "control callbacks"}
 
@@ -94,7 +92,7 @@ def knife_edges(
             "noslip_iterations hide whether the solver has converged; `stiffen` leaves less slip than they do"
         )
     with (
-        _raise_solver_limits(model),
+        raise_solver_limits(model),
         watched_edges(model, data, surface, wheels, WRONG) as contacts,
     ):
         yield contacts
@@ -219,28 +217,6 @@ def _record(contacts: EdgeContacts) -> Iterator[EdgeContacts]:
     finally:
         contacts.look()
         contacts.detach()
-
-
-@contextmanager
-def _raise_solver_limits(model: mujoco.MjModel) -> Iterator[None]:
-    """Let MuJoCo's solver iterate as long as it needs; options that are not changed meanwhile are restored."""
-    options = model.opt
-    tolerance = min(options.tolerance, LARGEST_TOLERANCE)
-    room = {
-        "iterations": max(options.iterations, LEAST_ITERATIONS),
-        "ls_iterations": max(options.ls_iterations, LEAST_SEARCH),
-        "tolerance": tolerance,
-        "ls_tolerance": max(options.ls_tolerance, SEARCH_SLOPE / tolerance) if tolerance > 0 else options.ls_tolerance,
-    }
-    before = {name: getattr(options, name) for name in room}
-    for name, value in room.items():
-        setattr(options, name, value)
-    try:
-        yield
-    finally:
-        for name, value in room.items():
-            if getattr(options, name) == value:
-                setattr(options, name, before[name])
 
 
 def _check_options(model: mujoco.MjModel, needed: Iterable[str]) -> None:

@@ -4,6 +4,7 @@
 # pyright: reportAttributeAccessIssue=false
 
 from collections.abc import Iterator
+from contextlib import ExitStack
 from threading import Thread
 
 import mujoco
@@ -306,6 +307,19 @@ def test_options_of_the_solver_are_restored() -> None:
         model.opt.ls_iterations = 77
     assert (model.opt.iterations, model.opt.tolerance, model.opt.ls_tolerance) == (before[0], *before[2:])
     assert model.opt.ls_iterations == 77
+
+
+def test_options_stay_raised_until_the_last_block_of_a_model_ends() -> None:
+    model, data = compile_disc()
+    other = mujoco.MjData(model)
+    before = model.opt.iterations
+    first, second = (knife_edges(model, state, Plane(), TOUCHING) for state in (data, other))
+    with ExitStack() as later:
+        with first:
+            later.enter_context(second)
+            mujoco.mj_step(model, data)
+        assert model.opt.iterations > before
+    assert model.opt.iterations == before
 
 
 def test_pair_without_reach_is_seen() -> None:

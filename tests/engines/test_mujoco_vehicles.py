@@ -131,6 +131,15 @@ def test_vehicles_agree_with_exudyn(name, rolling) -> None:
     assert ratio > 2**1.5
 
 
+@pytest.mark.slow
+def test_script_tells_all_rides(capsys) -> None:
+    RIDES.main()
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines[1:]] == ["tricycle"] * 4 + ["cart"] * 4 + ["tandem"] * 4
+    # The tricycle's distance from its exact circle.
+    assert all(float(line.split()[4]) < 1e-7 for line in lines[1:5])
+
+
 # ---------------------------------------------------------------------------------------------- redundant rows
 
 
