@@ -1,4 +1,9 @@
-"""Install compiled callbacks in MuJoCo temporarily and for one user at a time: MuJoCo has one set per process."""
+"""Install compiled callbacks in MuJoCo while blocks need them: MuJoCo has one set per process.
+
+Several blocks may be open at once, each for a state of its own. The first one installs the callbacks and the last one
+restores what was there. A control callback of the user is called first in every evaluation of the dynamics, whether it
+was set before the block or inside it.
+"""
 
 # MuJoCo's compiled bindings carry no types.
 # pyright: reportAttributeAccessIssue=false
@@ -9,50 +14,104 @@ import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Lock
-from typing import Any
 
 import mujoco
+import numpy as np
 
 from ..engine import EngineError
-from .compiled import board
-from .library import collision_slot
+from . import compiled
+from .library import collision_slot, control_slot
 
-_in_use = Lock()
+_lock = Lock()
+_owners: dict[int, int] = {}  # board's number by the address of the state
 
 
 @contextmanager
-def install_callbacks(control: Any, collision: Any = None) -> Iterator[None]:
-    """Let MuJoCo call compiled functions inside the block, and restore the previous callbacks afterwards.
+def claim_board(data: mujoco.MjData, kind: int) -> Iterator[np.ndarray]:
+    """Let MuJoCo call compiled functions inside the block, and yield an empty blackboard (1,) for a state.
 
-    They are restored also where the block ends with an exception.
+    The callbacks do nothing for the state until its address is on the blackboard.
 
     Parameters
     ----------
-        control : numba cfunc
-            Called in every evaluation of the dynamics, after MuJoCo has computed its constraints and bias forces.
-        collision : numba cfunc, optional
-            Called for each pair of a plane and a cylinder.
+    data : mujoco.MjData
+    kind : int
+        `compiled.CONTACTS`, `ROLLING` or `WATCHING`.
 
     Raises
     ------
-        EngineError
-            If callbacks are in use already, by this package or by other code in this process.
+    EngineError
+        If the state has a block already or there are too many blocks; at the end of a block without exact contacts, if
+        the control callback was replaced inside it.
     """
-    if not _in_use.acquire(blocking=False):
-        raise EngineError("another model with compiled callbacks runs in this process; one must end before the next")
+    with _lock:
+        number = _claim(data)
+        board = compiled.boards[number : number + 1]
+        board[:] = np.zeros(1, compiled.BLACKBOARD)
+        board["kind"] = kind
     try:
-        if mujoco.get_mjcb_control() is not None:
-            raise EngineError("MuJoCo has a control callback already; mujoco.set_mjcb_control(None) removes it")
-        slot = collision_slot()
-        before = slot.value
-        try:
-            if collision is not None:
-                board["collision"] = before
-                slot.value = ctypes.cast(collision.ctypes, ctypes.c_void_p).value
-            mujoco.set_mjcb_control(control.ctypes)
-            yield
-        finally:
-            mujoco.set_mjcb_control(None)
-            slot.value = before
+        yield board
+        # Exact contacts put the callback back before it is missed.
+        if kind != compiled.CONTACTS and control_slot().value != compiled.control.address:
+            raise EngineError(
+                "MuJoCo's control callback was replaced inside the block, so that evaluations were missed; "
+                "set your own before the block, which calls it"
+            )
     finally:
-        _in_use.release()
+        with _lock:
+            board["model"] = board["data"] = 0
+            del _owners[data._address]
+            _keep_callbacks() if _owners else _restore_callbacks()
+
+
+def find_board(data: mujoco.MjData) -> np.ndarray:
+    """Return the blackboard (1,) of a state whose block is open.
+
+    Raises
+    ------
+    EngineError
+        If there is no such block.
+    """
+    number = _owners.get(data._address)
+    if number is None:
+        raise EngineError("no block of wheels is open for this state")
+    return compiled.boards[number : number + 1]
+
+
+def _claim(data: mujoco.MjData) -> int:
+    if data._address in _owners:
+        raise EngineError("this state is in a block of wheels already; one must end before the next")
+    free = set(range(compiled.BOARD_COUNT)) - set(_owners.values())
+    if not free:
+        raise EngineError(f"{compiled.BOARD_COUNT} blocks of wheels are open in this process; there cannot be more")
+    number = min(free)
+    if not _owners:
+        _install_callbacks()
+    compiled.header["count"] = max(number + 1, int(compiled.header["count"][0]))
+    _owners[data._address] = number
+    return number
+
+
+def _install_callbacks() -> None:
+    control, collision = control_slot(), collision_slot()
+    head = compiled.header[0]
+    head["count"], head["control"] = 0, compiled.control.address
+    head["control_before"], head["collision"] = control.value or 0, collision.value
+    head["control_at"] = ctypes.addressof(control)
+    # MuJoCo's bindings keep a Python callback when its pointer is replaced here, and it stays callable.
+    collision.value, control.value = compiled.touch.address, compiled.control.address
+
+
+def _keep_callbacks() -> None:
+    control = control_slot()
+    if control.value != compiled.control.address:
+        compiled.header["control_before"], control.value = control.value or 0, compiled.control.address
+
+
+def _restore_callbacks() -> None:
+    control, collision, head = control_slot(), collision_slot(), compiled.header[0]
+    # What somebody else has set meanwhile stays.
+    if control.value == compiled.control.address:
+        control.value = int(head["control_before"]) or None
+    if collision.value == compiled.touch.address:
+        collision.value = int(head["collision"])

@@ -25,7 +25,7 @@ import mujoco
 import numpy as np
 
 from . import compiled
-from .callbacks import install_callbacks
+from .callbacks import claim_board
 from .settings import WRONG
 
 STATE = (
@@ -37,7 +37,6 @@ STATE = (
     "qacc_warmstart",
     "qfrc_bias",
     "qfrc_passive",
-    "qfrc_applied",
     "qfrc_smooth",
     "qfrc_constraint",
     "M",
@@ -50,72 +49,92 @@ def share(residual: float) -> str:
 
 
 class SolverConvergence:
-    """Convergence of MuJoCo's solver since a block began, as the callbacks have recorded it."""
+    """Convergence of MuJoCo's solver since a block began, as the callbacks have recorded it.
+
+    Parameters
+    ----------
+    board : ndarray, shape (1,)
+        The blackboard of the state.
+    """
+
+    def __init__(self, board: np.ndarray) -> None:
+        self._board = board
 
     def begin(self, steps: int) -> None:
         """Count the evaluations from here on as those of the step after ``steps`` steps and of the following steps."""
         self.look()
-        compiled.board["since_step"], compiled.board["evaluations"] = steps, 0
+        self._board["since_step"], self._board["evaluations"] = steps, 0
 
     def look(self) -> None:
         """Assess the last evaluation too, which otherwise happens only in the next one."""
-        compiled.judge(compiled.board)
+        compiled.judge(self._board)
+
+    def detach(self) -> None:
+        """Keep the record as it is when the block ends: its blackboard will be used again."""
+        self._board = self._board.copy()
 
     @property
     def unconverged(self) -> int:
         """Number of steps in which the solver's residual exceeded the limit."""
-        return int(compiled.board["unconverged"][0])
+        return int(self._board["unconverged"][0])
 
     @property
     def largest(self) -> float | None:
         """Largest relative residual; None where no solver was assessed."""
-        residual = float(compiled.board["largest_residual"][0])
+        residual = float(self._board["largest_residual"][0])
         return residual if residual >= 0 else None
 
     @property
     def wrong(self) -> tuple[int, float] | None:
         """First step with a residual above `WRONG`, and that residual; None if there is none."""
-        step = int(compiled.board["wrong_step"][0])
-        return None if step < 0 else (step, float(compiled.board["wrong_residual"][0]))
+        step = int(self._board["wrong_step"][0])
+        return None if step < 0 else (step, float(self._board["wrong_residual"][0]))
 
 
 @contextmanager
-def judge_solver(model: mujoco.MjModel, data: mujoco.MjData, converged_below: float) -> Iterator[SolverConvergence]:
-    """Write on the blackboard which model's solver is assessed, and clear it at the end.
+def watch_state(
+    board: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData, converged_below: float
+) -> Iterator[None]:
+    """Write a state on a blackboard: from here to the end of the block the callbacks act on it.
 
     Parameters
     ----------
+    board : ndarray, shape (1,)
     model, data
         The model and state on which the callbacks act inside the block.
     converged_below : float
         Relative residual up to which an evaluation counts as converged.
     """
-    board, kept = compiled.board[0], np.zeros(len(data.M))
+    entry, inertia, smooth = board[0], np.zeros(len(data.M)), np.zeros(model.nv)
     for name in STATE:
-        board[name] = getattr(data, name).ctypes.data
+        entry[name] = getattr(data, name).ctypes.data
     for name in ("M_rownnz", "M_rowadr", "M_colind"):
-        board[name] = getattr(model, name).ctypes.data
-    board["kept_M"], board["M_entries"], board["speeds"] = kept.ctypes.data, len(kept), model.nv
-    board["evaluations_per_step"] = 4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1
-    board["converged_below"], board["wrong_above"] = converged_below, WRONG
-    for name in ("pending", "evaluations", "since_step", "unconverged", "wrong_residual"):
-        board[name] = 0
-    board["last_unconverged"] = board["wrong_step"] = board["largest_residual"] = -1
-    board["model"], board["data"] = model._address, data._address
+        entry[name] = getattr(model, name).ctypes.data
+    entry["kept_M"], entry["M_entries"], entry["speeds"] = inertia.ctypes.data, len(inertia), model.nv
+    entry["kept_smooth"] = smooth.ctypes.data
+    entry["evaluations_per_step"] = 4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1
+    entry["converged_below"], entry["wrong_above"] = converged_below, WRONG
+    entry["last_unconverged"] = entry["wrong_step"] = entry["largest_residual"] = -1
+    entry["model"], entry["data"] = model._address, data._address
     try:
-        yield SolverConvergence()
+        yield
     finally:
-        board["model"] = board["data"] = board["pending"] = 0
+        entry["model"] = entry["data"] = 0
 
 
 @contextmanager
 def watch_solver(model: mujoco.MjModel, data: mujoco.MjData, converged_below: float) -> Iterator[SolverConvergence]:
-    """Record the convergence of the solver for a model with MuJoCo's own contacts; parameters as in `judge_solver`.
+    """Record the convergence of the solver for a model with MuJoCo's own contacts; parameters as in `watch_state`.
 
     Raises
     ------
     EngineError
-        If callbacks are in use already.
+        If the state has a block already.
     """
-    with install_callbacks(compiled.watch_iterations), judge_solver(model, data, converged_below) as convergence:
-        yield convergence
+    with claim_board(data, compiled.WATCHING) as board, watch_state(board, model, data, converged_below):
+        convergence = SolverConvergence(board)
+        try:
+            yield convergence
+        finally:
+            convergence.look()
+            convergence.detach()

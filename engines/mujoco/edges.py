@@ -7,15 +7,29 @@ from __future__ import annotations
 
 from functools import partial
 
+import mujoco
 import numpy as np
 
 from ...reference.kinematics import WHEELS
 from ..engine import Problem
-from .knife_edge import pressing_forces, rolling_forces, standing, stiffen, watched_edges
+from .callbacks import find_board
+from .edge_contacts import EdgeContacts
+from .knife_edge import ALL_AXES, stiffen, watched_edges, watched_rolling
 from .ride import Rig, bodies, look_at_rims, read_contact_forces, rim_stride, set_start, wheel_geoms
 from .settings import ExactContactSettings, MultiplierSettings
 
 GROUNDS: dict[str, str] = dict.fromkeys(WHEELS, "ground")
+
+
+def find_block_contacts(model: mujoco.MjModel, data: mujoco.MjData) -> EdgeContacts:
+    """Return the wheels of the block that is open for a state.
+
+    Raises
+    ------
+    EngineError
+        If there is no such block.
+    """
+    return EdgeContacts(find_board(data), model, data, [np.inf] * len(WHEELS))
 
 
 def build_contacts(problem: Problem, settings: ExactContactSettings) -> Rig:
@@ -34,7 +48,7 @@ def build_contacts(problem: Problem, settings: ExactContactSettings) -> Rig:
         data=data,
         bodies=bodies(model),
         wheels=wheels,
-        follow=standing,
+        follow=lambda: find_block_contacts(model, data).complete(),
         stride=rim_stride(problem, settings.step),
         look=look_at_rims(data, problem),
         forces=partial(read_contact_forces, model, data, wheels),
@@ -54,16 +68,18 @@ def build_multipliers(problem: Problem, settings: MultiplierSettings) -> Rig:
     model, data = set_start(problem, settings, "nothing")
 
     def forces(out: np.ndarray) -> None:
-        out[:] = pressing_forces(2)
+        out[:] = find_block_contacts(model, data).forces()
 
     return Rig(
         model=model,
         data=data,
         bodies=bodies(model),
         wheels=wheel_geoms(model),
-        follow=standing,
+        follow=lambda: find_block_contacts(model, data).complete(),
         stride=rim_stride(problem, settings.step),
         look=look_at_rims(data, problem),
         forces=forces,
-        callbacks=lambda: rolling_forces(model, data, problem.surface, GROUNDS, settings.stabilisation),
+        callbacks=lambda: watched_rolling(
+            model, data, problem.surface, GROUNDS, settings.stabilisation, [ALL_AXES] * len(GROUNDS)
+        ),
     )

@@ -5,23 +5,27 @@
     <pair geom1="ground" geom2="wheel" condim="3" margin="1e-3" gap="1e9"      in <contact>
           solref="0.05 1" solimp="0.9999 0.9999 0.001 0.5 2" friction="2 2 0 0 0"/>
 
-    with knife_edges(model, data, Paraboloid(0.1), {"wheel": "ground"}):
+    with knife_edges(model, data, Paraboloid(0.1), {"wheel": "ground"}) as contacts:
         mujoco.mj_step(model, data)
 
 Inside the block the cylinder touches the ground z = f(x, y) as a circle without thickness does, at the
 exact point of closest approach, with the exact normal, in every stage of every integrator. MuJoCo's
 reference accelerations get the contact's own acceleration, which MuJoCo omits. Solver, friction cone and
-lift-off stay MuJoCo's own. The plane only names the ground; its position does not matter.
-
-In every evaluation, MuJoCo's solver starts from the forces of wheels that neither slide nor lift off. Where it
-stops at forces that are wrong, the block ends with an error (`convergence`).
-
-MuJoCo's rows stay soft, even if only by the factor (1 - impedance) / impedance: a force F on a row leaves
+lift-off stay MuJoCo's own. The plane only names the ground; its position does not matter. A wheel may hang on any
+body of any tree. `stiffen` makes the rows harder than any impedance can:
 
     slip = R F / b,    gap = R F / k
 
-with R = efc_R the row's softness, b = 2 / (impedance time constant) and k its stiffness. `stiffen` makes R
-smaller than any impedance can.
+with F the force on a row, R = efc_R its softness, b = 2 / (impedance time constant) and k its stiffness.
+
+In every evaluation MuJoCo's solver starts from the forces of wheels that neither slide nor lift off, and inside the
+block it may iterate as long as nearly rigid rows need. Where it stops at forces that are wrong, or MuJoCo leaves a
+wheel out, the block ends with an error, which `EdgeContacts.check` raises earlier.
+
+`rolling_forces` replaces MuJoCo's contacts by the exact forces of rolling without slip.
+
+Several blocks may be open at once, in threads as well, one for each state. The user's control callback works as ever.
+``mj_inverse`` is not corrected.
 """
 
 # MuJoCo's compiled bindings carry no types.
@@ -29,7 +33,7 @@ smaller than any impedance can.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 import mujoco
@@ -37,46 +41,62 @@ import numpy as np
 
 from ...reference.rim import rim_search
 from ...reference.surface import Surface
-from ..engine import EngineError
 from . import compiled, layout
-from .callbacks import install_callbacks
-from .convergence import WRONG, SolverConvergence, judge_solver, share
+from .callbacks import claim_board
+from .convergence import WRONG, watch_state
+from .edge_contacts import EdgeContacts
+from .solver_limits import raise_solver_limits
+
+ALL_AXES = (True, True, True)
+# Flags without which the contacts, or the callback that completes them, are not computed.
+_NEEDED = {"CONTACT": "contacts", "CONSTRAINT": "constraint forces", "ACTUATION": "control callbacks"}
 
 
 @contextmanager
 def knife_edges(
     model: mujoco.MjModel, data: mujoco.MjData, surface: Surface, wheels: Mapping[str, str]
-) -> Iterator[SolverConvergence]:
+) -> Iterator[EdgeContacts]:
     """Let wheels touch a surface as knife edges.
 
     Parameters
     ----------
     model : mujoco.MjModel
-        Each wheel's geom is a cylinder and paired with a plane; see the module's example.
+        Each wheel's geom is a cylinder and paired with a plane; see the module's example. Inside the block its solver
+        has room to iterate.
     data : mujoco.MjData
-        The state that is stepped inside the block; other states are not affected.
+        The state that is stepped inside the block. Another state of the same model needs a block of its own.
     surface : Surface
     wheels : mapping
         Plane's geom name by wheel's geom name.
 
     Yields
     ------
-    SolverConvergence
-        Residuals of MuJoCo's solver so far. With ``noslip_iterations`` they cannot be determined.
+    EdgeContacts
+        Gaps, forces and the solver's residuals so far.
 
     Raises
     ------
     ValueError
-        If a geom or pair is missing or of the wrong kind.
+        If a geom or pair is missing or of the wrong kind, or an option is set with which the forces cannot be right or
+        nobody can tell: PGS and ``noslip_iterations``, whose results satisfy the equations of motion whatever the
+        forces; sleeping; disabled contacts, constraints or actuation.
     EngineError
-        If callbacks are in use already or this version of MuJoCo has another memory layout; at the end of the block, if
-        MuJoCo's solver ever gave forces that are wrong by more than `convergence.WRONG`.
+        If the state has a block already or this version of MuJoCo has another memory layout; at the end of the
+        block, if forces were wrong by more than `convergence.WRONG` or a wheel was left out.
     """
-    with watched_edges(model, data, surface, wheels, WRONG) as convergence:
-        yield convergence
-        convergence.look()
-        if convergence.wrong is not None:
-            raise EngineError(f"MuJoCo's contact solver stopped unconverged: {share(convergence.wrong[1])}")
+    _check_options(model, _NEEDED)
+    if model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
+        raise ValueError("the solver is PGS, whose convergence nobody can tell; knife edges need Newton or CG")
+    if model.opt.noslip_iterations:
+        raise ValueError(
+            "noslip_iterations hide whether the solver has converged; `stiffen` leaves less slip than they do"
+        )
+    with (
+        raise_solver_limits(model),
+        watched_edges(model, data, surface, wheels, WRONG) as contacts,
+    ):
+        yield contacts
+        contacts.check()
 
 
 @contextmanager
@@ -86,8 +106,8 @@ def watched_edges(
     surface: Surface,
     wheels: Mapping[str, str],
     converged_below: float,
-) -> Iterator[SolverConvergence]:
-    """Let wheels touch as in `knife_edges`, but leave it to the caller to check the solver's convergence.
+) -> Iterator[EdgeContacts]:
+    """Let wheels touch as in `knife_edges`, but leave options as they are and checks to the caller.
 
     Parameters
     ----------
@@ -96,24 +116,31 @@ def watched_edges(
     converged_below : float
         Relative residual up to which a step counts as converged.
     """
-    _check_pairs(model, wheels)
+    margins = [model.pair_margin[_find_pair(model, wheel, ground)] for wheel, ground in wheels.items()]
     with (
-        install_callbacks(compiled.correct_reference, compiled.touch),
-        _write_blackboard(model, surface, wheels),
-        judge_solver(model, data, converged_below) as convergence,
+        claim_board(data, compiled.CONTACTS) as board,
+        _write_blackboard(board, model, surface, wheels),
+        watch_state(board, model, data, converged_below),
+        _record(EdgeContacts(board, model, data, margins)) as contacts,
     ):
-        yield convergence
+        yield contacts
 
 
 @contextmanager
 def rolling_forces(
-    model: mujoco.MjModel, data: mujoco.MjData, surface: Surface, wheels: Mapping[str, str], stabilisation: float
-) -> Iterator[SolverConvergence]:
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    surface: Surface,
+    wheels: Mapping[str, str],
+    stabilisation: float,
+    constrained: Mapping[str, tuple[bool, bool, bool]] | None = None,
+) -> Iterator[EdgeContacts]:
     """Apply the exact forces of rolling without slip to wheels, in place of MuJoCo's contacts.
 
-    The forces are solved from MuJoCo's own mass matrix and bias forces in every evaluation of the dynamics and
-    stored in ``qfrc_applied``, together with the generalised forces that were there when the block began. The
-    constraints are bilateral: wheels neither lift off nor slide. Nothing is iterated.
+    The forces are solved from MuJoCo's own mass matrix and all its other forces in every evaluation of the dynamics and
+    added to ``qfrc_passive``. The constraints are bilateral: wheels neither lift off nor slide. Nothing is iterated,
+    except where constraints are redundant, such as the lateral ones of two wheels on one axle: accelerations are
+    determined there, the division of the force between the wheels is not, and the smallest forces are taken.
 
     Parameters
     ----------
@@ -121,36 +148,56 @@ def rolling_forces(
         As in `knife_edges`; no contact pairs are needed.
     stabilisation : float
         Rate at which gaps and slip decay to zero [1/s].
-    """
-    with (
-        install_callbacks(compiled.press),
-        _write_blackboard(model, surface, wheels, stabilisation),
-        judge_solver(model, data, WRONG) as convergence,
-    ):
-        held = data.qfrc_applied.copy()
-        compiled.board[0]["held"] = held.ctypes.data
-        yield convergence
-
-
-def standing() -> bool:
-    """Return whether every wheel has had a contact point with the ground ever since the block began.
-
-    A wheel without one moves on without contact forces.
+    constrained : mapping, optional
+        Which velocities of a wheel's contact are zero, by the wheel's geom name: lateral, forward and normal. All of
+        those of wheels that it does not name.
 
     Raises
     ------
+    ValueError
+        As in `knife_edges` for wheels, sleeping and disabled actuation; for unknown names in ``constrained`` or if
+        nothing is constrained.
     EngineError
-        If MuJoCo never called the collision callback.
+        As in `knife_edges`; at the end of the block, if MuJoCo's own constraints acted (contacts, limits, equalities,
+        friction losses), constraints of rolling contradicted each other or the control callback was replaced.
     """
-    found, lost = int(compiled.board["found"][0]), int(compiled.board["lost"][0])
-    if found + lost == 0:
-        raise EngineError(f"MuJoCo {mujoco.__version__} did not call the wheels' contacts; MuJoCo 4.0 does")
-    return lost == 0
+    _check_options(model, ("ACTUATION",))
+    chosen = dict.fromkeys(wheels, ALL_AXES) | dict(constrained or {})
+    if unknown := [name for name in chosen if name not in wheels]:
+        raise ValueError(f"constrained names {unknown[0]!r}, which is none of the wheels {', '.join(wheels)}")
+    if not any(any(axes) for axes in chosen.values()):
+        raise ValueError("nothing is constrained; at least one velocity of a wheel must be")
+    axes = [chosen[name] for name in wheels]
+    with watched_rolling(model, data, surface, wheels, stabilisation, axes) as contacts:
+        yield contacts
+        contacts.check()
 
 
-def pressing_forces(wheels: int) -> np.ndarray:
-    """Return the forces of the last evaluation inside `rolling_forces`, shape (wheels, 3), inertial axes [N]."""
-    return compiled.board["force"][0, :wheels].copy()
+@contextmanager
+def watched_rolling(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    surface: Surface,
+    wheels: Mapping[str, str],
+    stabilisation: float,
+    constrained: Sequence[tuple[bool, bool, bool]],
+) -> Iterator[EdgeContacts]:
+    """Apply forces as in `rolling_forces`, but leave checks to the caller.
+
+    Parameters
+    ----------
+    model, data, surface, wheels, stabilisation
+        As in `rolling_forces`.
+    constrained : sequence
+        Which velocities of each wheel's contact are zero: lateral, forward and normal.
+    """
+    with (
+        claim_board(data, compiled.ROLLING) as board,
+        _write_blackboard(board, model, surface, wheels, stabilisation, constrained),
+        watch_state(board, model, data, WRONG),
+        _record(EdgeContacts(board, model, data, [np.inf] * len(wheels))) as contacts,
+    ):
+        yield contacts
 
 
 def stiffen(model: mujoco.MjModel, wheels: Mapping[str, str], softness: float) -> None:
@@ -159,37 +206,60 @@ def stiffen(model: mujoco.MjModel, wheels: Mapping[str, str], softness: float) -
     MuJoCo takes R = (1 - impedance) / impedance times the mean inverse weight of the wheel's body. This function
     scales that weight, which only constraints use.
     """
-    for name in wheels:
-        model.body_invweight0[model.geom(name).bodyid[0]] *= softness
+    for body in {int(model.geom(name).bodyid[0]) for name in wheels}:
+        model.body_invweight0[body] *= softness
 
 
-def _check_pairs(model: mujoco.MjModel, wheels: Mapping[str, str]) -> None:
-    for wheel, ground in wheels.items():
-        ids = {model.geom(wheel).id, model.geom(ground).id}
-        pairs = [i for i in range(model.npair) if {int(model.pair_geom1[i]), int(model.pair_geom2[i])} == ids]
-        if len(pairs) != 1:
-            raise ValueError(f"there must be one contact pair of {ground!r} and {wheel!r}, not {len(pairs)}")
-        if model.pair_dim[pairs[0]] != 3:
-            raise ValueError(f"the pair of {ground!r} and {wheel!r} must have condim 3")
-        if not model.pair_margin[pairs[0]] > 0:
-            raise ValueError(f"the pair of {ground!r} and {wheel!r} must have a margin above 0, such as 1e-3")
+@contextmanager
+def _record(contacts: EdgeContacts) -> Iterator[EdgeContacts]:
+    try:
+        yield contacts
+    finally:
+        contacts.look()
+        contacts.detach()
+
+
+def _check_options(model: mujoco.MjModel, needed: Iterable[str]) -> None:
+    for name in needed:
+        if model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"):
+            raise ValueError(f"the flag {name.lower()} is disabled, without which there are no {_NEEDED[name]}")
+    if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
+        raise ValueError("the flag sleep is enabled; the forces on wheels need all bodies awake")
+
+
+def _find_pair(model: mujoco.MjModel, wheel: str, ground: str) -> int:
+    ids = {model.geom(wheel).id, model.geom(ground).id}
+    pairs = [i for i in range(model.npair) if {int(model.pair_geom1[i]), int(model.pair_geom2[i])} == ids]
+    if len(pairs) != 1:
+        raise ValueError(f"there must be one contact pair of {ground!r} and {wheel!r}, not {len(pairs)}")
+    if model.pair_dim[pairs[0]] != 3:
+        raise ValueError(f"the pair of {ground!r} and {wheel!r} must have condim 3")
+    if not model.pair_margin[pairs[0]] > 0:
+        raise ValueError(f"the pair of {ground!r} and {wheel!r} must have a margin above 0, such as 1e-3")
+    return pairs[0]
 
 
 @contextmanager
 def _write_blackboard(
-    model: mujoco.MjModel, surface: Surface, wheels: Mapping[str, str], stabilisation: float = 0.0
+    entries: np.ndarray,
+    model: mujoco.MjModel,
+    surface: Surface,
+    wheels: Mapping[str, str],
+    stabilisation: float = 0.0,
+    constrained: Sequence[tuple[bool, bool, bool]] = (),
 ) -> Iterator[None]:
-    """Write wheels and ground on the blackboard; the arrays that it points to live as long as the block."""
+    """Write wheels and ground on a blackboard (1,); the arrays that it points to live as long as the block."""
     if not 0 < len(wheels) <= compiled.WHEEL_COUNT:
         raise ValueError(f"there are {len(wheels)} wheels; there must be 1 to {compiled.WHEEL_COUNT}")
     offsets, function = layout.find_layout(), surface.function.real
     parameters = np.ascontiguousarray(surface.parameters, float)
-    board = compiled.board[0]
+    board = entries[0]
     board["surface"], board["parameters"] = function.address, parameters.ctypes.data
     board["parameter_count"] = len(parameters)
-    for name in ("ncon", "contact", "efc_aref", "efc_KBIP", "efc_R"):
+    for name in ("ncon", "nefc", "contact", "efc_aref", "efc_KBIP", "efc_R", "efc_type"):
         board[f"{name}_at"] = offsets.data[name]
     for name, field in (
+        ("dist", "dist"),
         ("frame", "frame"),
         ("margin", "includemargin"),
         ("friction", "friction"),
@@ -198,7 +268,9 @@ def _write_blackboard(
     ):
         board[f"{name}_at"] = offsets.contact[field]
     board["contact_size"], board["stabilisation"] = offsets.contact_size, stabilisation
-    board["pyramidal"] = model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
+    board["pyramidal_type"] = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL)
+    for k, axes in enumerate(constrained):
+        board["constrained"][k] = axes
     _write_wheels(board, model, wheels)
     search = rim_search(surface, [float(radius) for radius in board["radius"][: len(wheels)]])
     board["curved"] = search.curved
@@ -208,12 +280,14 @@ def _write_blackboard(
 
 
 def _write_wheels(board: np.void, model: mujoco.MjModel, wheels: Mapping[str, str]) -> None:
-    board["wheels"], board["lost"], board["found"] = len(wheels), 0, 0
+    board["wheels"] = len(wheels)
     for k, (wheel, ground) in enumerate(wheels.items()):
         geom, plane = model.geom(wheel), model.geom(ground)
         if geom.type[0] != mujoco.mjtGeom.mjGEOM_CYLINDER:
             raise ValueError(f"{wheel!r} must be a cylinder, whose radius and axis are the wheel's")
         if plane.type[0] != mujoco.mjtGeom.mjGEOM_PLANE or plane.bodyid[0] != 0:
             raise ValueError(f"{ground!r} must be a plane that belongs to the world")
+        if model.body_weldid[geom.bodyid[0]] == 0:
+            raise ValueError(f"{wheel!r} must belong to a body that moves")
         board["geom"][k], board["body"][k], board["ground"][k] = geom.id, geom.bodyid[0], plane.id
         board["radius"][k] = geom.size[0]

@@ -21,6 +21,7 @@ import numpy as np
 from mujoco.introspect import ast_nodes, enums, functions, structs
 
 from ..engine import EngineError
+from .library import callbacks_set_aside
 
 _SIZES = {
     "mjtNum": 8,
@@ -127,6 +128,7 @@ def _check_state(layout: Layout, data: mujoco.MjData) -> None:
             "efc_aref": data.efc_aref,
             "efc_KBIP": data.efc_KBIP,
             "efc_R": data.efc_R,
+            "efc_type": data.efc_type,
             "contact": data.contact.dist,
         }
     for name, view in views.items():
@@ -153,14 +155,15 @@ def find_layout() -> Layout:
         _check_functions()
         contact, contact_size, _ = _structure_layout("mjContact")
         layout = Layout(_structure_layout("mjData")[0], contact, contact_size)
-        model = mujoco.MjModel.from_xml_string(_PROBE)
-        if not model._address:
-            raise _layout_error("its model")
-        for height in (0.0, 1.0):
-            data = mujoco.MjData(model)
-            data.qpos[[2, 9]] += height
-            mujoco.mj_forward(model, data)
-            _check_state(layout, data)
+        with callbacks_set_aside():
+            model = mujoco.MjModel.from_xml_string(_PROBE)
+            if not model._address:
+                raise _layout_error("its model")
+            for height in (0.0, 1.0):
+                data = mujoco.MjData(model)
+                data.qpos[[2, 9]] += height
+                mujoco.mj_forward(model, data)
+                _check_state(layout, data)
     except (AttributeError, KeyError) as error:
         raise EngineError(f"MuJoCo {mujoco.__version__} describes itself otherwise than 4.0: {error}") from error
     return layout

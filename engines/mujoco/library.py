@@ -1,4 +1,4 @@
-"""MuJoCo's shared library: its C functions for compiled code, and its table of collision functions."""
+"""MuJoCo's shared library: its C functions for compiled code, its control callback and its collision functions."""
 
 # MuJoCo's compiled bindings carry no types.
 # pyright: reportAttributeAccessIssue=false
@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ import mujoco
 from ..engine import EngineError
 
 _GEOM_TYPES = 9  # mjNGEOMTYPES, the table's width
+_CALLBACKS = ("control", "passive", "contactfilter", "sensor", "act_dyn", "act_gain", "act_bias")
 _PATTERNS = ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll")
 
 
@@ -65,3 +68,35 @@ def collision_slot() -> Any:
     except ValueError as error:
         raise EngineError(f"MuJoCo {mujoco.__version__} has no table mjCOLLISIONFUNC; MuJoCo 4.0 has") from error
     return ctypes.c_void_p.from_buffer(table, index * ctypes.sizeof(ctypes.c_void_p))
+
+
+def control_slot() -> Any:
+    """Return MuJoCo's pointer to the control callback; its ``value`` can be set.
+
+    Raises
+    ------
+    EngineError
+        If the library has no such pointer.
+    """
+    return _callback_slot("control")
+
+
+@contextmanager
+def callbacks_set_aside() -> Iterator[None]:
+    """Take the user's callbacks out of MuJoCo inside the block: those in Python fail while a model is compiled."""
+    slots = [_callback_slot(name) for name in _CALLBACKS]
+    before = [slot.value for slot in slots]
+    try:
+        for slot in slots:
+            slot.value = None
+        yield
+    finally:
+        for slot, value in zip(slots, before, strict=True):
+            slot.value = value
+
+
+def _callback_slot(name: str) -> Any:
+    try:
+        return ctypes.c_void_p.in_dll(load_library(), f"mjcb_{name}")
+    except ValueError as error:
+        raise EngineError(f"MuJoCo {mujoco.__version__} has no pointer mjcb_{name}; MuJoCo 4.0 has") from error

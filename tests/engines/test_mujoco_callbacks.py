@@ -14,8 +14,8 @@ from mujoco.introspect import structs
 
 from velodrome.engines.engine import EngineError
 from velodrome.engines.mujoco import layout
-from velodrome.engines.mujoco.knife_edge import knife_edges, rolling_forces, standing
-from velodrome.engines.mujoco.library import collision_slot
+from velodrome.engines.mujoco.knife_edge import knife_edges, rolling_forces
+from velodrome.engines.mujoco.library import collision_slot, control_slot
 from velodrome.engines.mujoco.rolling_disc import TOUCHING, disc_mjcf, steady_state
 from velodrome.reference.surface import Paraboloid, Plane
 
@@ -35,44 +35,39 @@ def test_what_was_there_is_restored_however_the_block_ends() -> None:
         try:
             with knife_edges(model, data, Plane(), TOUCHING):
                 assert collision_slot().value != before
-                assert mujoco.get_mjcb_control() is not None
+                assert control_slot().value is not None
                 if end is not None:
                     raise end
         except (ValueError, KeyboardInterrupt):
             pass
         assert collision_slot().value == before
-        assert mujoco.get_mjcb_control() is None
+        assert control_slot().value is None
 
 
-def test_two_at_once_are_refused_and_the_first_goes_on() -> None:
+def test_a_state_has_one_block_at_a_time() -> None:
     model, data = disc()
-    other = disc()
     with knife_edges(model, data, Plane(), TOUCHING):
-        with pytest.raises(EngineError, match="one must end before"), rolling_forces(*other, Plane(), TOUCHING, 20.0):
+        with (
+            pytest.raises(EngineError, match="one must end before"),
+            rolling_forces(model, data, Plane(), TOUCHING, 1.0),
+        ):
             pass
         mujoco.mj_forward(model, data)
         # Still the first's: a knife edge's contact is exact, a cylinder's has several points.
         assert data.ncon == 1
-    mujoco.set_mjcb_control(lambda model, data: None)
-    try:
-        with pytest.raises(EngineError, match="has a control callback already"), knife_edges(*other, Plane(), TOUCHING):
-            pass
-        assert mujoco.get_mjcb_control() is not None
-    finally:
-        mujoco.set_mjcb_control(None)
 
 
-def test_other_models_and_states_keep_their_own_contacts() -> None:
+def test_other_models_keep_their_own_contacts() -> None:
     model, data = disc()
-    for other_model, other in (disc(), (model, disc()[1])):
-        other.qpos[2] -= 1e-3
+    other_model, other = disc()
+    other.qpos[2] -= 1e-3
+    mujoco.mj_forward(other_model, other)
+    expected = [other.ncon, *other.contact.dist, *other.contact.pos.ravel(), *other.qacc]
+    with knife_edges(model, data, Plane(), TOUCHING):
         mujoco.mj_forward(other_model, other)
-        expected = [other.ncon, *other.contact.dist, *other.contact.pos.ravel(), *other.qacc]
-        with knife_edges(model, data, Plane(), TOUCHING):
-            mujoco.mj_forward(other_model, other)
-            again = [other.ncon, *other.contact.dist, *other.contact.pos.ravel(), *other.qacc]
-        # The same computation: only where the solver starts may differ by round-off.
-        np.testing.assert_allclose(again, expected, rtol=1e-12, atol=1e-9)
+        again = [other.ncon, *other.contact.dist, *other.contact.pos.ravel(), *other.qacc]
+    # The same computation: only where the solver starts may differ by round-off.
+    np.testing.assert_allclose(again, expected, rtol=1e-12, atol=1e-9)
 
 
 def test_other_wheels_of_the_model_keep_their_own_contacts() -> None:
@@ -105,24 +100,25 @@ def test_models_that_cannot_work_are_refused(change, message) -> None:
     model, data = disc(xml.replace(*change))
     with pytest.raises(ValueError, match=message), knife_edges(model, data, Plane(), TOUCHING):
         pass
-    assert mujoco.get_mjcb_control() is None
+    assert control_slot().value is None
 
 
 def test_wheel_without_contact_is_seen_and_flies() -> None:
     model, data = disc()
-    with knife_edges(model, data, Paraboloid(0.1), TOUCHING):
+    with knife_edges(model, data, Paraboloid(0.1), TOUCHING) as contacts:
+        # A disc for the plane is a little too low for a bowl.
         mujoco.mj_forward(model, data)
-        assert standing()
+        assert contacts.standing()
         data.qpos[3:7] = [1, 0, 0, 0]  # its axle along z: it lies flat
         mujoco.mj_forward(model, data)
         assert data.ncon == 0
-        assert not standing()
+        assert not contacts.standing()
 
 
 def test_callbacks_that_are_not_called_are_no_ride() -> None:
     model, data = disc()
-    with knife_edges(model, data, Plane(), TOUCHING), pytest.raises(EngineError, match="did not call"):
-        standing()
+    with knife_edges(model, data, Plane(), TOUCHING) as contacts, pytest.raises(EngineError, match="did not call"):
+        contacts.standing()
 
 
 def test_wheel_lifts_off() -> None:
@@ -173,7 +169,7 @@ def test_fields_that_moved_give_an_error(unknown_layout, monkeypatch, structure,
     ):
         pass
     assert collision_slot().value == before
-    assert mujoco.get_mjcb_control() is None
+    assert control_slot().value is None
 
 
 def test_another_function_gives_an_error(unknown_layout, monkeypatch) -> None:

@@ -266,7 +266,7 @@ def test_a_section_that_leaves_the_rideable_part_is_ridden_up_to_there() -> None
     physical = assess_family(curve).physical
     (last,) = np.flatnonzero(physical[:-1] & ~physical[1:])
 
-    def make_end(k: int) -> SectionEnd:
+    def make_end(k: int | np.integer) -> SectionEnd:
         return SectionEnd("hopf", curve.equations.motion(curve.points[k].unknowns), 1j, curve.points[k], k)
 
     ((start, end),) = find_rideable_parts_of_section(curve, (make_end(last - 4), make_end(last + 4)))

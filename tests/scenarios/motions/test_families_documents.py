@@ -19,7 +19,7 @@ from velodrome.scenarios.motions import families as motions_families
 BICYCLE = Bicycle()
 
 
-def make_end(curve: Family, k: int) -> SectionEnd:
+def make_end(curve: Family, k: int | np.integer) -> SectionEnd:
     return SectionEnd("hopf", curve.equations.motion(curve.points[k].unknowns), 1j, curve.points[k], k)
 
 

@@ -1,0 +1,181 @@
+"""Vehicles of the examples on knife edges in MuJoCo: closed form, energy, redundant rows, and Exudyn."""
+
+import importlib
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from velodrome.engines.engine import EngineError
+from velodrome.engines.mujoco.compiled import DEPENDENT, solve_rows
+from velodrome.engines.rolling import observe_wheel
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "examples" / "rolling"))
+VEHICLES: Any = importlib.import_module("vehicles")
+RIDES: Any = importlib.import_module("mujoco_vehicles")
+# RK4's error of a step is (w h)^5 / 120 of what turns at the rate w; the fastest are the wheels, at less than 25 rad/s.
+RATE, ROUND_OFF = 25.0, 2.0**-52
+
+
+def local_error(step: float) -> float:
+    return (RATE * step) ** 5 / 120
+
+
+def find_weight(vehicle: Any) -> float:
+    return VEHICLES.GRAVITY * sum(body.mass for body in vehicle.bodies)
+
+
+def find_speeds(vehicle: Any) -> float:
+    return max(float(np.linalg.norm(body.velocity)) for body in vehicle.bodies)
+
+
+@pytest.mark.parametrize("rolling", ["contacts", "forces"])
+def test_tricycle_keeps_its_circle(rolling) -> None:
+    """Closed form, 1 s: within 1e-7 m at 2 ms.
+
+    The speeds are constant, so RK4 turns every wheel by a constant angle and errs in the yaw alone, by far less than in
+    the wheels' turns. Rows of the softness R creep by R F / b; 1e-5 of MuJoCo's R = (1e-4 / 0.9999) A, A the wheel's
+    inverse weight of about 1 / kg, at a few hundred N and b = 40 1/s, are 1e-8 m/s.
+    """
+    vehicle = VEHICLES.make_tricycle()
+    found = RIDES.ride_vehicle(vehicle, 1.0, 0.002, rolling)
+    exact = np.array([VEHICLES.find_tricycle_positions(vehicle, time) for time in found.time])
+    off = np.linalg.norm(found.position - exact, axis=2).max()
+    creep = 1e-8 if rolling == "contacts" else 0.0
+    assert off < creep + 500 * local_error(0.002) * 2.0
+    assert off < 1e-7
+    force = np.array([VEHICLES.find_tricycle_force(vehicle, time) for time in found.time])
+    # Forces are accelerations of the state's error, at rates of the stabilisation.
+    np.testing.assert_allclose(found.force.sum(axis=1), force, rtol=0, atol=1e-6 * find_weight(vehicle))
+    assert np.ptp(found.energy) < 1e-7 * abs(found.energy[0])
+    assert found.standing
+
+
+def test_redundant_rows_change_nothing_but_the_division_of_forces() -> None:
+    """All three wheels of the tricycle held laterally: the rear ones say the same."""
+    vehicle = VEHICLES.make_tricycle()
+    whole = replace(vehicle, wheels=tuple(replace(wheel, constrained=(True, True, True)) for wheel in vehicle.wheels))
+    found, expected = (RIDES.ride_vehicle(each, 0.5, 0.002, "forces") for each in (whole, vehicle))
+    np.testing.assert_allclose(found.position, expected.position, rtol=0, atol=250 * local_error(0.002))
+    total = find_weight(vehicle)
+    np.testing.assert_allclose(found.force.sum(axis=1), expected.force.sum(axis=1), rtol=0, atol=1e-9 * total)
+    # The smallest forces are shared by both rear wheels, not carried by one.
+    assert np.abs(expected.force[0, 1, 1]) < 1e-9 * total
+    assert np.abs(found.force[0, 1, 1]) > 0.1 * np.abs(expected.force[0, 0, 1])
+
+
+def test_contradicting_rows_are_seen() -> None:
+    """All four wheels of the cart held laterally, in a bowl."""
+    cart = VEHICLES.make_cart()
+    whole = replace(cart, wheels=tuple(replace(wheel, constrained=(True, True, True)) for wheel in cart.wheels))
+    with pytest.raises(EngineError, match="constraints of rolling contradict each other"):
+        RIDES.ride_vehicle(whole, 0.01, 0.001, "forces", samples=1)
+
+
+@pytest.mark.parametrize("name", ["cart", "tandem"])
+def test_forces_of_rolling_ride_in_a_bowl(name) -> None:
+    """Energy is kept, gaps stay closed, and the motion converges with the step's fourth power."""
+    vehicle = getattr(VEHICLES, f"make_{name}")()
+    rides = {step: RIDES.ride_vehicle(vehicle, 1.0, step, "forces") for step in (0.004, 0.002, 0.001)}
+    ends = {step: ride.position[-1] for step, ride in rides.items()}
+    order = np.log2(np.linalg.norm(ends[0.004] - ends[0.002]) / np.linalg.norm(ends[0.002] - ends[0.001]))
+    assert order > 3.5
+    found, speed = rides[0.001], find_speeds(vehicle)
+    # The step's error moves lengths by as much as it does speeds in 1 s.
+    bound = 1000 * local_error(0.001) * speed
+    assert np.abs(found.gap).max() < bound
+    assert np.ptp(found.energy) < bound * find_weight(vehicle)
+    assert found.standing
+
+
+def test_tandem_under_contacts_is_the_one_under_forces() -> None:
+    """Nearly rigid rows creep by 1e-8 m/s (see the tricycle), which its falling over amplifies by e^(3 t) or so."""
+    vehicle = VEHICLES.make_tandem()
+    contacts, forces = (RIDES.ride_vehicle(vehicle, 1.0, 0.001, rolling) for rolling in ("contacts", "forces"))
+    np.testing.assert_allclose(contacts.position, forces.position, rtol=0, atol=1e-8 * np.exp(3.0))
+    np.testing.assert_allclose(contacts.force, forces.force, rtol=0, atol=1e-6 * find_weight(vehicle))
+
+
+def test_cart_under_contacts_scrubs() -> None:
+    """Friction holds all four wheels laterally, which cannot all roll: they strain, and energy is lost, never won."""
+    vehicle = VEHICLES.make_cart()
+    found = RIDES.ride_vehicle(vehicle, 1.0, 0.001, "contacts")
+    free = RIDES.ride_vehicle(vehicle, 1.0, 0.001, "forces")
+    assert found.standing
+    assert np.all(np.diff(found.energy) < 1e-9 * abs(found.energy[0]))
+    strain = np.abs(found.force - free.force).max()
+    assert strain > 10.0
+    # Inside the cone of friction 2 at the start, and not far from where it rolls.
+    for wheel, force in zip(vehicle.wheels, found.force[0], strict=True):
+        body = vehicle.bodies[vehicle.number(wheel.body)]
+        normal = observe_wheel(vehicle.surface, wheel.radius, body.position, body.rotation[:, 1]).normal
+        load = force @ normal
+        assert np.linalg.norm(force - load * normal) < 2.0 * load * (1 + 1e-6)
+    assert np.linalg.norm(found.position - free.position, axis=2).max() < 1e-3
+
+
+@pytest.mark.parametrize(("name", "rolling"), [("tandem", "contacts"), ("tandem", "forces"), ("cart", "forces")])
+def test_vehicles_agree_with_exudyn(name, rolling) -> None:
+    """At 1 ms within 1e-5 m: what Exudyn's second-order method leaves."""
+    other: Any = pytest.importorskip("exudyn_vehicles")
+    vehicle = getattr(VEHICLES, f"make_{name}")()
+    found, expected = RIDES.ride_vehicle(vehicle, 1.0, 0.001, rolling), other.ride_vehicle(vehicle, 0.001, 1.0)
+    np.testing.assert_allclose(found.time, expected.time, atol=1e-9)
+    np.testing.assert_allclose(found.position, expected.position, rtol=0, atol=1e-5)
+    coarse = other.ride_vehicle(vehicle, 0.002, 1.0).position
+    ratio = np.abs(coarse - found.position).max() / np.abs(expected.position - found.position).max()
+    # The difference falls with Exudyn's step as its method's second order says, or faster: it is Exudyn's.
+    assert ratio > 2**1.5
+
+
+@pytest.mark.slow
+def test_script_tells_all_rides(capsys) -> None:
+    RIDES.main()
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines[1:]] == ["tricycle"] * 4 + ["cart"] * 4 + ["tandem"] * 4
+    # The tricycle's distance from its exact circle.
+    assert all(float(line.split()[4]) < 1e-7 for line in lines[1:5])
+
+
+# ---------------------------------------------------------------------------------------------- redundant rows
+
+
+def make_rows(scales: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Return J M^-1 J^T of three independent rows and two that depend on them, and J."""
+    rng = np.random.default_rng(1)
+    rows = rng.normal(size=(3, 8))
+    rows = np.vstack([rows, rows[0] + 2 * rows[1], rows[2]]) * np.array(scales)[:, None]
+    return rows @ rows.T, rows
+
+
+@pytest.mark.parametrize("scales", [[1.0] * 5, [1.0, 1e3, 1e-3, 1e2, 1.0]])
+def test_redundant_rows_have_the_smallest_forces(scales) -> None:
+    schur, rows = make_rows(scales)
+    target = rows @ np.random.default_rng(2).normal(size=8)
+    found = target.copy()
+    assert solve_rows(schur, found, 5) < 1e-12
+    np.testing.assert_allclose(schur @ found, target, rtol=0, atol=1e-12 * np.abs(target).max())
+    # Of all solutions the least in sqrt(S_ii) F_i: a least-squares problem without a weight.
+    weight = np.sqrt(np.diag(schur))
+    least = np.linalg.lstsq(schur / weight[:, None] / weight, target / weight, rcond=1e-10)[0] / weight
+    np.testing.assert_allclose(found * weight, least * weight, rtol=0, atol=1e-6 * np.abs(least * weight).max())
+
+
+def test_contradicting_rows_leave_a_residual() -> None:
+    schur, rows = make_rows([1.0] * 5)
+    target = rows @ np.ones(8)
+    target[4] += 1e-3 * np.abs(target).max()
+    assert solve_rows(schur, target, 5) > 1e-4
+
+
+def test_independent_rows_are_solved_directly() -> None:
+    rows = np.random.default_rng(3).normal(size=(4, 8))
+    schur, target = rows @ rows.T, np.arange(1.0, 5.0)
+    found = target.copy()
+    assert solve_rows(schur, found, 4) == 0.0
+    assert np.linalg.det(schur / np.diag(schur)) > DEPENDENT
+    condition = np.linalg.cond(schur)
+    np.testing.assert_allclose(found, np.linalg.solve(schur, target), rtol=10 * condition * ROUND_OFF)
