@@ -255,7 +255,7 @@ def test_parts_end_where_a_rim_grazes_the_ground() -> None:
     # Zero but for round-off of up to 1e-4, see `rideability`, and for the samples' distance squared.
     assert abs((height[seen] / (1 - np.cos(turn[seen]))).min()) < 2e-4
     physical = assess_family(curve).physical
-    (last,) = np.flatnonzero(physical[:-1] & ~physical[1:])
+    (last,) = np.flatnonzero(physical[:-1] & ~physical[1:]).tolist()
     rates = [curve.equations.motion(curve.points[k].unknowns).rear_rate for k in (last, last + 1)]
     assert min(rates) <= end.motion.rear_rate <= max(rates)
 
@@ -264,9 +264,9 @@ def test_a_section_that_leaves_the_rideable_part_is_ridden_up_to_there() -> None
     curve = trough_curve()
     ((_, grazing),) = find_rideable_parts(curve)
     physical = assess_family(curve).physical
-    (last,) = np.flatnonzero(physical[:-1] & ~physical[1:])
+    (last,) = np.flatnonzero(physical[:-1] & ~physical[1:]).tolist()
 
-    def make_end(k: int | np.integer) -> SectionEnd:
+    def make_end(k: int) -> SectionEnd:
         return SectionEnd("hopf", curve.equations.motion(curve.points[k].unknowns), 1j, curve.points[k], k)
 
     ((start, end),) = find_rideable_parts_of_section(curve, (make_end(last - 4), make_end(last + 4)))

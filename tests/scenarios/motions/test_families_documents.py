@@ -19,7 +19,7 @@ from velodrome.scenarios.motions import families as motions_families
 BICYCLE = Bicycle()
 
 
-def make_end(curve: Family, k: int | np.integer) -> SectionEnd:
+def make_end(curve: Family, k: int) -> SectionEnd:
     return SectionEnd("hopf", curve.equations.motion(curve.points[k].unknowns), 1j, curve.points[k], k)
 
 
@@ -28,7 +28,7 @@ def test_sections_are_ridden_wholly_partly_or_not(monkeypatch: pytest.MonkeyPatc
     curve = trace(BICYCLE, Torus(3.0, 0.5), 2, 0.05)
     monkeypatch.setattr(motions_families, "follow_modes", lambda family: np.zeros((len(family.points), 7), complex))
     plain = motions_families.examine_curve(curve)
-    (last,) = np.flatnonzero(plain.physical[:-1] & ~plain.physical[1:])
+    (last,) = np.flatnonzero(plain.physical[:-1] & ~plain.physical[1:]).tolist()
     places = [(last - 6, last - 2), (last - 1, last + 2), (last + 3, last + 6)]
     sections = [(make_end(curve, low), make_end(curve, high)) for low, high in places]
     monkeypatch.setattr(motions_families, "stable_sections", lambda _: sections)
