@@ -1,7 +1,14 @@
 """Scenario files: their schema, surfaces, engine settings and start."""
 
 from .bicycle_file import BicycleFile, read_bicycle_file
-from .engine_settings import configure_engine, installed_engines, list_engine_faults, refuse_engine
+from .engine_settings import (
+    EngineChoice,
+    choose_engines,
+    configure_engine,
+    fits_engine,
+    installed_engines,
+    list_engine_faults,
+)
 from .parameters import PARAMETERS
 from .resolved import resolve_scenario
 from .schema import (
@@ -34,14 +41,17 @@ __all__ = [
     "PARAMETERS",
     "BicycleFile",
     "CircularTable",
+    "EngineChoice",
     "Gate",
     "Scenario",
     "Simulation",
     "Start",
     "Table",
     "Texts",
+    "choose_engines",
     "configure_engine",
     "error_place",
+    "fits_engine",
     "format_validation_error",
     "installed_engines",
     "join_complaints",
@@ -57,7 +67,6 @@ __all__ = [
     "read_bicycle_file",
     "read_scenario_file",
     "read_toml",
-    "refuse_engine",
     "resolve_scenario",
     "set_keys",
     "show_value",
