@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...reference.kernels.compilation import jit
-from ...reference.kernels.vector import add, cross, dot
+from ...reference.kernels.vector import add, cross, dot, subtract
 from ...reference.kernels.wheel import contact_frame
 from .kernel import rotate_vector
 from .pose import locate_body, rotate_axes
@@ -27,12 +27,6 @@ from .pose import locate_body, rotate_axes
 def view_from(body, v):
     """Return the components of an inertial vector in the axes of a body with unit vectors ``body``."""
     return dot(body[0], v), dot(body[1], v), dot(body[2], v)
-
-
-@jit
-def subtract(a, b):
-    """Return a - b."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @jit

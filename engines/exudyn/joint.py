@@ -45,7 +45,7 @@ from ...reference.rim import rim_search
 from ...reference.surface import Surface
 from . import general, kernel
 from .attachment import INERTIAL_FRAME, Attachment, find_attachment, list_nodes, reference_coordinates, stack_frames
-from .pose import EULER_PARAMETERS, FIXED, Frames
+from .pose import EULER_PARAMETERS, FIXED, TREE, Frames
 
 SLIP_ROWS = (0, 1)  # of a wheel's three
 
@@ -85,8 +85,8 @@ def CreateRollingJointOnSurface(
     mbs: exu.MainSystem,
     name: str = "",
     bodyNumbers: Sequence[Any] = (),
-    axisPosition: Sequence[float] = (0.0, 0.0, 0.0),
-    axisVector: Sequence[float] = (1.0, 0.0, 0.0),
+    axisPosition: ArrayLike = (0.0, 0.0, 0.0),
+    axisVector: ArrayLike = (1.0, 0.0, 0.0),
     discRadius: float | Sequence[float] = 0.0,
     surface: Surface | None = None,
     constrainedAxes: ArrayLike = (1, 1, 1),
@@ -110,9 +110,9 @@ def CreateRollingJointOnSurface(
         Name of the constraint.
     bodyNumbers : sequence
         The wheels: rigid bodies, their nodes, or markers (MarkerBodyRigid, MarkerNodeRigid,
-        MarkerKinematicTreeRigid), with nodes of any kind. Several wheels of one body are markers on it.
-    axisPosition, axisVector : array_like, shape (3,)
-        Wheel centre [m] and axle, of any length, in the axes of the body, or of the marker; the same for all wheels.
+        MarkerKinematicTreeRigid), with nodes of any kind. A body with several wheels stands there several times.
+    axisPosition, axisVector : array_like, shape (3,) or (k, 3)
+        Wheel centre [m] and axle, of any length, in the axes of the body, or of the marker, for all wheels or for each.
     discRadius : float or sequence of float
         Radius of the edge [m], one for all wheels or one for each.
     surface : Surface
@@ -140,25 +140,28 @@ def CreateRollingJointOnSurface(
     """
     if len(bodyNumbers) == 0 or surface is None:
         raise ValueError("a rolling joint takes a surface, and at least one wheel in bodyNumbers")
-    wheels = [_offset(find_attachment(mbs, number), axisPosition) for number in bodyNumbers]
+    count = len(bodyNumbers)
+    centres = _read_vectors("axisPosition", axisPosition, count)
+    axles = _read_vectors("axisVector", axisVector, count)
+    wheels = [_offset(find_attachment(mbs, body), centre) for body, centre in zip(bodyNumbers, centres, strict=True)]
     ground = INERTIAL_FRAME if groundNumber is None else find_attachment(mbs, groundNumber)
     nodes = list_nodes([*wheels, ground])
     if not nodes:
         raise ValueError("nothing can roll: the wheels and their ground are all fixed")
+    if any(len(list_nodes([each, ground])) == 1 and each.kind == ground.kind != TREE for each in wheels):
+        raise ValueError(f"nothing can roll: a wheel is fixed to the body of its ground, node {int(ground.node)}")
     if len(nodes) > 2:
         raise ValueError(
             f"the wheels and their ground belong to {len(nodes)} nodes; the engine's connector joins at most two, so "
             "give each wheel a joint of its own"
         )
-    count = len(wheels)
     radii = np.broadcast_to(np.asarray(discRadius, float), count).copy()
     if not np.all(radii > 0) or not np.all(np.isfinite(radii)):
         raise ValueError(f"discRadius is {discRadius!r}; a wheel's radius is a positive number [m]")
     if not (math.isfinite(newmarkRatio) and newmarkRatio > 0):
         raise ValueError(f"newmarkRatio is {newmarkRatio!r}; it must be a positive number, about 0.5")
     frames = stack_frames([*wheels, ground])
-    triad = _make_triad(axisVector)
-    triads = np.stack([triad if np.array_equal(a.rotation, np.eye(3)) else triad @ a.rotation.T for a in wheels])
+    triads = np.stack([_make_triad(axle) @ each.rotation.T for axle, each in zip(axles, wheels, strict=True)])
     order = _number_rows(constrainedAxes, count)
     start = reference_coordinates(mbs, nodes)
     rolling = (frames, triads, radii, order)
@@ -182,12 +185,17 @@ def slip_equations(mbs: exu.MainSystem, joint: RollingJoint) -> list[int]:
     return [equations[row] for row in joint.order[:, SLIP_ROWS].ravel() if row >= 0]
 
 
-def _offset(wheel: Attachment, centre: Sequence[float]) -> Attachment:
-    """Move the frame of a wheel to the wheel's centre."""
-    shift = np.asarray(centre, float)
-    if shift.shape != (3,) or not np.all(np.isfinite(shift)):
-        raise ValueError(f"axisPosition is {centre!r}; it must be a vector of three numbers [m]")
-    return replace(wheel, position=wheel.position + wheel.rotation @ shift)
+def _read_vectors(name: str, values: ArrayLike, wheels: int) -> np.ndarray:
+    """Return vectors of the wheels (k, 3) from one for all of them or one for each."""
+    found = np.asarray(values, float)
+    if found.shape not in ((3,), (wheels, 3)) or not np.all(np.isfinite(found)):
+        raise ValueError(f"{name} is {values!r}; it must be a vector of three numbers, for all wheels or for each")
+    return np.broadcast_to(found, (wheels, 3))
+
+
+def _offset(wheel: Attachment, centre: np.ndarray) -> Attachment:
+    """Move the frame of a wheel to the wheel's centre, given in the frame's axes."""
+    return replace(wheel, position=wheel.position + wheel.rotation @ centre)
 
 
 def _number_rows(flags: ArrayLike, wheels: int) -> np.ndarray:
@@ -213,13 +221,12 @@ def _add_markers(mbs: exu.MainSystem, nodes: list[Any]) -> list[Any]:
     return [mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=node)) for node in nodes]
 
 
-def _make_triad(axle: Sequence[float]) -> np.ndarray:
+def _make_triad(axle: np.ndarray) -> np.ndarray:
     """Return right-handed unit vectors (3, 3) with an axle in the middle; the y axis gives the identity."""
-    along = np.asarray(axle, float)
-    length = np.linalg.norm(along)
-    if along.shape != (3,) or not (np.isfinite(length) and length > 0):
-        raise ValueError(f"axisVector is {axle!r}; it must be a vector of three numbers, not all zero")
-    along = along / length
+    length = np.linalg.norm(axle)
+    if not length > 0:
+        raise ValueError("axisVector is zero; an axle is a vector of three numbers, not all zero")
+    along = axle / length
     other = np.eye(3)[0 if abs(along[0]) < 0.9 else 1]
     across = np.cross(other, along)
     across /= np.linalg.norm(across)

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...reference.kernels.compilation import jit
-from ...reference.kernels.vector import add, cross
+from ...reference.kernels.vector import add, combine, cross
 from .kernel import axes as euler_parameter_axes
 from .kernel import rotate_vector
 
@@ -84,16 +84,10 @@ def turn_axes(body, axis, angle):
     c, s = np.cos(angle), np.sin(angle)
     x, y, z = body
     if axis == 0:
-        return x, combine_axes(c, y, s, z), combine_axes(c, z, -s, y)
+        return x, combine(c, y, s, z), combine(c, z, -s, y)
     if axis == 1:
-        return combine_axes(c, x, -s, z), y, combine_axes(c, z, s, x)
-    return combine_axes(c, x, s, y), combine_axes(c, y, -s, x), z
-
-
-@jit
-def combine_axes(a, u, b, v):
-    """Return a u + b v."""
-    return a * u[0] + b * v[0], a * u[1] + b * v[1], a * u[2] + b * v[2]
+        return combine(c, x, -s, z), y, combine(c, z, s, x)
+    return combine(c, x, s, y), combine(c, y, -s, x), z
 
 
 @jit
