@@ -27,6 +27,7 @@ from ..reference.surface import Surface
 from .format_version import VERSION_KEY
 from .guard import EngineError as EngineError
 from .guard import GuardedEngine, call_engine, where_raised
+from .libraries import install_command, list_missing
 from .names import suggest_name
 
 if TYPE_CHECKING:
@@ -426,12 +427,31 @@ def _distribution(point: EntryPoint) -> str:
 def engine_names() -> list[str]:
     """Return the names of all installed engines, the reference first.
 
+    Engines that are announced but whose library is not installed are not among them, see `uninstalled_engines`.
+
     Raises
     ------
     ValueError
         If two packages announce engines with the same name.
     """
-    return sorted(_find_entry_points(), key=lambda name: (name != REFERENCE, name))
+    there = (name for name, point in _find_entry_points().items() if not list_missing(point))
+    return sorted(there, key=lambda name: (name != REFERENCE, name))
+
+
+def default_engines() -> list[str]:
+    """Return the names of the engines that ride where none is named, the reference first.
+
+    They are those of the suite's own dependencies. Engines of an extra and of other packages ride when they are chosen.
+    """
+    points = _find_entry_points()
+    own = _distribution(points[REFERENCE]) if REFERENCE in points else None
+    return [name for name in engine_names() if not points[name].extras and _distribution(points[name]) == own]
+
+
+def uninstalled_engines() -> dict[str, str]:
+    """Return the announced engines whose library is not installed, with the command that installs it, by name."""
+    points = sorted(_find_entry_points().items())
+    return {name: install_command(point) for name, point in points if list_missing(point)}
 
 
 def load_engine(name: str) -> GuardedEngine:
@@ -440,12 +460,17 @@ def load_engine(name: str) -> GuardedEngine:
     Raises
     ------
     ValueError
-        If no engine with that name is installed, or the announced object is not an engine, or two packages announce
-        engines with the same name.
+        If no engine with that name is installed, its library is missing, the announced object is not an engine, or two
+        packages announce engines with the same name.
     """
     points = _find_entry_points()
     if name not in points:
         raise ValueError(f"engine {name!r} is not installed ({suggest_name(name, engine_names())})")
+    missing = list_missing(points[name])
+    if missing:
+        raise ValueError(
+            f"engine {name!r} needs {' and '.join(missing)}, not installed; install: {install_command(points[name])}"
+        )
     where = f"engine {name!r}, announced as {points[name].value},"
     engine = None
     try:

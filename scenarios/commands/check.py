@@ -26,7 +26,8 @@ def check_command(
     engine: Annotated[
         list[str] | None,
         typer.Option(
-            help="Judge only this engine; may be given several times. Its settings are those of the scenario's "
+            help="Judge only these engines: a name, a pattern, or all; may be given several times. "
+            "Their settings are those of the scenario's "
             "[engines.NAME].",
             autocompletion=complete_engine,
         ),

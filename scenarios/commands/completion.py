@@ -17,8 +17,8 @@ def complete_scenario(incomplete: str) -> list[str]:
 
 
 def complete_engine(incomplete: str) -> list[str]:
-    """Complete names of announced engines."""
-    return _filter_names(announced_names(), incomplete)
+    """Complete names of announced engines, and ``all``."""
+    return _filter_names([*announced_names(), "all"], incomplete)
 
 
 def complete_shown(incomplete: str) -> list[str]:

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 
 def list_command(as_json: JsonOption = False) -> None:
-    """Scenarios of the library and installed engines."""
-    from ...engines.engine import load_engine
+    """Scenarios of the library, and engines with the commands that install those that are not there."""
+    from ...engines.engine import load_engine, uninstalled_engines
     from ..run import installed_engines
     from ..scenario import library_names, load_scenario
 
@@ -49,6 +49,10 @@ def list_command(as_json: JsonOption = False) -> None:
             engines.append({"name": name, "version": engine.version, **given})
         except ValueError as error:
             engines.append({"name": name, "version": None, "gives": [], "error": " ".join(str(error).split())})
+    engines += [
+        {"name": name, "version": None, "gives": [], "install": command}
+        for name, command in uninstalled_engines().items()
+    ]
     with ending_with(0):
         if as_json:
             print_json({"scenarios": scenarios, "engines": engines})
@@ -70,6 +74,8 @@ def _show_list(scenarios: list[dict[str, Any]], engines: list[dict[str, Any]]) -
     table = Table("engine", "version", "gives, beside coordinates and poses", box=None, pad_edge=False)
     for entry in engines:
         given = Text(entry["error"], "red") if "error" in entry else ", ".join(entry["gives"])
+        if "install" in entry:
+            given = Text(f"not installed: {entry['install']}", "dim")
         table.add_row(entry["name"], entry["version"] or "–", given)
     console.print(table)
 
@@ -81,7 +87,8 @@ def run_command(
     engine: Annotated[
         list[str] | None,
         typer.Option(
-            help="Run only this engine, beside the reference; may be given several times.",
+            help="Run only these engines, beside the reference: a name, a pattern such as 'mujoco-*', or all; may be "
+            "given several times. Without it those of the suite's own dependencies run.",
             autocompletion=complete_engine,
         ),
     ] = None,

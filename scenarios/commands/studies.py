@@ -57,7 +57,8 @@ def precision_command(
     engine: Annotated[
         list[str] | None,
         typer.Option(
-            help="Study only this engine, beside the reference; may be given several times.",
+            help="Study only these engines, beside the reference: a name, a pattern, or all; may be given several "
+            "times.",
             autocompletion=complete_engine,
         ),
     ] = None,

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ...engines.engine import Engine, Settings, UnsuitableProblem, why_failed
+from ...engines.engine import REFERENCE, Engine, Settings, UnsuitableProblem, uninstalled_engines, why_failed
 from ...engines.format_version import VERSION_KEY, read_version
 from ...engines.guard import call_engine
 from ...reference.inputs import NO_INPUTS
@@ -20,15 +20,18 @@ from ..files import make_folder, write_json
 from ..run import RunWatch, Trace, configure_engine, installed_engines, library_versions, read_json
 from ..scenario import (
     OF_THE_MOTION,
+    EngineChoice,
     Gate,
     Scenario,
     Simulation,
+    choose_engines,
+    fits_engine,
     format_validation_error,
+    join_complaints,
     library_names,
     load_scenario,
     make_start,
     read_toml,
-    refuse_engine,
     show_value,
 )
 from .exact import find_exact
@@ -101,7 +104,8 @@ def check_gate(
     sources : sequence of str, optional
         Scenarios, by library name or path; the library's gated ones if not given.
     engines : sequence of str, optional
-        Engines to judge; all that are installed or have a baseline if not given.
+        Engines to judge, by name or pattern, or ``all``; those of the suite's own dependencies and all that have a
+        baseline if not given.
     baselines : Path, optional
         Folder of the baselines; the suite's own if not given.
     chosen : callable
@@ -125,12 +129,12 @@ def check_gate(
     folder = BASELINES if baselines is None else baselines
     scenarios = [load_gated(source) for source in (sources or gated_names())]
     known = {name: read_baseline(name, folder, scenario) for name, scenario in scenarios}
-    judged = _engines_to_judge(engines, known)
+    choice = _engines_to_judge(engines, known)
     verdicts: list[tuple[str, Verdict]] = []
     fresh: dict[str, dict[str, Any]] = {}
     for name, scenario in scenarios:
-        results = _judge_scenario(name, scenario, judged, known[name], watch, chosen, trace, bool(engines), hold_cpu)
-        verdicts += [(name, verdict) for verdict in [*results.verdicts, *_missing_verdicts(judged, results)]]
+        results = _judge_scenario(name, scenario, choice, known[name], watch, chosen, trace, hold_cpu)
+        verdicts += [(name, verdict) for verdict in [*results.verdicts, *_missing_verdicts(choice.names, results)]]
         fresh[name] = {
             VERSION_KEY: BASELINE_VERSION,
             "scenario": name,
@@ -181,14 +185,23 @@ def _ride_parameters(scenario: Scenario) -> dict[str, float]:
     }
 
 
-def _engines_to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Return the names of the engines to judge, including those of a baseline that are not installed any more."""
-    there = installed_engines()
-    names = [*there, *sorted({name for entries in known.values() for name in entries} - set(there))]
-    for engine in wanted or []:
-        if engine not in names:
-            raise ScenarioError(refuse_engine(engine, there))
-    return [name for name in names if not wanted or name in wanted]
+def _engines_to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[str, Any]]) -> EngineChoice:
+    """Choose the engines to judge.
+
+    Without a wish they are those of the suite's own dependencies and all that have a baseline. An engine that has a
+    baseline and is not announced any more is judged too, and fails; one whose library alone is missing is not.
+    """
+    choice, faults = choose_engines(wanted)
+    stored = sorted({name for entries in known.values() for name in entries} - uninstalled_engines().keys())
+    if not wanted:
+        return EngineChoice(tuple(dict.fromkeys([*choice.names, *stored])), frozenset())
+    unknown = [fault for entry, fault in faults.items() if entry not in stored]
+    if unknown:
+        raise ScenarioError(join_complaints(unknown))
+    gone = [entry for entry in faults if entry in stored]
+    # The reference is judged only where it is chosen.
+    chosen = [name for name in choice.names if name != REFERENCE or any(fits_engine(entry, name) for entry in wanted)]
+    return EngineChoice((*chosen, *gone), choice.named | {*gone})
 
 
 @dataclass(frozen=True)
@@ -215,17 +228,16 @@ class _ScenarioResults:
 def _judge_scenario(
     name: str,
     scenario: Scenario,
-    engines: Sequence[str],
+    engines: EngineChoice,
     baseline: Mapping[str, Any],
     watch: RunWatch,
     chosen: Chosen,
     trace: Trace | None,
-    asked: bool,
     hold_cpu: bool,
 ) -> _ScenarioResults:
     """Judge the engines on one scenario against the baseline.
 
-    An engine that the motion does not suit is passed over, unless it was ``asked`` for or has a baseline.
+    An engine that the motion does not suit is passed over, unless it was named or has a baseline.
     """
     start = make_start(scenario)
     try:
@@ -233,7 +245,7 @@ def _judge_scenario(
     except ScenarioError as error:
         raise ScenarioError(f"{name}: {error}") from error
     results = _ScenarioResults([], {}, [], exact.error)
-    for engine_name in engines:
+    for engine_name in engines.names:
         entry = baseline.get(engine_name)
         try:
             values = gate_settings().get(engine_name, {}) | scenario.engines.get(engine_name, {})
@@ -250,7 +262,7 @@ def _judge_scenario(
                 hold_cpu=hold_cpu,
             )
         except Exception as error:  # an engine that raises anything counts as not run
-            if entry is None and not asked and isinstance(error, UnsuitableProblem):
+            if entry is None and engine_name not in engines.named and isinstance(error, UnsuitableProblem):
                 results.passed_over.append(engine_name)
                 continue
             own_words = isinstance(error, ScenarioError | UnsuitableProblem)
@@ -359,7 +371,7 @@ def update_baselines(
 
     An engine's entry is written if it is new, a judged quantity moved beyond its limit, or the engine's version or
     settings changed. Every other entry stays as it is, those of engines that were not run or are refused
-    (`refused_verdicts`) included; entries of engines that are not installed any more are removed. CPU times that were
+    (`refused_verdicts`) included; entries of engines that are not announced any more are removed. CPU times that were
     not judged are no reason to write an entry. A file in which no entry changes is not touched.
 
     Parameters
@@ -380,7 +392,7 @@ def update_baselines(
     folder = BASELINES if baselines is None else baselines
     make_folder(folder)
     paths: list[Path] = []
-    installed = installed_engines()
+    installed = [*installed_engines(), *uninstalled_engines()]
     refused = {(scenario, verdict.engine) for scenario, verdict in refused_verdicts(verdicts)}
     for name, baseline in fresh.items():
         entries = {engine: entry for engine, entry in baseline["engines"].items() if (name, engine) not in refused}

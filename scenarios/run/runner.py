@@ -22,12 +22,11 @@ from ..files import file_digest, write_sealed, write_text
 from ..scenario import (
     Scenario,
     Start,
+    choose_engines,
     configure_engine,
-    installed_engines,
     join_complaints,
     list_engine_faults,
     make_start,
-    refuse_engine,
 )
 from .folder import (
     RUN_VERSION,
@@ -118,25 +117,25 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
     name : str
     scenario : Scenario
     wanted : list of str, optional
-        Engines to run in addition to the reference; by default all installed engines that support the problem.
+        Engines to run in addition to the reference: names, patterns, or ``all``; by default the engines of the suite's
+        own dependencies that support the problem.
 
     Raises
     ------
     ScenarioError
         If an engine is not installed, a setting is wrong, or the motion does not exist.
     """
-    installed = installed_engines()
-    faults = [refuse_engine(engine, installed) for engine in wanted or [] if engine not in installed]
-    names = [engine for engine in installed if engine == REFERENCE or not wanted or engine in wanted]
+    choice, unknown = choose_engines(wanted)
+    faults = list(unknown.values())
     chosen: dict[str, tuple[Engine, Settings]] = {}
     cause: BaseException | None = None
-    for engine in names:
+    for engine in choice.names:
         try:
             chosen[engine] = configure_engine(engine, scenario.engines.get(engine, {}))
         except ScenarioError as error:
             faults.append(str(error))
             cause = cause or error.__cause__ or error  # --traceback shows it
-    faults += list_engine_faults(scenario.engines, skipped=names)
+    faults += list_engine_faults(scenario.engines, skipped=choice.names)
     if faults:
         raise ScenarioError(join_complaints(faults)) from cause
     start = make_start(scenario)
@@ -145,7 +144,7 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
         try:
             loaded.check(start.problem, settings)
         except ValueError as error:
-            if wanted or not isinstance(error, UnsuitableProblem):
+            if engine in choice.named or not isinstance(error, UnsuitableProblem):
                 raise ScenarioError(f"engines.{engine}: {error}") from error
             left_out[engine] = str(error)
         except Exception as error:  # an engine's check may raise anything

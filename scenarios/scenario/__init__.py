@@ -2,7 +2,14 @@
 
 from .bicycle_file import BicycleFile, read_bicycle_file
 from .bicycle_source import BENCHMARK, find_bicycle, insert_bicycle_file, name_bicycle
-from .engine_settings import configure_engine, installed_engines, list_engine_faults, refuse_engine
+from .engine_settings import (
+    EngineChoice,
+    choose_engines,
+    configure_engine,
+    fits_engine,
+    installed_engines,
+    list_engine_faults,
+)
 from .parameters import PARAMETERS
 from .resolved import resolve_scenario
 from .schema import (
@@ -38,16 +45,19 @@ __all__ = [
     "PARAMETERS",
     "BicycleFile",
     "CircularTable",
+    "EngineChoice",
     "Gate",
     "Scenario",
     "Simulation",
     "Start",
     "Table",
     "Texts",
+    "choose_engines",
     "configure_engine",
     "describe_missing_motion",
     "error_place",
     "find_bicycle",
+    "fits_engine",
     "format_validation_error",
     "insert_bicycle_file",
     "installed_engines",
@@ -65,7 +75,6 @@ __all__ = [
     "read_bicycle_file",
     "read_scenario_file",
     "read_toml",
-    "refuse_engine",
     "resolve_scenario",
     "set_keys",
     "show_value",

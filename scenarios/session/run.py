@@ -42,8 +42,8 @@ def run(
     scenario : str or Path
         Name of a scenario of the library (`scenario_names`), or path to a TOML file.
     engines : str or iterable of str, optional
-        Engines to run in addition to the reference, which always runs; by default all installed engines that support
-        the problem.
+        Engines to run in addition to the reference, which always runs: names, patterns such as ``"mujoco-*"``, or
+        ``"all"``; by default the engines of the suite's own dependencies that support the problem.
     duration : float, optional
         Simulated time [s]; the scenario's own if not given.
     out : str or Path, optional

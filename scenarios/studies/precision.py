@@ -64,7 +64,8 @@ def study_precision(
     name : str
     scenario : Scenario
     wanted : list of str or None
-        Engines in addition to the reference; all installed engines if None.
+        Engines in addition to the reference: names, patterns, or ``all``; those of the suite's own dependencies if
+        None.
     levels : int
         Number of steps, each half of the previous one; the first is `COARSEST` times the scenario's step.
     eigenvalues : bool

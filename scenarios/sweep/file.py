@@ -78,7 +78,9 @@ class SweepFile(Table):
 
     title: str = Field(default="", description="one line of text")
     scenario: str | dict[str, Any] = Field(description="library name, path from the sweep file, or tables")
-    engines: _Names = Field(default=(REFERENCE,), description="engines that ride at every point")
+    engines: _Names = Field(
+        default=(REFERENCE,), description="engines that ride at every point: names, patterns, or all"
+    )
     time_limit: float = Field(
         default=600.0, gt=0, le=1e6, description="of a run, on the clock", json_schema_extra={"unit": "s"}
     )

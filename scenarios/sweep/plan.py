@@ -14,15 +14,16 @@ from pydantic import ValidationError
 from ...engines.engine import REFERENCE, UnsuitableProblem, load_engine
 from ...engines.names import suggest_name
 from ..error import ScenarioError
-from ..run import configure_engine, installed_engines, library_versions
+from ..run import configure_engine, library_versions
 from ..scenario import (
     Scenario,
+    choose_engines,
     error_place,
+    fits_engine,
     join_complaints,
     list_complaints,
     list_engine_faults,
     make_start,
-    refuse_engine,
     set_keys,
 )
 from .file import SweepFile, read_sweep
@@ -106,10 +107,15 @@ def plan_sweep(path: Path) -> SweepPlan:
         are refused.
     """
     sweep, base = read_sweep(path)
-    names = installed_engines()
+    choice, unknown = choose_engines(sweep.engines)
+    # The reference rides at every point; it is an engine of the sweep only where it is chosen.
+    engines = [name for name in choice.names if any(fits_engine(entry, name) for entry in sweep.engines)]
+    # In the order of the file, by which the tasks are numbered.
+    engines.sort(key=lambda name: [fits_engine(entry, name) for entry in sweep.engines].index(True))
+    sweep = sweep.model_copy(update={"engines": tuple(engines)})
     riding = {*sweep.engines, REFERENCE}
     # Of engines that ride, a grid may have other settings; those are checked at every point.
-    faults = [refuse_engine(engine, names) for engine in sweep.engines if engine not in names]
+    faults = list(unknown.values())
     faults += [f"scenario: {fault}" for fault in list_engine_faults(base.get("engines"), skipped=riding)]
     at_points: dict[str, str] = {}  # by complaint, the complaint with the first point that it concerns
     if count_points(sweep) * len(sweep.engines) > MOST_TASKS:
@@ -119,11 +125,10 @@ def plan_sweep(path: Path) -> SweepPlan:
     checker = _Checker(path, base, drawn=sweep.latin_hypercube.ranges if sweep.latin_hypercube else ())
     tasks: list[Task] = []
     seen: set[tuple[str, str]] = set()
-    present = [engine for engine in sweep.engines if engine in names]
     for changes in make_points(sweep):
         for line in _name_other_engines(sweep, changes):
             at_points.setdefault(line, line)
-        for engine in present:
+        for engine in sweep.engines:
             own = concerning(engine, changes)
             try:
                 digest, refused = checker.resolve(engine, own)
@@ -139,7 +144,7 @@ def plan_sweep(path: Path) -> SweepPlan:
     faults += at_points.values()
     if faults:
         raise ScenarioError(f"{path}: {join_complaints(faults)}")
-    for engine in sweep.engines:
+    for engine in choice.named & {*sweep.engines}:
         if all(task.refused for task in tasks if task.engine == engine):
             raise ScenarioError(checker.first_refusal[engine])
     return SweepPlan(path.stem, path, sweep, base, tasks)

@@ -1,0 +1,52 @@
+"""The libraries that an announced engine needs, and the command that installs them.
+
+An entry point names the extra of its package whose requirements are the engine's library, for example
+``drake-native = "velodrome.engines.drake.engine:NATIVE [drake]"``. Without an extra, an engine needs what its package
+needs anyway.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint, PackageNotFoundError, version
+
+from packaging.requirements import Requirement
+
+
+def list_missing(point: EntryPoint) -> list[str]:
+    """Return the requirements of an engine's extras that are not installed, or only in an unsuitable version.
+
+    Parameters
+    ----------
+    point : EntryPoint
+
+    Returns
+    -------
+    list of str
+        Requirements without their conditions, such as ``mujoco-mjx>=3.17``.
+    """
+    if not point.extras or point.dist is None:
+        return []
+    missing = []
+    for line in point.dist.requires or []:
+        requirement = Requirement(line)
+        # Without an extra its marker is false; requirements without a marker are the package's own.
+        if requirement.marker is None or requirement.marker.evaluate({"extra": ""}):
+            continue
+        needed = any(requirement.marker.evaluate({"extra": extra}) for extra in point.extras)
+        if needed and not _is_installed(requirement):
+            missing.append(f"{requirement.name}{requirement.specifier}")
+    return missing
+
+
+def install_command(point: EntryPoint) -> str:
+    """Return the shell command that installs an engine's library."""
+    package = "" if point.dist is None else point.dist.name
+    return f"pip install '{package}[{','.join(point.extras)}]'"
+
+
+def _is_installed(requirement: Requirement) -> bool:
+    try:
+        found = version(requirement.name)
+    except PackageNotFoundError:
+        return False
+    return requirement.specifier.contains(found, prereleases=True)
