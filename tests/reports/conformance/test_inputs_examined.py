@@ -77,9 +77,10 @@ def test_an_engine_that_takes_them_rightly_passes_and_one_that_says_nothing_is_n
 def test_an_engine_that_says_nothing_is_never_given_inputs() -> None:
     problem = make_motion("plane", Bicycle(), 0.01, inputs=Inputs(steer_torque=1.0)).problem
     engine = replace(load_engine("exudyn"), takes_inputs=False)
-    for call in (engine.check, lambda *given: engine.simulate(*given, lambda _: None)):
-        with pytest.raises(UnsuitableProblem, match="it applies no inputs"):
-            call(problem, engine.settings())
+    with pytest.raises(UnsuitableProblem, match="it applies no inputs"):
+        engine.check(problem, engine.settings())
+    with pytest.raises(UnsuitableProblem, match="it applies no inputs"):
+        engine.simulate(problem, engine.settings(), lambda _: None)
 
 
 def test_takes_inputs_must_be_true_or_false() -> None:
