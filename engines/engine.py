@@ -483,7 +483,9 @@ def load_engine(name: str) -> GuardedEngine:
     if members["name"] != name:
         raise ValueError(f"{where} calls itself {members['name']!r}; both names must be the same")
     takes = call_engine(getattr, engine, "takes_inputs", False)
-    return GuardedEngine(engine, **{fact: members[fact] for fact in _FACTS}, takes_inputs=takes is True)
+    if not isinstance(takes, bool):
+        raise ValueError(f"{where} has takes_inputs = {reprlib.repr(takes)}; it must be True or False")
+    return GuardedEngine(engine, **{fact: members[fact] for fact in _FACTS}, takes_inputs=takes)
 
 
 def describe_engine(engine: Engine) -> str:

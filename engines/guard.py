@@ -209,11 +209,7 @@ class GuardedEngine:
 
     def check(self, problem: Problem, settings: Any) -> None:
         """Refuse a problem that the engine cannot run, and inputs that it does not apply."""
-        from .engine import UnsuitableProblem, find_ignored_inputs  # that module imports this one
-
-        ignored = find_ignored_inputs(self, problem)
-        if ignored is not None:
-            raise UnsuitableProblem(ignored)
+        self._refuse_ignored_inputs(problem)
         call_engine(self.inner.check, _copy_problem(problem), settings)
 
     def step_noise(self, settings: Any) -> float:
@@ -221,5 +217,13 @@ class GuardedEngine:
         return call_engine(self.inner.step_noise, settings)
 
     def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
-        """Run a problem."""
+        """Run a problem; inputs that the engine does not apply are refused."""
+        self._refuse_ignored_inputs(problem)
         return simulate_guarded(self.inner, problem, settings, progress)
+
+    def _refuse_ignored_inputs(self, problem: Problem) -> None:
+        from .engine import UnsuitableProblem, find_ignored_inputs  # that module imports this one
+
+        ignored = find_ignored_inputs(self, problem)
+        if ignored is not None:
+            raise UnsuitableProblem(ignored)

@@ -170,7 +170,9 @@ class _Examination:
         for ground in suitable:
             if ground not in accepted:
                 yield skip_check(f"order on {ground}", CLAIM, "it refuses this ground")
-        yield from self.check_inputs(accepted[0], _has_wrong_map(checks))
+        yield from self.check_inputs(motion, _has_wrong_map(checks))
+        if len(accepted) > 1:
+            yield from self.check_inputs(second_motion, _has_wrong_map((*checks, *more)))
 
     @property
     def interval(self) -> float:
@@ -224,11 +226,11 @@ class _Examination:
             yield check_bits(first, again.trajectory)
         yield check_own_work(first, self.engine.name)
 
-    def check_inputs(self, ground: str, map_is_wrong: bool) -> Iterator[ConformanceCheck]:
-        """Check a ride with torques and steer damping, if the engine declares that it applies them."""
+    def check_inputs(self, like: TransientMotion, map_is_wrong: bool) -> Iterator[ConformanceCheck]:
+        """Check a ride with torques and steer damping on a motion's ground, if the engine declares to apply them."""
         if not self.engine.takes_inputs:
             return
-        motion = make_motion(ground, Bicycle(), self.interval, inputs=EXAMINED_INPUTS)
+        motion = make_motion(like.ground, like.problem.bicycle, self.interval, inputs=EXAMINED_INPUTS)
         ride, faults = self.try_ride(motion)
         yield make_check(f"ride on {motion.name}", _RIDE, faults)
         if ride is not None:

@@ -48,6 +48,7 @@ from velodrome.scenarios.gate import sample as gate_sample
 from velodrome.scenarios.gate.exact import find_exact, scale_of
 from velodrome.scenarios.gate.verdict import ABSOLUTE, HELD_CPU, RIDE_QUANTITIES, SHOWN, Verdict
 from velodrome.scenarios.run.runner import configure_engine
+from velodrome.scenarios.scenario import engine_settings
 from velodrome.scenarios.scenario.schema import LIBRARY, Gate, Perturbation, Scenario, load_scenario
 from velodrome.scenarios.scenario.start import make_start
 
@@ -116,10 +117,10 @@ def test_a_clean_repeat_passes_in_every_quantity(name: str) -> None:
 def test_an_engine_that_no_gated_motion_suits_fails_only_if_it_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     ((_, verdict),) = gate.check_gate(lambda *_: None, ["q2"], ["exudyn-builtin"])[0]
     assert (verdict.status, "rolls on the level plane only" in verdict.reason) == ("missing", True)
-    monkeypatch.setattr(gate, "installed_engines", lambda: ["reference", "exudyn-builtin"])
+    monkeypatch.setattr(engine_settings, "default_engines", lambda: ["reference", "exudyn-builtin"])
     monkeypatch.setattr(gate, "read_baseline", lambda *_: {})
     assert {verdict.engine for _, verdict in gate.check_gate(lambda *_: None, ["q2"])[0]} == {"reference"}
-    monkeypatch.setattr(gate, "installed_engines", lambda: ["exudyn-builtin"])
+    monkeypatch.setattr(engine_settings, "default_engines", lambda: ["exudyn-builtin"])
     with pytest.raises(ScenarioError, match="nothing was judged"):
         gate.check_gate(lambda *_: None, ["q2"])
 
@@ -217,7 +218,7 @@ def test_a_dropped_acceleration_of_the_contacts_fails(monkeypatch: pytest.Monkey
     fails = failing(verdicts_on("exudyn", set_to(start="engine")))
     assert "contact_force_error" in fails
     # MuJoCo's rows leave out J' q' unless they are corrected, and the wheels creep.
-    monkeypatch.setattr(compiled, "correct_reference", uncorrected)
+    monkeypatch.setattr(compiled, "control", uncorrected)
     assert {"max_slip", "mean_slip", "short_error"} <= failing(verdicts_on("mujoco-exact-contact"))
 
 

@@ -30,6 +30,7 @@ from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.kinematics import LEAN, STEER, YAW
 from velodrome.reference.surface import Paraboloid, Plane
 from velodrome.scenarios.gate import checks as gate
+from velodrome.scenarios.scenario import engine_settings
 
 GATED = gate.gated_names()
 
@@ -290,6 +291,7 @@ def test_a_planted_fault_closes_the_gate_and_is_named(what: str) -> None:
 
 @pytest.fixture
 def plain_baselines(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    monkeypatch.setattr(engine_settings, "installed_engines", lambda: [REFERENCE, "plain"])
     monkeypatch.setattr(gate, "installed_engines", lambda: [REFERENCE, "plain"])
     verdicts, fresh = gate.check_gate(lambda *_: None, WEAVE, ["plain"], tmp_path, plain(PlainEngine()))
     gate.update_baselines(fresh, verdicts, "first", tmp_path)
