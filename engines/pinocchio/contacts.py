@@ -10,7 +10,7 @@ from ..engine import Problem
 from ..rolling import add, contact_state, cross, scale, wheel_axes
 
 
-class WheelContacts:
+class MovingContacts:
     """Contacts of both wheels; write the poses and twists, then call `update`, then read the contacts.
 
     Attributes

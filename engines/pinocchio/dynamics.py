@@ -21,16 +21,16 @@ import pinocchio as pin
 
 from ...reference.bicycle import BODIES
 from ..engine import Problem
-from .contacts import WheelContacts
+from .contacts import MovingContacts
 from .settings import ConstraintSettings
-from .tree import JOINTS, REAR_RATE, STEER_RATE, build_tree
+from .tree import JOINTS, REAR_RATE, STEER_RATE, build_pinocchio_model
 
 WHEEL_JOINTS = [JOINTS[BODIES.index(name)] for name in ("rear_wheel", "front_wheel")]
 _INERTIAL = pin.LOCAL_WORLD_ALIGNED
 
 
-class NoContactError(Exception):
-    """Raised where a wheel has no contact point with the ground."""
+class NoAccelerationError(Exception):
+    """Raised with the reason where a state has no accelerations."""
 
 
 class ConstrainedBicycle:
@@ -44,20 +44,20 @@ class ConstrainedBicycle:
     Attributes
     ----------
     model, data : pinocchio.Model, pinocchio.Data
-    contacts : WheelContacts
+    contacts : MovingContacts
         Those of the last evaluation.
     force : ndarray, shape (2, 3)
         Contact forces on the wheels of the last evaluation, inertial axes [N].
     residual : float
-        Change of the forces in the solver's last iteration of the last evaluation [N], larger than their error.
+        Change of the forces in the solver's last iteration of the last evaluation [N]; their error is smaller.
     converged : bool
         Whether it met the accuracy.
     """
 
     def __init__(self, problem: Problem, settings: ConstraintSettings) -> None:
-        self.model = build_tree(problem.bicycle)
+        self.model = build_pinocchio_model(problem.bicycle)
         self.data = self.model.createData()
-        self.contacts = WheelContacts(problem)
+        self.contacts = MovingContacts(problem)
         self.force = np.zeros((2, 3))
         self.residual, self.converged = 0.0, True
         self._inputs = problem.inputs
@@ -79,7 +79,7 @@ class ConstrainedBicycle:
 
         Raises
         ------
-        NoContactError
+        NoAccelerationError
             If a wheel has none.
         """
         pin.forwardKinematics(self.model, self.data, configuration, velocity)
@@ -90,15 +90,15 @@ class ConstrainedBicycle:
             contacts.centre[k], contacts.axle[k] = place.translation, place.rotation[:, 1]
             contacts.velocity[k], contacts.spin[k] = motion.linear, motion.angular
         if not contacts.update():
-            raise NoContactError
+            raise NoAccelerationError("a wheel lies flat or has no contact point with the surface")
 
     def accelerate(self, configuration: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the derivative (9,) of the velocity at a state, and keep forces and residual of the solver.
 
         Raises
         ------
-        NoContactError
-            If a wheel has no contact point.
+        NoAccelerationError
+            If a wheel has no contact point, or the solver's result is not finite.
         """
         self.observe_contacts(configuration, velocity)
         contacts = self.contacts
@@ -114,6 +114,8 @@ class ConstrainedBicycle:
         rates = pin.constraintDynamics(
             self.model, self.data, configuration, velocity, self._torque, self._models, self._datas, self._solver
         )
+        if not np.all(np.isfinite(rates)):
+            raise NoAccelerationError("Pinocchio's accelerations became infinite")
         for k in range(2):
             self.force[k] = self._datas[k].contact_force.linear
         self.residual = self._solver.relative_residual  # relative to the iteration before, in newtons

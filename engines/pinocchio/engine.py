@@ -2,12 +2,36 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ...reference.contact import observe
+from ...reference.dae import mass_matrix
 from ...reference.kinematics import quaternions
 from ...reference.simulate import steps_per_output
 from ..coordinates import start_on_turn
-from ..engine import Problem, Progress, Trajectory, package_version
+from ..engine import Problem, Progress, Trajectory, UnsuitableProblem, package_version
 from .settings import ROUND_OFF, ConstraintSettings
+
+# Least eigenvalue of a mass matrix with a unit diagonal. The benchmark's is 1e-2, that of a bicycle with wheels of 1 mg
+# is 1e-7, and round-off leaves 1e-16 of a singular one.
+LEAST_INERTIA = 1e-10
+
+
+def require_inertia(problem: Problem) -> None:
+    """Refuse a bicycle with a singular mass matrix, which Pinocchio factorises before it adds the contacts.
+
+    Raises
+    ------
+    UnsuitableProblem
+        If the tree of bodies without contacts can move without inertia.
+    """
+    mass = mass_matrix(problem.bicycle, problem.q)
+    size = np.sqrt(np.diag(mass))
+    if np.any(size == 0) or np.linalg.eigvalsh(mass / np.outer(size, size))[0] < LEAST_INERTIA:
+        raise UnsuitableProblem(
+            "Pinocchio factorises the mass matrix, and this bicycle's is singular; wheels and frames need masses and "
+            "moments of inertia that are not zero"
+        )
 
 
 class PinocchioEngine:
@@ -28,7 +52,8 @@ class PinocchioEngine:
         return package_version("pin")
 
     def check(self, problem: Problem, settings: ConstraintSettings) -> None:
-        """Refuse output times that are not multiples of the step; see `velodrome.engines.engine.Engine`."""
+        """Refuse bicycles without inertia and output times that are not multiples of the step; see `Engine.check`."""
+        require_inertia(problem)
         steps_per_output(problem.times, settings.step)
 
     def step_noise(self, settings: ConstraintSettings) -> float:

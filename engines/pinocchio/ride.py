@@ -17,18 +17,19 @@ from ...reference.bicycle import BODIES
 from ...reference.rim import Ending, RimWatch
 from ...reference.simulate import steps_per_output
 from ..engine import EngineError, Problem, Progress
-from .dynamics import ConstrainedBicycle, NoContactError
+from .dynamics import ConstrainedBicycle, NoAccelerationError
 from .settings import ConstraintSettings
 from .tree import JOINTS, to_pinocchio
 
 REPORT_INTERVAL = 0.05  # of simulated time between two calls of `progress` [s]
-# Contact forces with a larger error than this, relative to the weight, are unusable.
+# Contact forces with a larger error than this, relative to the largest of them, are unusable.
 WRONG = 0.01
-NO_CONTACT = "a wheel lies flat or has no contact point with the surface"
+# Coordinates and rates beyond this are known to micrometres at best, even if they were exact but for round-off.
+HUGE = 1e10
 
 
 @dataclass(frozen=True)
-class Recording:
+class PinocchioRecording:
     """The n samples of a ride.
 
     Attributes
@@ -57,23 +58,23 @@ class Recording:
     energy: np.ndarray
 
     @classmethod
-    def empty(cls, n: int) -> Recording:
+    def empty(cls, n: int) -> PinocchioRecording:
         """Return arrays for n samples, filled with zeros."""
         shapes = ((n,), (n, 10), (n, 9), (n, 4, 3), (n, 4, 3, 3), (n, 4, 3), (n, 2, 3), (n, 2))
         return cls(*(np.zeros(shape) for shape in shapes))
 
-    def first(self, n: int) -> Recording:
+    def first(self, n: int) -> PinocchioRecording:
         """Return the first n samples."""
-        return Recording(*(getattr(self, name)[:n] for name in self.__dataclass_fields__))
+        return PinocchioRecording(*(getattr(self, name)[:n] for name in self.__dataclass_fields__))
 
 
 @dataclass(frozen=True)
-class RideResult:
+class PinocchioOutcome:
     """Result of a ride.
 
     Attributes
     ----------
-    recording : Recording
+    recording : PinocchioRecording
         The samples that were reached.
     steps : int
     cpu_time : float
@@ -83,10 +84,10 @@ class RideResult:
     unconverged_steps : int
         Steps with an evaluation in which the solver did not meet its accuracy.
     largest_residual : float
-        Largest residual of the contact forces, relative to the weight.
+        Largest residual of the contact forces, relative to the largest of them or to the weight.
     """
 
-    recording: Recording
+    recording: PinocchioRecording
     steps: int
     cpu_time: float
     ended: str | None
@@ -94,13 +95,13 @@ class RideResult:
     largest_residual: float
 
 
-class SolverWatch:
+class ProximalWatch:
     """Evaluate accelerations and keep what the solver leaves.
 
     Attributes
     ----------
     largest : float
-        Largest residual of the contact forces in any evaluation, relative to the weight.
+        Largest residual of the contact forces in any evaluation, relative to the largest of them or to the weight.
     converged : bool
         Whether the solver met its accuracy in every evaluation since the attribute was set to True.
     """
@@ -112,7 +113,8 @@ class SolverWatch:
     def accelerate(self, configuration: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the derivative of the velocity; see `ConstrainedBicycle.accelerate`."""
         rates = self._bicycle.accelerate(configuration, velocity)
-        self.largest = max(self.largest, self._bicycle.residual / self._weight)
+        largest_force = max(self._weight, float(np.abs(self._bicycle.force).max()))
+        self.largest = max(self.largest, self._bicycle.residual / largest_force)
         self.converged = self.converged and self._bicycle.converged
         return rates
 
@@ -136,7 +138,7 @@ def differentiate_configuration(configuration: np.ndarray, velocity: np.ndarray)
     return rates
 
 
-def normalise(configuration: np.ndarray) -> np.ndarray:
+def normalise_quaternion(configuration: np.ndarray) -> np.ndarray:
     """Return a configuration whose quaternion has unit length."""
     unit = configuration.copy()
     unit[3:7] /= np.linalg.norm(unit[3:7])
@@ -152,7 +154,7 @@ def step_rk4(
     """
     moved, changed = [differentiate_configuration(configuration, velocity)], [rates]
     for share in (0.5, 0.5, 1.0):
-        here = normalise(configuration + share * step * moved[-1])
+        here = normalise_quaternion(configuration + share * step * moved[-1])
         speed = velocity + share * step * changed[-1]
         moved.append(differentiate_configuration(here, speed))
         changed.append(accelerate(here, speed))
@@ -160,7 +162,7 @@ def step_rk4(
     def combine(slopes: list[np.ndarray]) -> np.ndarray:
         return step / 6 * (slopes[0] + 2 * slopes[1] + 2 * slopes[2] + slopes[3])
 
-    return normalise(configuration + combine(moved)), velocity + combine(changed)
+    return normalise_quaternion(configuration + combine(moved)), velocity + combine(changed)
 
 
 def step_euler(
@@ -171,21 +173,7 @@ def step_euler(
     return pin.integrate(model, configuration, step * faster), faster
 
 
-def record_sample(bicycle: ConstrainedBicycle, recording: Recording, k: int) -> None:
-    """Record the poses, forces and energies of sample k, whose state has been recorded and evaluated last."""
-    model, data = bicycle.model, bicycle.data
-    configuration, velocity = recording.configuration[k], recording.velocity[k]
-    recording.energy[k, 0] = pin.computeKineticEnergy(model, data, configuration, velocity)
-    recording.energy[k, 1] = pin.computePotentialEnergy(model, data, configuration)
-    for body, joint in enumerate(JOINTS):
-        place = data.oMi[joint]
-        recording.position[k, body] = place.act(model.inertias[joint].lever)
-        recording.rotation[k, body] = place.rotation
-        recording.spin[k, body] = pin.getVelocity(model, data, joint, pin.LOCAL_WORLD_ALIGNED).angular
-    recording.force[k] = bicycle.force
-
-
-class Ride:
+class PinocchioRide:
     """A ride in progress.
 
     Parameters
@@ -202,7 +190,7 @@ class Ride:
     def __init__(self, problem: Problem, settings: ConstraintSettings) -> None:
         self.bicycle = ConstrainedBicycle(problem, settings)
         mass = sum(problem.bicycle.body_mass(name) for name in BODIES)
-        self.watch = SolverWatch(self.bicycle, mass * problem.bicycle.gravity)
+        self.watch = ProximalWatch(self.bicycle, mass * problem.bicycle.gravity)
         self.settings = settings
         self.steps, self.unconverged = 0, 0
         try:
@@ -220,22 +208,30 @@ class Ride:
 
     def advance(self) -> str | None:
         """Take a step and evaluate the state that it reaches; return why the ride ends there, None if it goes on."""
-        step = self.settings.step
         try:
-            if self.settings.integrator == "rk4":
-                state = step_rk4(self.configuration, self.velocity, self._rates, step, self.watch.accelerate)
-            else:
-                state = step_euler(self.bicycle.model, self.configuration, self.velocity, self._rates, step)
+            # A ride that ends here may overflow before it does.
+            with np.errstate(over="ignore", invalid="ignore"):
+                self.configuration, self.velocity = self._step()
             self.steps += 1
             self.unconverged += not self.watch.converged
             self.watch.converged = True
-            if not (np.all(np.isfinite(state[0])) and np.all(np.isfinite(state[1]))):
-                return f"the state became infinite at {self.time:.6g} s"
-            self.configuration, self.velocity = state
+            if not max(np.abs(self.configuration).max(), np.abs(self.velocity).max()) < HUGE:
+                return f"Pinocchio's state became infinite or huge at {self.time:.6g} s"
             self._evaluate()
-        except NoContactError:
-            return f"{NO_CONTACT} at {self.time:.6g} s"
+        except NoAccelerationError as error:
+            return f"{error} at {self.time:.6g} s"
         return self.find_unconverged()
+
+    def advance_by(self, steps: int) -> tuple[str | None, Ending | None]:
+        """Take some steps; return why the ride ends before they are done, and the second touch that ends it."""
+        for _ in range(steps):
+            ended = self.advance()
+            if ended is not None:
+                return ended, None
+            touch = self.look()
+            if touch is not None:
+                return None, touch
+        return None, None
 
     def find_unconverged(self) -> str | None:
         """Return when and how far the solver failed to converge; None if its forces are usable."""
@@ -243,7 +239,7 @@ class Ride:
             return None
         return (
             f"Pinocchio's constraint solver stopped unconverged at {self.time:.6g} s: the contact forces changed by "
-            f"{100 * self.watch.largest:.3g} % of the weight in its last iteration"
+            f"{100 * self.watch.largest:.3g} % in its last iteration"
         )
 
     def look(self) -> Ending | None:
@@ -253,17 +249,31 @@ class Ride:
         self._rims.centre[:], self._rims.axle[:] = self.bicycle.contacts.centre, self.bicycle.contacts.axle
         return self._rims.look(self.time)
 
-    def record(self, recording: Recording, k: int) -> None:
-        """Record sample k."""
+    def record(self, recording: PinocchioRecording, k: int) -> None:
+        """Record the present state as sample k."""
+        model, data = self.bicycle.model, self.bicycle.data
         recording.time[k] = self.time
         recording.configuration[k], recording.velocity[k] = self.configuration, self.velocity
-        record_sample(self.bicycle, recording, k)
+        recording.energy[k, 0] = pin.computeKineticEnergy(model, data, self.configuration, self.velocity)
+        recording.energy[k, 1] = pin.computePotentialEnergy(model, data, self.configuration)
+        for body, joint in enumerate(JOINTS):
+            place = data.oMi[joint]
+            recording.position[k, body] = place.act(model.inertias[joint].lever)
+            recording.rotation[k, body] = place.rotation
+            recording.spin[k, body] = pin.getVelocity(model, data, joint, pin.LOCAL_WORLD_ALIGNED).angular
+        recording.force[k] = self.bicycle.force
+
+    def _step(self) -> tuple[np.ndarray, np.ndarray]:
+        step, state = self.settings.step, (self.configuration, self.velocity, self._rates)
+        if self.settings.integrator == "rk4":
+            return step_rk4(*state, step, self.watch.accelerate)
+        return step_euler(self.bicycle.model, *state, step)
 
     def _evaluate(self) -> None:
         self._rates = self.watch.accelerate(self.configuration, self.velocity)
 
 
-def ride_bicycle(problem: Problem, settings: ConstraintSettings, progress: Progress) -> RideResult:
+def ride_bicycle(problem: Problem, settings: ConstraintSettings, progress: Progress) -> PinocchioOutcome:
     """Integrate a problem.
 
     Raises
@@ -274,17 +284,17 @@ def ride_bicycle(problem: Problem, settings: ConstraintSettings, progress: Progr
         If not even the start can be evaluated.
     """
     stride = steps_per_output(problem.times, settings.step)
-    recording = Recording.empty(len(problem.times))
+    recording = PinocchioRecording.empty(len(problem.times))
     try:
-        ride = Ride(problem, settings)
-    except NoContactError as error:
-        raise EngineError("a wheel has no contact point with the surface at the start") from error
+        ride = PinocchioRide(problem, settings)
+    except NoAccelerationError as error:
+        raise EngineError(f"{error} at the start") from error
     ended = ride.find_unconverged()
     if ended is not None:
         raise EngineError(ended)
     ride.record(recording, 0)
     samples, cpu_time, ended = _continue_ride(ride, stride, recording, progress)
-    return RideResult(
+    return PinocchioOutcome(
         recording=recording.first(samples),
         steps=ride.steps,
         cpu_time=cpu_time,
@@ -294,16 +304,14 @@ def ride_bicycle(problem: Problem, settings: ConstraintSettings, progress: Progr
     )
 
 
-def _continue_ride(ride: Ride, stride: int, recording: Recording, progress: Progress) -> tuple[int, float, str | None]:
+def _continue_ride(
+    ride: PinocchioRide, stride: int, recording: PinocchioRecording, progress: Progress
+) -> tuple[int, float, str | None]:
     """Continue from the first sample; return the number of samples, CPU time [s] and why the ride ended early."""
     cpu_time, reported = 0.0, 0.0
     for k in range(1, len(recording.time)):
         begin = process_time()
-        for _ in range(stride):
-            ended = ride.advance()
-            touch = None if ended is not None else ride.look()
-            if ended is not None or touch is not None:
-                break
+        ended, touch = ride.advance_by(stride)
         cpu_time += process_time() - begin
         if touch is not None:
             # The second touch may lie before the last sample.

@@ -34,7 +34,7 @@ STEER_RATE, REAR_RATE = 6 + HINGES.index(STEER), 6 + HINGES.index(REAR_ANGLE)  #
 JOINTS = (1, 3, 2, 4)
 
 
-def build_tree(bicycle: Bicycle) -> Any:
+def build_pinocchio_model(bicycle: Bicycle) -> Any:
     """Return the bicycle as a `pinocchio.Model` whose joints are numbered as in `JOINTS`."""
     model = pin.Model()
     model.gravity.linear = np.array([0.0, 0.0, -bicycle.gravity])
