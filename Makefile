@@ -6,10 +6,13 @@ DOCS_STAMP := .venv/set-up-docs
 # Environment with the oldest supported versions of the direct dependencies.
 LOWEST := .venv-lowest
 LOWEST_STAMP := $(LOWEST)/set-up
+# Environment with the libraries of the engines that are extras.
+ENGINES := .venv-engines
+ENGINES_STAMP := $(ENGINES)/set-up
 # Run the tests in two processes, each file in one of them, so that fixtures of a file are computed once.
 PYTEST := -m pytest -n 2 --dist loadfile
 
-.PHONY: run test test-all test-lowest test-machines test-machines-short test-wheel lint check docs
+.PHONY: run test test-all test-engines test-lowest test-machines test-machines-short test-wheel lint check docs
 
 run: $(STAMP)
 	$(BIN)/velodrome run q2-plus
@@ -19,6 +22,10 @@ test: $(STAMP)
 
 test-all: $(STAMP)
 	$(BIN)/python $(PYTEST) -m ""
+
+# Run the tests of the engines that are extras.
+test-engines: $(ENGINES_STAMP)
+	$(ENGINES)/bin/python $(PYTEST) -m engines
 
 test-lowest: $(LOWEST_STAMP)
 	$(LOWEST)/bin/python $(PYTEST)
@@ -58,6 +65,11 @@ $(STAMP): pyproject.toml constraints.txt
 # Packages for the documentation.
 $(DOCS_STAMP): $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,docs]'
+	touch $@
+
+$(ENGINES_STAMP): pyproject.toml constraints.txt constraints-engines.txt
+	$(PYTHON) -m venv $(ENGINES)
+	$(ENGINES)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --constraint constraints-engines.txt --editable '.[dev,engines]'
 	touch $@
 
 $(LOWEST_STAMP): pyproject.toml constraints-lowest.txt

@@ -247,8 +247,8 @@ def test_a_files_name_is_no_formula_in_a_figure(tmp_path: Path) -> None:
 
 
 def test_every_installed_requirement_is_pinned() -> None:
-    """The requirements of the suite and its extras, with all of theirs, against constraints.txt."""
-    pins = read_pins("constraints.txt")
+    """The requirements of the suite and its extras, with all of theirs, against the lists of versions."""
+    pins = read_pins("constraints.txt") | read_pins("constraints-engines.txt")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
     # What only a benchmark compares with may be absent.
@@ -261,7 +261,20 @@ def test_every_installed_requirement_is_pinned() -> None:
     wrong = {name: version for name, version in found.items() if pins.get(name) != version}
     in_benchmark = dict(installed([Requirement(line) for line in extras.get("benchmark", [])]))
     wrong = {name: version for name, version in wrong.items() if name not in in_benchmark}
-    assert not wrong, f"installed, but not pinned so in constraints.txt: {wrong}"
+    assert not wrong, f"installed, but not pinned so: {wrong}"
+
+
+def engine_extras(project: dict[str, Any]) -> set[str]:
+    """The extras that entry points of engines name, and the one with all of them."""
+    points = project["entry-points"]["velodrome.engines"].values()
+    return {"engines", *(extra for point in points for extra in re.findall(r"\[(.*)\]", point))}
+
+
+def test_all_libraries_of_engines_are_in_one_extra() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    single = engine_extras(project) - {"engines"}
+    assert sorted(extras["engines"]) == [f"velodrome[{','.join(sorted(single))}]"]
 
 
 def read_pins(file: str) -> dict[str, str]:
@@ -274,9 +287,13 @@ def read_pins(file: str) -> dict[str, str]:
 
 
 def test_lower_bounds_are_the_versions_that_are_tested() -> None:
-    """Every direct dependency, at its lower bound in pyproject.toml and nothing else in constraints-lowest.txt."""
+    """Every direct dependency, at its lower bound in pyproject.toml and nothing else in constraints-lowest.txt.
+
+    Libraries of engines that are extras are tested in their pinned versions alone, which are large to install.
+    """
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    extras = project["optional-dependencies"]
+    libraries = engine_extras(project)
+    extras = {extra: lines for extra, lines in project["optional-dependencies"].items() if extra not in libraries}
     # Linters, what builds the package and what builds the documentation run in the pinned environment alone: they have
     # no bound.
     pinned = {line for extra in ("dev", "docs") for line in extras[extra] if not Requirement(line).specifier}
@@ -312,7 +329,7 @@ def installed(requirements: list[Requirement]) -> Iterator[tuple[str, str]]:
                 todo.append((required.name, frozenset(required.extras)))
 
 
-@pytest.mark.parametrize("file", ["constraints.txt", "constraints-lowest.txt"])
+@pytest.mark.parametrize("file", ["constraints.txt", "constraints-lowest.txt", "constraints-engines.txt"])
 def test_pins_are_exact(file: str) -> None:
     lines = (ROOT / file).read_text().splitlines()
     assert all(re.fullmatch(r"[A-Za-z0-9._-]+==[0-9][A-Za-z0-9.+!]*", line) for line in lines)
