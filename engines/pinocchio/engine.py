@@ -14,10 +14,10 @@ from .settings import ROUND_OFF, ConstraintSettings
 
 # Least eigenvalue of a mass matrix with a unit diagonal. The benchmark's is 1e-2, that of a bicycle with wheels of 1 mg
 # is 1e-7, and round-off leaves 1e-16 of a singular one.
-LEAST_INERTIA = 1e-10
+LEAST_EIGENVALUE = 1e-10
 
 
-def require_inertia(problem: Problem) -> None:
+def require_mass_matrix(problem: Problem) -> None:
     """Refuse a bicycle with a singular mass matrix, which Pinocchio factorises before it adds the contacts.
 
     Raises
@@ -27,7 +27,7 @@ def require_inertia(problem: Problem) -> None:
     """
     mass = mass_matrix(problem.bicycle, problem.q)
     size = np.sqrt(np.diag(mass))
-    if np.any(size == 0) or np.linalg.eigvalsh(mass / np.outer(size, size))[0] < LEAST_INERTIA:
+    if np.any(size == 0) or np.linalg.eigvalsh(mass / np.outer(size, size))[0] < LEAST_EIGENVALUE:
         raise UnsuitableProblem(
             "Pinocchio factorises the mass matrix, and this bicycle's is singular; wheels and frames need masses and "
             "moments of inertia that are not zero"
@@ -53,7 +53,7 @@ class PinocchioEngine:
 
     def check(self, problem: Problem, settings: ConstraintSettings) -> None:
         """Refuse bicycles without inertia and output times that are not multiples of the step; see `Engine.check`."""
-        require_inertia(problem)
+        require_mass_matrix(problem)
         steps_per_output(problem.times, settings.step)
 
     def step_noise(self, settings: ConstraintSettings) -> float:
