@@ -26,7 +26,7 @@ def require_mass_matrix(problem: Problem) -> None:
         If the tree of bodies without contacts can move without inertia.
     """
     mass = mass_matrix(problem.bicycle, problem.q)
-    size = np.sqrt(np.diag(mass))
+    size = np.sqrt(np.diag(mass).clip(0))
     if np.any(size == 0) or np.linalg.eigvalsh(mass / np.outer(size, size))[0] < LEAST_EIGENVALUE:
         raise UnsuitableProblem(
             "Pinocchio factorises the mass matrix, and this bicycle's is singular; wheels and frames need masses and "
