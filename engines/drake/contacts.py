@@ -69,9 +69,7 @@ class WheelContactFinder:
             self.acceleration,
         )
         # Inferring the types in every call would take numba longer than the search itself.
-        self._observe = partial(
-            observe_wheels.compile(tuple(typeof(argument) for argument in arguments)), *arguments
-        )
+        self._observe = partial(observe_wheels.compile(tuple(typeof(argument) for argument in arguments)), *arguments)
 
     def find(self) -> None:
         """Find both contacts.

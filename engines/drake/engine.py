@@ -12,7 +12,7 @@ from ...reference.kinematics import coordinates_from_bodies
 from ...reference.simulate import steps_per_output
 from ..coordinates import quaternions, start_on_turn
 from ..engine import Problem, Progress, Settings, Trajectory, package_version
-from .settings import MultiplierSettings
+from .settings import DrakeContactSettings, DrakeMultiplierSettings
 
 if TYPE_CHECKING:
     from .ride import DrakeRig
@@ -63,7 +63,7 @@ class DrakeEngine(Generic[S]):
         ----------
         problem : Problem
             Its output times must be multiples of the step.
-        settings : MultiplierSettings or NativeSettings
+        settings : DrakeMultiplierSettings or DrakeContactSettings
         progress : callable
             Called with the simulated time [s] at most every 50 ms of it.
 
@@ -119,7 +119,13 @@ class DrakeEngine(Generic[S]):
 
 MULTIPLIERS = DrakeEngine(
     "drake-multipliers",
-    MultiplierSettings,
-    "velodrome.engines.drake.multipliers:build_multipliers",
+    DrakeMultiplierSettings,
+    "velodrome.engines.drake.multipliers:build_rolling_plant",
     description="Drake's tree and integrators under the exact forces of rolling, without its contacts",
+)
+NATIVE = DrakeEngine(
+    "drake-native",
+    DrakeContactSettings,
+    "velodrome.engines.drake.planes:build_contact_plant",
+    description="Drake's tree and discrete contact solvers, thin wheels on tangent planes",
 )

@@ -9,11 +9,11 @@ from pydrake.systems.framework import DiagramBuilder
 from ..engine import Problem
 from .ride import DrakeRig
 from .rolling_forces import RollingForces
-from .settings import MultiplierSettings
-from .tree import add_tree, set_state
+from .settings import DrakeMultiplierSettings
+from .tree import add_bicycle_tree, set_plant_state
 
 
-def build_multipliers(problem: Problem, settings: MultiplierSettings) -> DrakeRig:
+def build_rolling_plant(problem: Problem, settings: DrakeMultiplierSettings) -> DrakeRig:
     """Build a plant with continuous dynamics, driven by the forces of rolling, at the start of a problem.
 
     Raises
@@ -23,7 +23,7 @@ def build_multipliers(problem: Problem, settings: MultiplierSettings) -> DrakeRi
     """
     builder = DiagramBuilder()
     plant = builder.AddSystem(MultibodyPlant(0.0))
-    tree = add_tree(plant, problem.bicycle)
+    tree = add_bicycle_tree(plant, problem.bicycle)
     plant.Finalize()
     rolling = builder.AddSystem(RollingForces(tree, problem, settings.stabilisation))
     builder.Connect(plant.get_state_output_port(), rolling.state_port)
@@ -31,7 +31,7 @@ def build_multipliers(problem: Problem, settings: MultiplierSettings) -> DrakeRi
     simulator = Simulator(builder.Build())
     ResetIntegratorFromFlags(simulator, settings.integrator, settings.step).set_fixed_step_mode(True)
     context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-    set_state(tree, context, problem.bicycle, problem.q, problem.qd)
+    set_plant_state(tree, context, problem.bicycle, problem.q, problem.qd)
 
     def forces():
         rolling.solve(plant.GetPositionsAndVelocities(context))

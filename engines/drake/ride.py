@@ -13,7 +13,7 @@ import numpy as np
 from ...reference.bicycle import BODIES
 from ...reference.rim import Ending, RimWatch
 from ..engine import EngineError, Problem, Progress
-from .tree import BodyMotions, Tree, read_bodies, read_wheels
+from .tree import BodyMotions, DrakeTree, read_body_motions, read_wheel_motions
 
 REPORT_INTERVAL = 0.05  # [s]
 
@@ -25,7 +25,7 @@ class DrakeRig:
     Attributes
     ----------
     simulator : Simulator
-    tree : Tree
+    tree : DrakeTree
     context : Context
         The plant's part of the simulator's context.
     follow : callable
@@ -36,7 +36,7 @@ class DrakeRig:
     """
 
     simulator: Any
-    tree: Tree
+    tree: DrakeTree
     context: Any
     follow: Callable[[int], None]
     forces: Callable[[], np.ndarray]
@@ -44,7 +44,19 @@ class DrakeRig:
 
 @dataclass(frozen=True)
 class DrakeRecording:
-    """The n samples of a ride: Drake's time [s], motion of the bodies (n, 4), forces (n, 2, 3) [N], energies (n,) [J]."""
+    """The n samples of a ride.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        Drake's time [s].
+    motion : BodyMotions
+        Of the four bodies, (n, 4).
+    force : ndarray, shape (n, 2, 3)
+        Contact forces on the wheels, inertial axes [N].
+    kinetic_energy, potential_energy : ndarray, shape (n,)
+        Energies [J].
+    """
 
     time: np.ndarray
     motion: BodyMotions
@@ -74,9 +86,7 @@ class DrakeRide:
     ended: str | None
 
 
-def ride_simulation(
-    rig: DrakeRig, problem: Problem, step: float, counts: list[int], progress: Progress
-) -> DrakeRide:
+def ride_simulation(rig: DrakeRig, problem: Problem, step: float, counts: list[int], progress: Progress) -> DrakeRide:
     """Integrate from the current state of a rig.
 
     Parameters
@@ -156,14 +166,14 @@ def _look_at_rims(rig: DrakeRig, watch: RimWatch, time: float) -> Ending | None:
     if not watch.needed:
         return None
     motion = BodyMotions.empty(2)
-    read_wheels(rig.tree, rig.context, motion)
+    read_wheel_motions(rig.tree, rig.context, motion)
     watch.centre[:], watch.axle[:] = motion.position, motion.rotation[:, :, 1]
     return watch.look(time)
 
 
 def _record_sample(rig: DrakeRig, recording: DrakeRecording, k: int) -> None:
     recording.time[k] = rig.context.get_time()
-    read_bodies(rig.tree, rig.context, recording.motion[k])
+    read_body_motions(rig.tree, rig.context, recording.motion[k])
     recording.force[k] = rig.forces()
     recording.kinetic_energy[k] = rig.tree.plant.CalcKineticEnergy(rig.context)
     recording.potential_energy[k] = rig.tree.plant.CalcPotentialEnergy(rig.context)

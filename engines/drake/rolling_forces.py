@@ -19,7 +19,7 @@ from pydrake.systems.framework import LeafSystem
 from ...reference.kinematics import STEER
 from ..engine import Problem
 from .contacts import WheelContactFinder
-from .tree import Tree, constant_torques, read_wheels
+from .tree import DrakeTree, input_torques, read_wheel_motions
 
 
 class RollingForces(LeafSystem):
@@ -27,7 +27,7 @@ class RollingForces(LeafSystem):
 
     Parameters
     ----------
-    tree : Tree
+    tree : DrakeTree
         Its plant is finalised.
     problem : Problem
     stabilisation : float
@@ -39,12 +39,12 @@ class RollingForces(LeafSystem):
         Contact forces on the wheels of the last evaluation, inertial axes [N].
     """
 
-    def __init__(self, tree: Tree, problem: Problem, stabilisation: float) -> None:
+    def __init__(self, tree: DrakeTree, problem: Problem, stabilisation: float) -> None:
         super().__init__()
         self._tree, self._rate = tree, stabilisation
         self._context = tree.plant.CreateDefaultContext()
         self._finder = WheelContactFinder(problem.bicycle, problem.surface)
-        self._torques, self._damping = constant_torques(tree, problem.inputs), problem.inputs.steer_damping
+        self._torques, self._damping = input_torques(tree, problem.inputs), problem.inputs.steer_damping
         self._steer = tree.hinges[STEER].velocity_start()
         self.force = np.zeros((2, 3))
         plant = tree.plant
@@ -66,7 +66,7 @@ class RollingForces(LeafSystem):
         """
         plant, context, finder = self._tree.plant, self._context, self._finder
         plant.SetPositionsAndVelocities(context, state)
-        read_wheels(self._tree, context, finder.motion)
+        read_wheel_motions(self._tree, context, finder.motion)
         finder.find()
         applied = self._torques.copy()
         applied[self._steer] -= self._damping * plant.GetVelocities(context)[self._steer]

@@ -21,8 +21,9 @@ from ...reference.inputs import Inputs
 from ...reference.kinematics import FRONT_ANGLE, REAR_ANGLE, STEER, angular_velocities, rotations
 from ..engine import EngineError
 
+
 @dataclass(frozen=True)
-class Tree:
+class DrakeTree:
     """The bicycle's bodies and hinges in a plant.
 
     Attributes
@@ -47,7 +48,7 @@ class Tree:
         return self.bodies[2], self.bodies[3]
 
 
-def add_tree(plant: Any, bicycle: Bicycle, steer_damping: float = 0.0) -> Tree:
+def add_bicycle_tree(plant: Any, bicycle: Bicycle, steer_damping: float = 0.0) -> DrakeTree:
     """Add the bicycle to a plant that is not finalised.
 
     Parameters
@@ -85,7 +86,7 @@ def add_tree(plant: Any, bicycle: Bicycle, steer_damping: float = 0.0) -> Tree:
     }
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -bicycle.gravity])
     centres = np.array([bicycle.centre(name) - origins[name] for name in BODIES])
-    return Tree(plant, tuple(bodies[name] for name in BODIES), hinges, centres)
+    return DrakeTree(plant, tuple(bodies[name] for name in BODIES), hinges, centres)
 
 
 def _make_inertia(bicycle: Bicycle, name: str, centre: np.ndarray) -> Any:
@@ -101,7 +102,7 @@ def _first_line(error: Exception) -> str:
     return next(iter(str(error).strip().splitlines()), type(error).__name__)
 
 
-def constant_torques(tree: Tree, inputs: Inputs) -> np.ndarray:
+def input_torques(tree: DrakeTree, inputs: Inputs) -> np.ndarray:
     """Return the generalised forces (nv,) of the steer torque and the rear wheel's torque."""
     forces = np.zeros(tree.plant.num_velocities())
     forces[tree.hinges[STEER].velocity_start()] = inputs.steer_torque
@@ -109,7 +110,7 @@ def constant_torques(tree: Tree, inputs: Inputs) -> np.ndarray:
     return forces
 
 
-def set_state(tree: Tree, context: Any, bicycle: Bicycle, q: np.ndarray, qd: np.ndarray) -> None:
+def set_plant_state(tree: DrakeTree, context: Any, bicycle: Bicycle, q: np.ndarray, qd: np.ndarray) -> None:
     """Set the state of a plant's context to the coordinates and rates (9,)."""
     frame = tree.bodies[0]
     pose = RigidTransform(RotationMatrix.ProjectToRotationMatrix(rotations(bicycle, q)[0]), q[:3])
@@ -150,7 +151,7 @@ class BodyMotions:
         return BodyMotions(self.position[rows], self.velocity[rows], self.rotation[rows], self.spin[rows])
 
 
-def read_bodies(tree: Tree, context: Any, out: BodyMotions) -> None:
+def read_body_motions(tree: DrakeTree, context: Any, out: BodyMotions) -> None:
     """Read the motion of all four bodies from a plant's context."""
     _read_origins(tree.plant, context, tree.bodies, out)
     arms = np.einsum("kij,kj->ki", out.rotation, tree.centres)
@@ -158,7 +159,7 @@ def read_bodies(tree: Tree, context: Any, out: BodyMotions) -> None:
     out.velocity[:] += np.cross(out.spin, arms)
 
 
-def read_wheels(tree: Tree, context: Any, out: BodyMotions) -> None:
+def read_wheel_motions(tree: DrakeTree, context: Any, out: BodyMotions) -> None:
     """Read the motion of both wheels, whose origins are their centres, from a plant's context."""
     _read_origins(tree.plant, context, tree.wheels, out)
 
