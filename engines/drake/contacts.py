@@ -14,6 +14,9 @@ from ...reference.surface import Surface
 from ..engine import EngineError
 from .tree import BodyMotions
 
+# Half the thickness of a wheel, since Drake has no knife edge [m]: a contact lies within 1e-8 m of the edge's. A wheel
+# lies flat where its centre is less than this above the contact.
+HALF_THICKNESS = 1e-4
 NO_CONTACT = "a wheel lies flat or has no contact point with the surface"
 
 
@@ -27,8 +30,6 @@ class WheelContactFinder:
     ----------
     bicycle : Bicycle
     surface : Surface
-    thickness : float
-        A wheel lies flat where its centre is less than this above its contact [m].
 
     Attributes
     ----------
@@ -44,11 +45,10 @@ class WheelContactFinder:
         Velocities of the wheels' material points there [m/s], and the contacts' own accelerations [m/s^2].
     """
 
-    def __init__(self, bicycle: Bicycle, surface: Surface, thickness: float = 0.0) -> None:
+    def __init__(self, bicycle: Bicycle, surface: Surface) -> None:
         self.motion = BodyMotions.empty(2)
         self.point, self.frames, self.gap = np.zeros((2, 3)), np.zeros((2, 3, 3)), np.zeros(2)
         self.velocity, self.acceleration = np.zeros((2, 3)), np.zeros((2, 3))
-        self._thickness = thickness
         # The surface's compiled function must stay alive as long as the finder.
         self._function = surface.function.real
         arguments = (
@@ -82,5 +82,5 @@ class WheelContactFinder:
         self._observe()
         height = ((self.motion.position - self.point) * self.frames[:, 2]).sum(axis=1)
         # The comparison is false for nan, of which the gap of a wheel without contact is.
-        if not (np.all(np.isfinite(self.gap)) and np.all(height > self._thickness)):
+        if not (np.all(np.isfinite(self.gap)) and np.all(height > HALF_THICKNESS)):
             raise EngineError(NO_CONTACT)

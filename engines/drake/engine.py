@@ -8,10 +8,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ...reference.contact import observe
-from ...reference.kinematics import coordinates_from_bodies
+from ...reference.kinematics import WHEELS
 from ...reference.simulate import steps_per_output
-from ..coordinates import quaternions, start_on_turn
-from ..engine import Problem, Progress, Settings, Trajectory, package_version
+from ..coordinates import coordinates_from_bodies, quaternions, start_on_turn
+from ..engine import Problem, Progress, Settings, Trajectory, UnsuitableProblem, package_version
 from .settings import DrakeContactSettings, DrakeMultiplierSettings
 
 if TYPE_CHECKING:
@@ -49,8 +49,17 @@ class DrakeEngine(Generic[S]):
         return package_version("drake")
 
     def check(self, problem: Problem, settings: Any) -> None:
-        """Refuse output times that are not multiples of the step; see `velodrome.engines.engine.Engine`."""
+        """Refuse output times that are not multiples of the step, and wheels without inertia about their axles.
+
+        See `velodrome.engines.engine.Engine`.
+        """
         steps_per_output(problem.times, settings.step)
+        for wheel in WHEELS:
+            if not getattr(problem.bicycle, f"{wheel}_wheel_Iyy") > 0:
+                raise UnsuitableProblem(
+                    f"Drake needs the inverse of the mass matrix, which is singular where {wheel}_wheel_Iyy is 0; any "
+                    "positive moment of inertia would do"
+                )
 
     def step_noise(self, settings: Any) -> float:
         """Return round-off, or what the contact solver may leave unconverged in a step; see `Engine`."""
@@ -75,15 +84,16 @@ class DrakeEngine(Generic[S]):
         Raises
         ------
         ValueError
-            If an output time lies between two steps.
+            If an output time lies between two steps, or a wheel has no inertia about its axle.
         EngineError
             If Drake refuses the bicycle, or a wheel has no contact point at the start.
         """
-        stride = steps_per_output(problem.times, settings.step)
+        self.check(problem, settings)
         from .ride import ride_simulation
 
         module, name = self.builder.split(":")
         build: Callable[[Problem, Any], DrakeRig] = getattr(import_module(module), name)
+        stride = steps_per_output(problem.times, settings.step)
         counts = [stride * k for k in range(len(problem.times))]
         ride = ride_simulation(build(problem, settings), problem, settings.step, counts, progress)
         recording = ride.recording

@@ -36,13 +36,11 @@ from pydrake.systems.framework import DiagramBuilder
 from ...reference.kinematics import WHEELS
 from ...reference.surface import is_level
 from ..engine import Problem
-from .contacts import WheelContactFinder
+from .contacts import HALF_THICKNESS, WheelContactFinder
 from .ride import DrakeRig
 from .settings import DrakeContactSettings
 from .tree import DrakeTree, add_bicycle_tree, input_torques, read_wheel_motions, set_plant_state
 
-# Half the thickness of a wheel [m]: Drake has no knife edge. A contact lies within 1e-8 m of the edge's.
-HALF_THICKNESS = 1e-4
 LOOK_INTERVAL = 0.01  # between two checks of the contacts on level ground [s]
 
 
@@ -81,7 +79,7 @@ def build_contact_plant(problem: Problem, settings: DrakeContactSettings) -> Dra
     context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     set_plant_state(tree, context, problem.bicycle, problem.q, problem.qd)
     plant.get_applied_generalized_force_input_port().FixValue(context, input_torques(tree, problem.inputs))
-    finder = WheelContactFinder(problem.bicycle, problem.surface, HALF_THICKNESS)
+    finder = WheelContactFinder(problem.bicycle, problem.surface)
     stride = 1 if moving else max(1, int(LOOK_INTERVAL / settings.step))
 
     def follow(steps: int) -> None:

@@ -146,8 +146,8 @@ def _advance(
     """Step from ``steps`` to ``until`` steps; return the number of steps and why the ride ends, if it does."""
     while steps < until:
         try:
-            # To the end of one step at a time: over several, an integrator with fixed steps adds up their round-off and
-            # then takes a step of 1e-17 s.
+            # To the end of one step at a time: over several, an integrator with fixed steps adds up their lengths,
+            # misses the end by their round-off and takes a step of 1e-17 s.
             rig.simulator.AdvanceTo((steps + 1) * step)
             steps += 1
             if not np.all(np.isfinite(rig.tree.plant.GetPositionsAndVelocities(rig.context))):

@@ -31,7 +31,7 @@ class DrakeMultiplierSettings(Settings):
         default="runge_kutta3", description="Drake's integrator with fixed steps; Drake's default is runge_kutta3"
     )
     stabilisation: float = Field(
-        default=20.0,
+        default=1.0,
         ge=0,
         le=1000,
         description="rate at which gaps and slip are brought back to zero [1/s]",
@@ -102,7 +102,8 @@ class DrakeContactSettings(Settings):
         default=1.0,
         ge=0,
         le=10,
-        description="threshold beyond which lagged, similar and sap soften contacts (sap_near_rigid_threshold)",
+        description="how far sap softens contacts that are stiff for its step (sap_near_rigid_threshold); Drake's "
+        "default is 1",
         json_schema_extra={"unit": "1"},
     )
 

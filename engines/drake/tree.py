@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
-from pydrake.multibody.tree import FixedOffsetFrame, RevoluteJoint, RotationalInertia, SpatialInertia
+from pydrake.multibody.tree import FixedOffsetFrame, RevoluteJoint, SpatialInertia, UnitInertia
 
 from ...reference.bicycle import BODIES, Bicycle
 from ...reference.inputs import Inputs
@@ -91,11 +91,14 @@ def add_bicycle_tree(plant: Any, bicycle: Bicycle, steer_damping: float = 0.0) -
 
 def _make_inertia(bicycle: Bicycle, name: str, centre: np.ndarray) -> Any:
     """Return the inertia of a body about its origin; ``centre`` is the centre of mass there."""
-    moments = bicycle.inertia(name)
-    central = RotationalInertia(
-        moments[0, 0], moments[1, 1], moments[2, 2], moments[0, 1], moments[0, 2], moments[1, 2]
-    )
-    return SpatialInertia.MakeFromCentralInertia(bicycle.body_mass(name), centre, central)
+    mass = bicycle.body_mass(name)
+    if mass == 0:
+        # Drake aborts the process where it is to divide moments of inertia by such a mass.
+        return SpatialInertia.Zero()
+    unit = bicycle.inertia(name) / mass + (centre @ centre) * np.eye(3) - np.outer(centre, centre)
+    moments, products = unit[[0, 1, 2], [0, 1, 2]], unit[[0, 0, 1], [1, 2, 2]]
+    # Measured moments may miss the triangle inequality by some percent, which Drake would refuse.
+    return SpatialInertia(mass, centre, UnitInertia(*moments, *products), skip_validity_check=True)
 
 
 def _first_line(error: Exception) -> str:
