@@ -1,5 +1,8 @@
 """Build Drake's tree and integrator under the exact forces of rolling."""
 
+# Drake is not among the suite's own dependencies.
+# pyright: reportMissingImports=false
+
 from __future__ import annotations
 
 from pydrake.multibody.plant import MultibodyPlant

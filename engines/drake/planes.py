@@ -6,6 +6,9 @@ It belongs to a body that is welded to the world by a frame whose pose is a para
 ground has no inertia and no velocity.
 """
 
+# Drake is not among the suite's own dependencies.
+# pyright: reportMissingImports=false
+
 from __future__ import annotations
 
 import logging

@@ -8,6 +8,9 @@ contacts' own acceleration beside J' v, the forces F of rolling without slip sol
 in every evaluation of the plant's derivatives. The rate s brings gaps and slip that the integrator leaves back to zero.
 """
 
+# Drake is not among the suite's own dependencies.
+# pyright: reportMissingImports=false
+
 from __future__ import annotations
 
 from typing import Any

@@ -5,6 +5,9 @@ hinges are revolute joints without friction. The frames' bodies have their origi
 rest the axes of every body are the inertial ones.
 """
 
+# Drake is not among the suite's own dependencies.
+# pyright: reportMissingImports=false
+
 from __future__ import annotations
 
 from collections.abc import Sequence

@@ -205,14 +205,14 @@ def test_an_integrator_keeps_its_order(integrator: str, order: int, step: float)
 def test_a_ride_takes_the_steps_that_its_times_ask_for() -> None:
     # 1/300 s is no sum of powers of two: times that are added up would leave steps of 1e-17 s.
     problem = disturbed_problem(Plane(), duration=1.0)
-    for build, engine in ((build_rolling_plant, MULTIPLIERS), (build_contact_plant, NATIVE)):
-        step = 1 / 300
-        rig = build(problem, engine.settings(step=step))
+    step = 1 / 300
+    rolling = build_rolling_plant(problem, MULTIPLIERS.settings(step=step))
+    for rig in (rolling, build_contact_plant(problem, NATIVE.settings(step=step))):
         counts = [3 * k for k in range(len(problem.times))]
         found = ride_simulation(rig, problem, step, counts, lambda _: None)
         taken = (
             rig.simulator.get_integrator().get_num_steps_taken()
-            if engine is MULTIPLIERS
+            if rig is rolling
             else rig.simulator.get_num_discrete_updates()
         )
         assert found.steps == taken == 300
@@ -225,7 +225,7 @@ def test_the_forces_that_drake_gives_are_those_of_its_step(solver: str, surface:
     """M (v1 - v0) / h + bias = J^T F, the balance of momentum of one step, with the forces of the first sample."""
     step = 0.001
     problem = disturbed_problem(surface, duration=2 * step, interval=step)
-    rig = build_contact_plant(problem, NATIVE.settings(step=step, solver=solver))
+    rig = build_contact_plant(problem, NATIVE.settings.model_validate({"step": step, "solver": solver}))
     rig.follow(0)
     rig.simulator.Initialize()
     tree = rig.tree
@@ -242,7 +242,9 @@ def test_the_forces_that_drake_gives_are_those_of_its_step(solver: str, surface:
     rig.simulator.AdvanceTo(step)
     residual = mass @ (plant.GetVelocities(context) - before) / step - smooth - pushed
     # SAP's tolerance is relative to the momentum, TAMSI's one of slip; the ellipsoids' contacts are 1e-8 m off.
-    allowed = NATIVE.settings(step=step, solver=solver).noise * np.abs(mass @ before).max() / step
+    allowed = (
+        NATIVE.settings.model_validate({"step": step, "solver": solver}).noise * np.abs(mass @ before).max() / step
+    )
     assert np.abs(residual).max() <= allowed
 
 
