@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -38,7 +39,7 @@ def build_rolling_plant(problem: Problem, settings: DrakeMultiplierSettings) -> 
     context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     set_plant_state(tree, context, problem.bicycle, problem.q, problem.qd)
 
-    def forces():
+    def forces() -> np.ndarray:
         rolling.solve(plant.GetPositionsAndVelocities(context))
         return rolling.force
 

@@ -75,8 +75,7 @@ def build_contact_plant(problem: Problem, settings: DrakeContactSettings) -> Dra
         plant.RegisterCollisionGeometry(plant.world_body(), RigidTransform(), HalfSpace(), "ground", material)
     plant.Finalize()
     plant.set_stiction_tolerance(settings.stiction_tolerance)
-    if moving:
-        _keep_apart(plant, scene, tree)
+    _keep_apart(plant, scene, tree, moving)
     with _hide_warning():
         simulator = Simulator(builder.Build())
     context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
@@ -133,16 +132,15 @@ def _add_ground(plant: Any, wheel: str, material: Any) -> Any:
     return frame
 
 
-def _keep_apart(plant: Any, scene: Any, tree: DrakeTree) -> None:
-    """Let each wheel touch its own half space only."""
-    for name, other in zip(WHEELS, reversed(tree.wheels), strict=True):
-        ids = (
-            plant.GetCollisionGeometriesForBody(plant.GetBodyByName(f"{name}_ground")),
-            plant.GetCollisionGeometriesForBody(other),
-        )
-        scene.collision_filter_manager().Apply(
-            CollisionFilterDeclaration().ExcludeBetween(*(GeometrySet(some) for some in ids))
-        )
+def _keep_apart(plant: Any, scene: Any, tree: DrakeTree, moving: bool) -> None:
+    """Let each wheel touch nothing but the ground, and of two half spaces its own only."""
+    rear, front = tree.wheels
+    pairs = [(rear, front)]
+    if moving:
+        pairs += [(plant.GetBodyByName("rear_ground"), front), (plant.GetBodyByName("front_ground"), rear)]
+    for pair in pairs:
+        sets = (GeometrySet(plant.GetCollisionGeometriesForBody(body)) for body in pair)
+        scene.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeBetween(*sets))
 
 
 def _place_plane(point: np.ndarray, normal: np.ndarray, gap: float) -> Any:

@@ -114,6 +114,8 @@ def ride_simulation(rig: DrakeRig, problem: Problem, step: float, counts: list[i
     try:
         rig.simulator.Initialize()
         _record_sample(rig, recording, 0)
+    except EngineError:
+        raise
     except RuntimeError as error:
         raise EngineError(f"Drake cannot evaluate the start: {_join_lines(error)}") from error
     steps, cpu_time, reported = 0, 0.0, 0

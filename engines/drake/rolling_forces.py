@@ -20,7 +20,7 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import LeafSystem
 
 from ...reference.kinematics import STEER
-from ..engine import Problem
+from ..engine import EngineError, Problem
 from .contacts import WheelContactFinder
 from .tree import DrakeTree, input_torques, read_wheel_motions
 
@@ -65,7 +65,7 @@ class RollingForces(LeafSystem):
         Raises
         ------
         EngineError
-            If a wheel lies flat or has no contact.
+            If a wheel lies flat or has no contact, or the forces are not determined.
         """
         plant, context, finder = self._tree.plant, self._context, self._finder
         plant.SetPositionsAndVelocities(context, state)
@@ -75,8 +75,11 @@ class RollingForces(LeafSystem):
         applied[self._steer] -= self._damping * plant.GetVelocities(context)[self._steer]
         smooth = applied + plant.CalcGravityGeneralizedForces(context) - plant.CalcBiasTerm(context)
         rows, rest = self._constrain()
-        moved = np.linalg.solve(plant.CalcMassMatrix(context), np.column_stack([rows.T, smooth]))
-        force = np.linalg.solve(rows @ moved[:, :-1], -rest - rows @ moved[:, -1])
+        try:
+            moved = np.linalg.solve(plant.CalcMassMatrix(context), np.column_stack([rows.T, smooth]))
+            force = np.linalg.solve(rows @ moved[:, :-1], -rest - rows @ moved[:, -1])
+        except np.linalg.LinAlgError as error:
+            raise EngineError("the rolling constraints are singular") from error
         self.force[:] = force.reshape(2, 3)
         return applied + rows.T @ force
 
