@@ -259,7 +259,7 @@ def name_modes(matrices: CanonicalMatrices, speeds: Any) -> tuple[np.ndarray, np
 
 def _divides_pair(values: np.ndarray) -> np.ndarray:
     """Return which rows (n, 4) have one of a pair among the first two columns and the other among the last two."""
-    oscillates = (np.abs(values.imag) > _REAL * np.abs(values))[:, :2].any(axis=1)
+    oscillates = (np.abs(np.imag(values)) > _REAL * np.abs(values))[:, :2].any(axis=1)
     return oscillates & (values[:, 1] != np.conj(values[:, 0]))
 
 
