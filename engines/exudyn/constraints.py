@@ -85,7 +85,8 @@ def make_constraint_functions(mbs: exu.MainSystem, joint: RollingJoint, ratio: f
         if time != evaluated_at[0]:
             begin_time(mbs, time)
         pack(memory, 0, *coordinates, *rates)
-        if turns and time == mbs.systemData.GetTime(_START_OF_STEP):
+        # Only the engine's differences leave the rates as they are, so the time need not be asked for at every iterate.
+        if turns and rates == evaluated_at[2] and time == mbs.systemData.GetTime(_START_OF_STEP):
             _follow_rotations(state[0], start_coordinates(mbs), turns)
         evaluate()
         evaluated_at = (time, coordinates, rates)
