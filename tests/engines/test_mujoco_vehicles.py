@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from velodrome.engines.engine import EngineError
-from velodrome.engines.mujoco.compiled import DEPENDENT, solve_rows
+from velodrome.engines.mujoco.compiled import INDEPENDENT, solve_rows
 from velodrome.engines.rolling import observe_wheel
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "examples" / "rolling"))
@@ -156,7 +156,9 @@ def test_redundant_rows_have_the_smallest_forces(scales) -> None:
     schur, rows = make_rows(scales)
     target = rows @ np.random.default_rng(2).normal(size=8)
     found = target.copy()
-    assert solve_rows(schur, found, 5) < 1e-12
+    residual, dependence = solve_rows(schur, found, 5, np.empty(5))
+    assert residual < 1e-12
+    assert dependence == 0
     np.testing.assert_allclose(schur @ found, target, rtol=0, atol=1e-12 * np.abs(target).max())
     # Of all solutions the least in sqrt(S_ii) F_i: a least-squares problem without a weight.
     weight = np.sqrt(np.diag(schur))
@@ -168,14 +170,19 @@ def test_contradicting_rows_leave_a_residual() -> None:
     schur, rows = make_rows([1.0] * 5)
     target = rows @ np.ones(8)
     target[4] += 1e-3 * np.abs(target).max()
-    assert solve_rows(schur, target, 5) > 1e-4
+    share = np.empty(5)
+    residual, dependence = solve_rows(schur, target, 5, share)
+    assert residual > 1e-4
+    assert dependence == 0
+    # Row 4 is row 2 again: these two contradict each other, and no other.
+    np.testing.assert_allclose(share[[0, 1, 3]], 0, atol=1e-12 * share.max())
 
 
 def test_independent_rows_are_solved_directly() -> None:
     rows = np.random.default_rng(3).normal(size=(4, 8))
     schur, target = rows @ rows.T, np.arange(1.0, 5.0)
     found = target.copy()
-    assert solve_rows(schur, found, 4) == 0.0
-    assert np.linalg.det(schur / np.diag(schur)) > DEPENDENT
+    assert solve_rows(schur, found, 4, np.empty(4)) == (0.0, 0.0)
+    assert np.linalg.det(schur / np.diag(schur)) > INDEPENDENT
     condition = np.linalg.cond(schur)
     np.testing.assert_allclose(found, np.linalg.solve(schur, target), rtol=10 * condition * ROUND_OFF)
