@@ -51,7 +51,7 @@ WHEEL_COUNT = 64  # largest number of wheels on a blackboard
 CONTACTS, ROLLING, WATCHING = 1, 2, 3
 # Rows of rolling, scaled to the same size, are independent if the smallest eigenvalue of their Gram matrix is above
 # `INDEPENDENT`, the squared angle between two of them: 0.2 degrees. Below `REDUNDANT`, a thousand roundings, they say the
-# same. Forces in rows between the two grow as the inverse angle and are nothing that a vehicle is built for.
+# same. Forces that keep rows between the two apart would grow as the inverse angle; no vehicle is built for them.
 INDEPENDENT = 1e-5
 REDUNDANT = 1e-12
 # A row whose square is smaller than this, relative to the largest row's, is one that no motion of the model changes.
@@ -172,7 +172,7 @@ BLACKBOARD = np.dtype(
         ("pull", np.float64),  # largest one that holds a wheel down [N]
         ("contradiction", np.float64),  # largest residual of the forces of rolling, relative to the accelerations
         ("contradicting", np.float64, WHEEL_COUNT),  # shares of the wheels in its square
-        ("dependence", np.float64),  # smallest eigenvalue between `REDUNDANT` and `INDEPENDENT`; 0 if there is none
+        ("dependence", np.float64),  # first eigenvalue between `REDUNDANT` and `INDEPENDENT`; 0 if there is none
         ("dependent", np.float64, WHEEL_COUNT),  # shares of the wheels in its eigenvector
         # Arrays (n,): passive forces without and with those of rolling; all forces that these belong to.
         ("passive_before", _ADDRESS),
@@ -698,7 +698,7 @@ def _add_least_forces(values, vectors, weight, left, force):
     """Add to forces (n,) the smallest ones whose accelerations are ``left`` (n,), as far as there are any."""
     size = len(force)
     for k in range(size):
-        if values[k] > REDUNDANT:
+        if values[k] > INDEPENDENT:
             along = 0.0
             for i in range(size):
                 along += vectors[i, k] * weight[i] * left[i]
@@ -730,35 +730,35 @@ def _solve_dependent_rows(schur, target, size, share):
             left[i] = target[i]
             for j in range(size):
                 left[i] -= schur[i, j] * force[j]
-    size_of, residual = 0.0, 0.0
+    residual = 0.0
     for i in range(size):
-        size_of, residual = max(size_of, abs(target[i])), max(residual, abs(left[i]))
-        share[i] = left[i] ** 2
+        residual = max(residual, abs(left[i]))
+        share[0, i] = left[i] ** 2
     dependence = 0.0
     for k in range(size - 1, -1, -1):
         if REDUNDANT < values[k] < INDEPENDENT:
             dependence = values[k]
             for i in range(size):
-                share[i] = vectors[i, k] ** 2
+                share[1, i] = vectors[i, k] ** 2
     target[:size] = force
-    return residual / size_of if size_of > 0 else 0.0, dependence
+    return residual, dependence
 
 
 @jit
 def solve_rows(schur, target, size, share):
-    """Overwrite ``target`` (n,) with forces F, S F = target; return |S F - target| over |target| and a dependence.
+    """Overwrite ``target`` (n,) with forces F, S F = target; return the largest |S F - target| and a dependence.
 
     Independent rows are solved directly. Where a row's own share beside the rows before it, a pivot of S relative to
     its diagonal, is not above `INDEPENDENT`, the eigenvalues of D S D decide, D = diag(S)^(-1/2). F is the smallest, in
-    the sum of S_ii F_i^2, among forces in the space of the eigenvalues above `REDUNDANT`: redundant rows share a force,
-    rows that no motion changes have none, and rows that contradict each other leave a residual. The smallest eigenvalue
-    between `REDUNDANT` and `INDEPENDENT` is returned as the dependence, 0 if there is none: such rows neither say the
-    same nor differ, and their forces are large and arbitrary. ``share`` (n,) gets the share of each row in the square
-    of the dependence's eigenvector or, without one, of the residual.
+    the sum of S_ii F_i^2, among forces in the space of the eigenvalues above `INDEPENDENT`: redundant rows share a
+    force, rows that no motion changes have none, and rows that contradict each other leave a residual. The smallest
+    eigenvalue between `REDUNDANT` and `INDEPENDENT` is returned as the dependence, 0 if there is none: such rows neither
+    say the same nor differ. ``share`` (2, n) gets the share of each row in the square of the residual, and of the
+    dependence's eigenvector.
     """
     factors, least, largest, smallest = schur.copy(), 1.0, 0.0, np.inf
     for i in range(size):
-        share[i] = 0.0
+        share[0, i] = share[1, i] = 0.0
         largest, smallest = max(largest, schur[i, i]), min(smallest, schur[i, i])
     if smallest > VANISHING * largest:
         factorise(factors, size)
@@ -781,11 +781,35 @@ def _fill_row(row, axis, velocities, demand, free):
 
 
 @jit
+def _acceleration_scale(board, k, gap, velocity, rows, turning, free):
+    """Return the size of the terms that make up the accelerations of rows (m, n) of wheel k.
+
+    They may cancel, as on a straight line, and leave round-off of this size. ``turning`` (3, n) is the Jacobian of the
+    wheel's angular velocity, whose square times the radius is that of gamma's parts.
+    """
+    s, qvel, squared, largest = board.stabilisation, _real_array(board.qvel, board.speeds), 0.0, 0.0
+    for i in range(3):
+        spin = 0.0
+        for j in range(board.speeds):
+            spin += turning[i, j] * qvel[j]
+        squared += spin * spin
+    for i in range(len(rows)):
+        total = 0.0
+        for j in range(board.speeds):
+            total += abs(rows[i, j] * free[j])
+        largest = max(largest, total)
+    speed = np.sqrt(squared) * board.radius[k] + np.sqrt(dot(velocity, velocity))
+    return largest + squared * board.radius[k] + 2 * s * speed + s * s * abs(gap)
+
+
+@jit
 def _fill_rows(board, k, model, data, centre, here, rows, turning, free, force, first):
     """Fill the rows of wheel k, and minus the accelerations that its forces must undo.
 
-    Returns the number of the next row. The rows are along the inertial axes if all velocities are constrained.
+    Returns the number of the next row and the size of the accelerations' terms. The rows are along the inertial axes if
+    all velocities are constrained.
     """
+    begin = first
     s, axes = board.stabilisation, board.constrained
     whole = axes[k, 0] and axes[k, 1] and axes[k, 2]
     velocities = rows[first : first + 3] if whole else np.empty((3, board.speeds))
@@ -800,7 +824,7 @@ def _fill_rows(board, k, model, data, centre, here, rows, turning, free, force, 
             for j in range(board.speeds):
                 total += velocities[i, j] * free[j]
             force[first + i] = -total
-        return first + 3
+        return first + 3, _acceleration_scale(board, k, here.gap, velocity, velocities, turning, free)
     demand = add(gamma, add(scale(closing, here.normal), scale(2 * s, velocity)))
     if axes[k, 0]:
         force[first] = -_fill_row(rows[first], cross(here.normal, here.tangent), velocities, demand, free)
@@ -811,7 +835,7 @@ def _fill_rows(board, k, model, data, centre, here, rows, turning, free, force, 
     if axes[k, 2]:
         force[first] = -_fill_row(rows[first], here.normal, velocities, demand, free)
         first += 1
-    return first
+    return first, _acceleration_scale(board, k, here.gap, velocity, rows[begin:first], turning, free)
 
 
 @jit
@@ -848,23 +872,25 @@ def _take_back(board):
 
 @jit
 def _record_solution(board, residual, dependence, share, owner, force, size):
-    """Record what is wrong with the forces (n,) of rows, and the shares of the wheels that own the rows."""
+    """Record what is wrong with the forces (n,) of rows, and the shares of the wheels that own the rows.
+
+    ``share`` (2, n) is that of `solve_rows`.
+    """
     for i in range(size):
         if not np.isfinite(force[i]):
             board.infinite += 1
             return
-    if dependence > 0:
-        if board.dependence == 0:
-            board.dependence = dependence
-            for i in range(size):
-                board.dependent[owner[i]] += share[i]
-    elif residual > board.contradiction:
+    if dependence > 0 and board.dependence == 0:
+        board.dependence = dependence
+        for i in range(size):
+            board.dependent[owner[i]] += share[1, i]
+    if residual > board.contradiction:
         board.contradiction, total = residual, 0.0
         board.contradicting[:] = 0.0
         for i in range(size):
-            total += share[i]
+            total += share[0, i]
         for i in range(size):
-            board.contradicting[owner[i]] += share[i] / total
+            board.contradicting[owner[i]] += share[0, i] / total
 
 
 @jit
@@ -889,7 +915,7 @@ def _press(board, model, data):
     """
     n, most = board.speeds, 3 * board.wheels
     rows, spread, turning, force = np.empty((most, n)), np.empty((most, n)), np.empty((3, n)), np.empty(most)
-    owner, share, touches = np.empty(most, np.int64), np.empty(most), np.empty(board.wheels, np.bool_)
+    owner, share, touches = np.empty(most, np.int64), np.empty((2, most)), np.empty(board.wheels, np.bool_)
     _take_back(board)
     # MuJoCo computes the same again after this callback.
     _actuation(model, data)
@@ -898,7 +924,7 @@ def _press(board, model, data):
     before = _real_array(board.passive_before, n)
     before[:] = passive
     board.crowded += _read_integer(_address_of(data) + types.uintp(board.nefc_at)) > 0
-    size = 0
+    size, scale_of = 0, 0.0
     for k in range(board.wheels):
         touches[k], centre, here = _find_contact(board, k)
         if not touches[k]:
@@ -908,11 +934,12 @@ def _press(board, model, data):
             continue
         board.found += 1
         first = size
-        size = _fill_rows(board, k, model, data, centre, here, rows, turning, free, force, size)
+        size, scale_k = _fill_rows(board, k, model, data, centre, here, rows, turning, free, force, size)
+        scale_of = max(scale_of, scale_k)
         owner[first:size] = k
     _solve_mass(model, data, spread.ctypes, rows.ctypes, types.int32(size))
     residual, dependence = solve_rows(rows[:size] @ spread[:size].T, force, size, share)
-    _record_solution(board, residual, dependence, share, owner, force, size)
+    _record_solution(board, residual / scale_of if residual > 0 else residual, dependence, share, owner, force, size)
     for i in range(size):
         for j in range(n):
             passive[j] += rows[i, j] * force[i]

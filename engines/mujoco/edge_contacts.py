@@ -167,17 +167,17 @@ class EdgeContacts(SolverConvergence):
                 f"the wheel {self._name(k)} had no contact point with the ground in {record['unreached'][k]} "
                 "evaluations, and so no force"
             )
-        if record["dependence"] > 0:
-            return (
-                f"the constraints of rolling on {self._name_all('dependent')} are nearly redundant: they differ by "
-                f"{np.sqrt(record['dependence']):.2g} rad, and their forces are arbitrary; make them equal, or leave "
-                "some out by `constrained`"
-            )
         if record["contradiction"] > CONTRADICTION:
             return (
                 f"the constraints of rolling contradict each other by {record['contradiction']:.2g} of the "
                 f"accelerations, on {self._name_all('contradicting')}; `constrained` can leave out the lateral "
                 "velocity of all but one wheel on an axle"
+            )
+        if record["dependence"] > 0:
+            return (
+                f"the constraints of rolling on {self._name_all('dependent')} are nearly redundant: they differ by "
+                f"{np.sqrt(record['dependence']):.2g} rad, which is neither nothing nor enough to tell their forces "
+                "apart; make them equal, or leave some out by `constrained`"
             )
         if record["changed"]:
             return (
