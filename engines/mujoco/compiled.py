@@ -50,8 +50,8 @@ WHEEL_COUNT = 64  # largest number of wheels on a blackboard
 # What a blackboard is for: wheels in MuJoCo's contacts, wheels under forces of rolling, or MuJoCo's solver alone.
 CONTACTS, ROLLING, WATCHING = 1, 2, 3
 # Rows of rolling, scaled to the same size, are independent if the smallest eigenvalue of their Gram matrix is above
-# `INDEPENDENT`, the squared angle between two of them: 0.2 degrees. Below `REDUNDANT`, a thousand roundings, they say the
-# same. Forces that keep rows between the two apart would grow as the inverse angle; no vehicle is built for them.
+# `INDEPENDENT`, half the squared angle of two of them: 0.25 degrees. Below `REDUNDANT`, a thousand roundings, they say
+# the same. Forces that keep rows between the two apart would grow as the inverse angle; no vehicle is built for them.
 INDEPENDENT = 1e-5
 REDUNDANT = 1e-12
 # A row whose square is smaller than this, relative to the largest row's, is one that no motion of the model changes.
@@ -178,7 +178,10 @@ BLACKBOARD = np.dtype(
         ("passive_before", _ADDRESS),
         ("passive_after", _ADDRESS),
         ("smooth_after", _ADDRESS),
-        ("pressed", np.int64),  # 1: forces of rolling are in the passive forces, and nobody has looked at what became of them
+        (
+            "pressed",
+            np.int64,
+        ),  # 1: forces of rolling are in the passive forces, and nobody has looked at what became of them
         ("smooth_size", np.float64),  # largest of all forces in the last evaluation
     ],
     align=True,
@@ -707,8 +710,38 @@ def _add_least_forces(values, vectors, weight, left, force):
 
 
 @jit
-def _solve_dependent_rows(schur, target, size, share):
-    """Overwrite ``target`` with the smallest forces in dependent rows; see `solve_rows`."""
+def solve_independent_rows(schur, target, size):
+    """Overwrite ``target`` (n,) with the forces F, S F = target, if the rows are independent; return whether they are.
+
+    They are if each row's own share beside the rows before it, a pivot of S relative to its diagonal, is above
+    `INDEPENDENT`.
+    """
+    largest, smallest, least = 0.0, np.inf, 1.0
+    for i in range(size):
+        largest, smallest = max(largest, schur[i, i]), min(smallest, schur[i, i])
+    if not smallest > VANISHING * largest:
+        return False
+    factors = schur.copy()
+    factorise(factors, size)
+    for i in range(size):
+        least = min(least, factors[i, i] / schur[i, i])
+    if not least > INDEPENDENT:
+        return False
+    solve_factorised(factors, target, size)
+    return True
+
+
+@jit
+def solve_dependent_rows(schur, target, size, share):
+    """Overwrite ``target`` (n,) with forces F, S F = target; return the largest |S F - target| and a dependence.
+
+    The eigenvalues of D S D decide, D = diag(S)^(-1/2). F is the smallest, in the sum of S_ii F_i^2, among forces in
+    the space of the eigenvalues above `INDEPENDENT`: redundant rows share a force, rows that no motion changes have
+    none, and rows that contradict each other leave a residual. The smallest eigenvalue between `REDUNDANT` and
+    `INDEPENDENT` is returned as the dependence, 0 if there is none: such rows neither say the same nor differ.
+    ``share`` (2, n) gets the share of each row in the square of the residual, and of the dependence's eigenvector.
+    """
+    share[:] = 0.0
     weight, scaled, largest = np.zeros(size), np.empty((size, size)), 0.0
     for i in range(size):
         largest = max(largest, schur[i, i])
@@ -745,32 +778,6 @@ def _solve_dependent_rows(schur, target, size, share):
 
 
 @jit
-def solve_rows(schur, target, size, share):
-    """Overwrite ``target`` (n,) with forces F, S F = target; return the largest |S F - target| and a dependence.
-
-    Independent rows are solved directly. Where a row's own share beside the rows before it, a pivot of S relative to
-    its diagonal, is not above `INDEPENDENT`, the eigenvalues of D S D decide, D = diag(S)^(-1/2). F is the smallest, in
-    the sum of S_ii F_i^2, among forces in the space of the eigenvalues above `INDEPENDENT`: redundant rows share a
-    force, rows that no motion changes have none, and rows that contradict each other leave a residual. The smallest
-    eigenvalue between `REDUNDANT` and `INDEPENDENT` is returned as the dependence, 0 if there is none: such rows neither
-    say the same nor differ. ``share`` (2, n) gets the share of each row in the square of the residual, and of the
-    dependence's eigenvector.
-    """
-    factors, least, largest, smallest = schur.copy(), 1.0, 0.0, np.inf
-    for i in range(size):
-        share[0, i] = share[1, i] = 0.0
-        largest, smallest = max(largest, schur[i, i]), min(smallest, schur[i, i])
-    if smallest > VANISHING * largest:
-        factorise(factors, size)
-        for i in range(size):
-            least = min(least, factors[i, i] / schur[i, i])
-        if least > INDEPENDENT:
-            solve_factorised(factors, target, size)
-            return 0.0, 0.0
-    return _solve_dependent_rows(schur, target, size, share)
-
-
-@jit
 def _fill_row(row, axis, velocities, demand, free):
     """Fill a row (n,) with a velocity along an axis, and return the acceleration along it that forces must undo."""
     total = dot(axis, demand)
@@ -781,35 +788,11 @@ def _fill_row(row, axis, velocities, demand, free):
 
 
 @jit
-def _acceleration_scale(board, k, gap, velocity, rows, turning, free):
-    """Return the size of the terms that make up the accelerations of rows (m, n) of wheel k.
-
-    They may cancel, as on a straight line, and leave round-off of this size. ``turning`` (3, n) is the Jacobian of the
-    wheel's angular velocity, whose square times the radius is that of gamma's parts.
-    """
-    s, qvel, squared, largest = board.stabilisation, _real_array(board.qvel, board.speeds), 0.0, 0.0
-    for i in range(3):
-        spin = 0.0
-        for j in range(board.speeds):
-            spin += turning[i, j] * qvel[j]
-        squared += spin * spin
-    for i in range(len(rows)):
-        total = 0.0
-        for j in range(board.speeds):
-            total += abs(rows[i, j] * free[j])
-        largest = max(largest, total)
-    speed = np.sqrt(squared) * board.radius[k] + np.sqrt(dot(velocity, velocity))
-    return largest + squared * board.radius[k] + 2 * s * speed + s * s * abs(gap)
-
-
-@jit
 def _fill_rows(board, k, model, data, centre, here, rows, turning, free, force, first):
     """Fill the rows of wheel k, and minus the accelerations that its forces must undo.
 
-    Returns the number of the next row and the size of the accelerations' terms. The rows are along the inertial axes if
-    all velocities are constrained.
+    Returns the number of the next row. The rows are along the inertial axes if all velocities are constrained.
     """
-    begin = first
     s, axes = board.stabilisation, board.constrained
     whole = axes[k, 0] and axes[k, 1] and axes[k, 2]
     velocities = rows[first : first + 3] if whole else np.empty((3, board.speeds))
@@ -824,7 +807,7 @@ def _fill_rows(board, k, model, data, centre, here, rows, turning, free, force, 
             for j in range(board.speeds):
                 total += velocities[i, j] * free[j]
             force[first + i] = -total
-        return first + 3, _acceleration_scale(board, k, here.gap, velocity, velocities, turning, free)
+        return first + 3
     demand = add(gamma, add(scale(closing, here.normal), scale(2 * s, velocity)))
     if axes[k, 0]:
         force[first] = -_fill_row(rows[first], cross(here.normal, here.tangent), velocities, demand, free)
@@ -835,7 +818,7 @@ def _fill_rows(board, k, model, data, centre, here, rows, turning, free, force, 
     if axes[k, 2]:
         force[first] = -_fill_row(rows[first], here.normal, velocities, demand, free)
         first += 1
-    return first, _acceleration_scale(board, k, here.gap, velocity, rows[begin:first], turning, free)
+    return first
 
 
 @jit
@@ -871,21 +854,55 @@ def _take_back(board):
 
 
 @jit
-def _record_solution(board, residual, dependence, share, owner, force, size):
-    """Record what is wrong with the forces (n,) of rows, and the shares of the wheels that own the rows.
+def _row_owners(board, size):
+    """Return the wheel of each row (n,): wheels without a contact point have none."""
+    owner, first = np.empty(size, np.int64), 0
+    for k in range(board.wheels):
+        if np.isfinite(board.gap[k]):
+            for i in range(3):
+                if board.constrained[k, i]:
+                    owner[first], first = k, first + 1
+    return owner
 
-    ``share`` (2, n) is that of `solve_rows`.
+
+@jit
+def _find_scale(board, model, data, rows, owner, free):
+    """Return the size of the terms that make up the accelerations of rows (m, n), which may cancel to round-off.
+
+    Gamma's terms are of the size w^2 r, w the wheel's angular velocity.
     """
-    for i in range(size):
-        if not np.isfinite(force[i]):
-            board.infinite += 1
-            return
+    s, qvel, largest = board.stabilisation, _real_array(board.qvel, board.speeds), 0.0
+    moving, turning = np.empty((3, board.speeds)), np.empty((3, board.speeds))
+    for row in range(len(owner)):
+        k = owner[row]
+        centre, here = _evaluate_contact(board, k)
+        _contact_motion(board, k, model, data, centre, here, moving, turning)
+        squared, total = 0.0, 0.0
+        for i in range(3):
+            spin = 0.0
+            for j in range(board.speeds):
+                spin += turning[i, j] * qvel[j]
+            squared += spin * spin
+        for j in range(board.speeds):
+            total += abs(rows[row, j] * free[j]) + 2 * s * abs(rows[row, j] * qvel[j])
+        largest = max(largest, total + squared * board.radius[k] + s * s * abs(here.gap))
+    return largest
+
+
+@jit
+def _press_dependent(board, model, data, rows, schur, force, free):
+    """Solve rows (m, n) that are not all independent for their forces (m,), and record how far they agree."""
+    size = len(rows)
+    share, owner = np.empty((2, size)), _row_owners(board, size)
+    residual, dependence = solve_dependent_rows(schur, force, size, share)
     if dependence > 0 and board.dependence == 0:
         board.dependence = dependence
         for i in range(size):
             board.dependent[owner[i]] += share[1, i]
-    if residual > board.contradiction:
-        board.contradiction, total = residual, 0.0
+    scale_of = _find_scale(board, model, data, rows, owner, free)
+    # Without any acceleration there is no residual either.
+    if residual > board.contradiction * scale_of:
+        board.contradiction, total = residual / scale_of, 0.0
         board.contradicting[:] = 0.0
         for i in range(size):
             total += share[0, i]
@@ -915,7 +932,6 @@ def _press(board, model, data):
     """
     n, most = board.speeds, 3 * board.wheels
     rows, spread, turning, force = np.empty((most, n)), np.empty((most, n)), np.empty((3, n)), np.empty(most)
-    owner, share, touches = np.empty(most, np.int64), np.empty((2, most)), np.empty(board.wheels, np.bool_)
     _take_back(board)
     # MuJoCo computes the same again after this callback.
     _actuation(model, data)
@@ -924,29 +940,31 @@ def _press(board, model, data):
     before = _real_array(board.passive_before, n)
     before[:] = passive
     board.crowded += _read_integer(_address_of(data) + types.uintp(board.nefc_at)) > 0
-    size, scale_of = 0, 0.0
+    size = 0
     for k in range(board.wheels):
-        touches[k], centre, here = _find_contact(board, k)
-        if not touches[k]:
+        found, centre, here = _find_contact(board, k)
+        if not found:
             board.lost += 1
             board.unreached[k] += 1
             board.gap[k] = np.nan
             continue
         board.found += 1
-        first = size
-        size, scale_k = _fill_rows(board, k, model, data, centre, here, rows, turning, free, force, size)
-        scale_of = max(scale_of, scale_k)
-        owner[first:size] = k
+        size = _fill_rows(board, k, model, data, centre, here, rows, turning, free, force, size)
     _solve_mass(model, data, spread.ctypes, rows.ctypes, types.int32(size))
-    residual, dependence = solve_rows(rows[:size] @ spread[:size].T, force, size, share)
-    _record_solution(board, residual / scale_of if residual > 0 else residual, dependence, share, owner, force, size)
+    schur = rows[:size] @ spread[:size].T
+    if not solve_independent_rows(schur, force, size):
+        _press_dependent(board, model, data, rows[:size], schur, force, free)
+    for i in range(size):
+        if not np.isfinite(force[i]):
+            board.infinite += 1
+            break
     for i in range(size):
         for j in range(n):
             passive[j] += rows[i, j] * force[i]
     _store_sums(board, _real_array(board.qfrc_smooth, n), passive)
     first = 0
     for k in range(board.wheels):
-        if not touches[k]:
+        if not np.isfinite(board.gap[k]):
             board.force[k, :] = 0.0
             continue
         first = _store_force(board, k, force, first)

@@ -57,9 +57,10 @@ _FOLLOWED = (
 )
 # Largest tilt of a plane that counts as level [rad]; round-off in a quaternion is 1e-16.
 LEVEL = 1e-9
-# Largest product of the rate of stabilisation and the step at which x" = -2 s x' - s^2 x decays: of RK4, at the real
-# end of its region of stability, and of MuJoCo's other methods, v += h a, x += h v, where 4 - 4 s h - (s h)^2 = 0.
-FASTEST_RK4, FASTEST_EULER = 2.785, 2 * (2**0.5 - 1)
+# Largest product of the rate of stabilisation and the step at which slip, v' = -2 s v, and gaps,
+# x" = -2 s x' - s^2 x, decay. RK4 is stable on the real axis down to -2.785, twice the product. MuJoCo's other methods
+# take v += h a, x += h v, so that gaps begin to grow where 4 - 4 s h - (s h)^2 = 0, and slip at s h = 1.
+FASTEST_RK4, FASTEST_EULER = 2.785 / 2, 2 * (2**0.5 - 1)
 
 
 @contextmanager
@@ -159,7 +160,7 @@ def rolling_forces(
     model, data, surface, wheels
         As in `knife_edges`; no contact pairs are needed.
     stabilisation : float
-        Rate at which gaps and slip decay to zero [1/s]; at most 0.8 (RK4: 2.7) a step.
+        Rate at which gaps and slip decay to zero [1/s]; at most 0.8 (RK4: 1.3) a step.
     constrained : mapping, optional
         Which velocities of a wheel's contact are zero, by the wheel's geom name: lateral, forward and normal. All of
         those of wheels that it does not name.
@@ -265,7 +266,7 @@ def _check_rate(stabilisation: float, model: mujoco.MjModel) -> None:
     fastest = FASTEST_RK4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else FASTEST_EULER
     if stabilisation * model.opt.timestep > fastest:
         raise ValueError(
-            f"stabilisation is {stabilisation:g} 1/s; at steps of {model.opt.timestep:g} s gaps grow from "
+            f"stabilisation is {stabilisation:g} 1/s; at steps of {model.opt.timestep:g} s gaps or slip grow from "
             f"{fastest / model.opt.timestep:.4g} 1/s on"
         )
 
@@ -273,9 +274,7 @@ def _check_rate(stabilisation: float, model: mujoco.MjModel) -> None:
 def _check_axes(name: str, axes: object) -> None:
     known = isinstance(axes, Sequence | np.ndarray) and not isinstance(axes, str | bytes) and len(axes) == 3
     if not known or any(not isinstance(axis, bool | np.bool_) for axis in axes):  # type: ignore[union-attr]
-        raise ValueError(
-            f"constrained[{name!r}] must be three truth values, lateral, forward and normal, not {axes!r}"
-        )
+        raise ValueError(f"constrained[{name!r}] must be three truth values, lateral, forward and normal, not {axes!r}")
 
 
 def _find_geom(model: mujoco.MjModel, name: str) -> Any:
