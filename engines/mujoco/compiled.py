@@ -732,15 +732,42 @@ def solve_independent_rows(schur, target, size):
 
 
 @jit
-def solve_dependent_rows(schur, target, size, share):
+def _reduce_forces(values, vectors, weight, cost, force):
+    """Reduce forces (n,) to the ones of least cost, sum of c_i F_i^2, among those with the same accelerations."""
+    size, count = len(force), 0
+    free = np.empty((size, size))
+    for k in range(size):
+        if -0.5 < values[k] <= INDEPENDENT:
+            for i in range(size):
+                free[count, i] = weight[i] * vectors[i, k]
+            count += 1
+    if count == 0:
+        return
+    normal, right = np.zeros((count, count)), np.zeros(count)
+    for k in range(count):
+        for i in range(size):
+            right[k] -= free[k, i] * cost[i] * force[i]
+            for j in range(count):
+                normal[k, j] += free[k, i] * cost[i] * free[j, i]
+    factorise(normal, count)
+    solve_factorised(normal, right, count)
+    for k in range(count):
+        for i in range(size):
+            force[i] += right[k] * free[k, i]
+
+
+@jit
+def solve_dependent_rows(schur, target, cost, share):
     """Overwrite ``target`` (n,) with forces F, S F = target; return the largest |S F - target| and a dependence.
 
-    The eigenvalues of D S D decide, D = diag(S)^(-1/2). F is the smallest, in the sum of S_ii F_i^2, among forces in
-    the space of the eigenvalues above `INDEPENDENT`: redundant rows share a force, rows that no motion changes have
-    none, and rows that contradict each other leave a residual. The smallest eigenvalue between `REDUNDANT` and
-    `INDEPENDENT` is returned as the dependence, 0 if there is none: such rows neither say the same nor differ.
-    ``share`` (2, n) gets the share of each row in the square of the residual, and of the dependence's eigenvector.
+    The eigenvalues of D S D decide, D = diag(S)^(-1/2). Those above `INDEPENDENT` determine the accelerations; of the
+    forces with these accelerations F is the smallest, in the sum of c_i F_i^2 with the ``cost`` c (n,) of each row.
+    Redundant rows share a force, rows that no motion changes have none, and rows that contradict each other leave a
+    residual. The smallest eigenvalue between `REDUNDANT` and `INDEPENDENT` is returned as the dependence, 0 if there is
+    none: such rows neither say the same nor differ. ``share`` (2, n) gets the share of each row in the square of the
+    residual, and of the dependence's eigenvector.
     """
+    size = len(target)
     share[:] = 0.0
     weight, scaled, largest = np.zeros(size), np.empty((size, size)), 0.0
     for i in range(size):
@@ -755,25 +782,26 @@ def solve_dependent_rows(schur, target, size, share):
         for j in range(size):
             # Half of both triangles, which round otherwise.
             scaled[i, j] = weight[i] * weight[j] * (schur[i, j] + schur[j, i]) / 2
+        if weight[i] == 0:
+            scaled[i, i] = -1.0  # apart from all others
     values, vectors = np.linalg.eigh(scaled)
-    force, left = np.zeros(size), target[:size].copy()
+    force, left, residual, dependence = np.zeros(size), target.copy(), 0.0, 0.0
     for _ in range(2):  # the second time removes what rounding has left
         _add_least_forces(values, vectors, weight, left, force)
         for i in range(size):
             left[i] = target[i]
             for j in range(size):
                 left[i] -= schur[i, j] * force[j]
-    residual = 0.0
     for i in range(size):
         residual = max(residual, abs(left[i]))
         share[0, i] = left[i] ** 2
-    dependence = 0.0
     for k in range(size - 1, -1, -1):
         if REDUNDANT < values[k] < INDEPENDENT:
             dependence = values[k]
             for i in range(size):
                 share[1, i] = vectors[i, k] ** 2
-    target[:size] = force
+    _reduce_forces(values, vectors, weight, cost, force)
+    target[:] = force
     return residual, dependence
 
 
@@ -893,8 +921,13 @@ def _find_scale(board, model, data, rows, owner, free):
 def _press_dependent(board, model, data, rows, schur, force, free):
     """Solve rows (m, n) that are not all independent for their forces (m,), and record how far they agree."""
     size = len(rows)
-    share, owner = np.empty((2, size)), _row_owners(board, size)
-    residual, dependence = solve_dependent_rows(schur, force, size, share)
+    share, owner, cost = np.empty((2, size)), _row_owners(board, size), np.zeros(size)
+    # One for the rows of a wheel, so that the smallest forces do not depend on the directions of the axes.
+    for i in range(size):
+        for j in range(size):
+            if owner[i] == owner[j]:
+                cost[i] += schur[j, j]
+    residual, dependence = solve_dependent_rows(schur, force[:size], cost, share)
     if dependence > 0 and board.dependence == 0:
         board.dependence = dependence
         for i in range(size):

@@ -35,6 +35,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from numbers import Real
 from typing import Any
 
 import mujoco
@@ -178,8 +179,8 @@ def rolling_forces(
     """
     _check_arguments(model, data, surface, wheels, compiled.ROLLING)
     _check_rate(stabilisation, model)
-    for name, axes in dict(constrained or {}).items():
-        _check_axes(name, axes)
+    for name, given in dict(constrained or {}).items():
+        _check_axes(name, given)
     chosen = dict.fromkeys(wheels, ALL_AXES) | dict(constrained or {})
     if unknown := [name for name in chosen if name not in wheels]:
         raise ValueError(f"constrained names {unknown[0]!r}, which is none of the wheels {', '.join(wheels)}")
@@ -230,7 +231,7 @@ def stiffen(model: mujoco.MjModel, wheels: Mapping[str, str], softness: float) -
     ValueError
         If a geom is missing or the factor is not a finite number above 0.
     """
-    if not (np.isscalar(softness) and np.isreal(softness) and 0 < float(softness) < np.inf):
+    if not (isinstance(softness, Real) and 0 < float(softness) < np.inf):
         raise ValueError(f"softness must be a finite number above 0, such as 1e-5, not {softness!r}")
     for body in {int(_find_geom(model, name).bodyid[0]) for name in wheels}:
         model.body_invweight0[body] *= softness
@@ -260,8 +261,7 @@ def _check_arguments(
 
 
 def _check_rate(stabilisation: float, model: mujoco.MjModel) -> None:
-    numeric = np.isscalar(stabilisation) and not isinstance(stabilisation, str | bytes) and np.isreal(stabilisation)
-    if not (numeric and 0 <= float(stabilisation) < np.inf):
+    if not (isinstance(stabilisation, Real) and 0 <= float(stabilisation) < np.inf):
         raise ValueError(f"stabilisation must be a finite rate of 0 or more [1/s], not {stabilisation!r}")
     fastest = FASTEST_RK4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else FASTEST_EULER
     if stabilisation * model.opt.timestep > fastest:
@@ -271,9 +271,9 @@ def _check_rate(stabilisation: float, model: mujoco.MjModel) -> None:
         )
 
 
-def _check_axes(name: str, axes: object) -> None:
-    known = isinstance(axes, Sequence | np.ndarray) and not isinstance(axes, str | bytes) and len(axes) == 3
-    if not known or any(not isinstance(axis, bool | np.bool_) for axis in axes):  # type: ignore[union-attr]
+def _check_axes(name: str, axes: Any) -> None:
+    three = isinstance(axes, Sequence | np.ndarray) and len(axes) == 3
+    if not three or any(not isinstance(axis, bool | np.bool_) for axis in axes):
         raise ValueError(f"constrained[{name!r}] must be three truth values, lateral, forward and normal, not {axes!r}")
 
 

@@ -180,13 +180,23 @@ def make_rows(scales: list[float]) -> tuple[np.ndarray, np.ndarray]:
     return rows @ rows.T, rows
 
 
+def test_cost_of_forces_decides_which_are_the_smallest() -> None:
+    schur, rows = make_rows([1.0] * 5)
+    target, cost = rows @ np.ones(8), np.array([1.0, 4.0, 0.5, 2.0, 9.0])
+    found = target.copy()
+    solve_dependent_rows(schur, found, cost, np.empty((2, 5)))
+    root = np.sqrt(cost)
+    least = np.linalg.lstsq(schur / root, target, rcond=1e-10)[0] / root
+    np.testing.assert_allclose(found, least, rtol=0, atol=1e-10 * np.abs(least).max())
+
+
 @pytest.mark.parametrize("scales", [[1.0] * 5, [1.0, 1e3, 1e-3, 1e2, 1.0]])
 def test_redundant_rows_have_the_smallest_forces(scales) -> None:
     schur, rows = make_rows(scales)
     target = rows @ np.random.default_rng(2).normal(size=8)
     found = target.copy()
     assert not solve_independent_rows(schur, found, 5)
-    residual, dependence = solve_dependent_rows(schur, found, 5, np.empty((2, 5)))
+    residual, dependence = solve_dependent_rows(schur, found, np.diag(schur).copy(), np.empty((2, 5)))
     assert residual < 1e-12 * np.abs(target).max()
     assert dependence == 0
     np.testing.assert_allclose(schur @ found, target, rtol=0, atol=1e-12 * np.abs(target).max())
@@ -201,7 +211,7 @@ def test_contradicting_rows_leave_a_residual() -> None:
     target = rows @ np.ones(8)
     target[4] += 1e-3 * np.abs(target).max()
     share = np.empty((2, 5))
-    residual, dependence = solve_dependent_rows(schur, target, 5, share)
+    residual, dependence = solve_dependent_rows(schur, target, np.ones(5), share)
     assert residual > 1e-4 * np.abs(target).max()
     assert dependence == 0
     # Row 4 is row 2 again: these two contradict each other, and no other.
@@ -224,7 +234,7 @@ def test_nearly_dependent_rows_are_told_and_have_no_large_forces(angle) -> None:
     rows = np.array([[1.0, 0.0], [np.cos(angle), np.sin(angle)]])
     schur, target, share = rows @ rows.T, np.array([1.0, 1.0 + 0.5 * angle]), np.empty((2, 2))
     assert not solve_independent_rows(schur, target.copy(), 2)
-    residual, dependence = solve_dependent_rows(schur, target, 2, share)
+    residual, dependence = solve_dependent_rows(schur, target, np.ones(2), share)
     # The entries of the matrix are rounded.
     np.testing.assert_allclose(dependence, 1 - np.cos(angle), rtol=0, atol=10 * ROUND_OFF)
     np.testing.assert_allclose(residual, 0.25 * angle, rtol=1e-3)
