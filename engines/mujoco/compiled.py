@@ -7,16 +7,20 @@ closest approach of the two (`velodrome.reference.kernels.contact`). The materia
     acceleration  Jp q'' + gamma,    gamma = Jp' q' + w x (r a' t)
 
 where Jp' is the derivative for the material point and r a' t is the velocity of the contact along the rim. MuJoCo's
-contact rows prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `correct_reference` subtracts gamma.
+contact rows prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `_correct_reference` subtracts gamma.
 
-`press` does not use MuJoCo's contacts. It solves, for the constrained force components on all wheels,
+`_press` does not use MuJoCo's contacts. It solves, for the constrained force components on all wheels,
 
     Jp M^-1 Jp^T F = -(Jp a + gamma + s^2 gap n + 2 s v),    M a = all forces but those of contacts
 
 and adds Jp^T F to MuJoCo's passive forces. The stabilisation rate s contributes nothing where the constraints hold.
 
-`_assess_solution` assesses the solution of MuJoCo's solver when the next evaluation begins, the first moment after the
-solution at which a callback is called (the criterion is in `convergence`).
+MuJoCo may keep reference accelerations and passive forces from the last evaluation (``mj_forwardSkip``); both functions
+see that and correct them once. MuJoCo's counters tell how often it has solved without the callback (`_count_missed`),
+and its sum of forces whether these have changed since the callback (`_compare_forces`).
+
+`_assess_solution` assesses the solution of MuJoCo's solver when the next evaluation or inverse dynamics begins, the
+first moment after the solution at which a callback is called (the criterion is in `convergence`).
 
 MuJoCo has one control callback and one collision function per process. `control` and `touch` serve up to
 `BOARD_COUNT` states at once: each has a `BLACKBOARD`, which holds numbers and the addresses of arrays that keep their

@@ -24,8 +24,8 @@ wheel out, the block ends with an error, which `EdgeContacts.check` raises earli
 
 `rolling_forces` replaces MuJoCo's contacts by the exact forces of rolling without slip.
 
-Several blocks may be open at once, in threads as well, one for each state. The user's control callback works as ever.
-``mj_inverse`` is not corrected.
+Several blocks may be open at once, in threads as well, one for each state. The user's control callback is called first;
+under `rolling_forces` it must be set before the block. ``mj_inverse`` is not corrected.
 """
 
 # MuJoCo's compiled bindings carry no types.
