@@ -7,7 +7,8 @@ closest approach of the two (`velodrome.reference.kernels.contact`). The materia
     acceleration  Jp q'' + gamma,    gamma = Jp' q' + w x (r a' t)
 
 where Jp' is the derivative for the material point and r a' t is the velocity of the contact along the rim. MuJoCo's
-contact rows prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `_correct_reference` subtracts gamma.
+contact rows prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `_correct_reference` subtracts
+gamma.
 
 `_press` does not use MuJoCo's contacts. It solves, for the constrained force components on all wheels,
 

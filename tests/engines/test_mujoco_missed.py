@@ -24,6 +24,10 @@ PAIR = """<contact><pair geom1="ground" geom2="wheel" condim="3" friction="2 2 0
 KINDS = pytest.mark.parametrize("kind", ["contacts", "forces"])
 STABILISATION, SPEED, RADIUS = 20.0, 3.0, 0.3
 Change = tuple[str, str]
+PLANAR = (
+    "<freejoint/>",
+    '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>',
+)
 
 
 @pytest.fixture(autouse=True)
@@ -250,6 +254,23 @@ def test_forces_may_change_between_steps() -> None:
             assert contacts.standing()
 
 
+@KINDS
+def test_slip_that_implicit_damping_leaves(kind) -> None:
+    """Of the guide: h J M^-1 D q" / (2 s), or / b, b = 2 / time constant = 40 1/s = 2 s. It lags by 1 / (2 s) = 25 ms.
+
+    A planar wheel: J = (1, 0, -r), and q" changes at the rate c / (r^2 m) of the ride, 0.3 1/s: a share of 0.8 %.
+    """
+    damping, inertia = 0.1, 0.04
+    model, data = make_roller(kind, PLANAR, ('name="axle"', f'name="axle" damping="{damping}"'))
+    data.qvel[:] = [SPEED, 0, SPEED / RADIUS]
+    with open_block(kind, model, data, constrained={"wheel": (False, True, True)}) as contacts:
+        mujoco.mj_step(model, data, 500)
+        slip = data.qvel[0] - RADIUS * data.qvel[2]
+        law = model.opt.timestep * RADIUS * damping / inertia * data.qacc[2] / (2 * STABILISATION)
+        assert slip == pytest.approx(law, rel=0.02)
+        assert contacts.standing()
+
+
 # ------------------------------------------------------------------------------------ changes inside the block
 
 
@@ -308,12 +329,6 @@ def test_radius_must_not_change_inside_the_block(kind) -> None:
 
 
 # ------------------------------------------------------------------------------------------ wheels and models
-
-
-PLANAR = (
-    "<freejoint/>",
-    '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>',
-)
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.7])
