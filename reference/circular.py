@@ -6,7 +6,7 @@ forces follow from them, and all 22 unknowns of `velodrome.reference.kernels.ste
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -76,6 +76,20 @@ class CircularMotion:
         w = self.yaw_rate
         forward = self.straight_speed if self.is_straight else -w * y
         return q, np.array([forward, w * x, 0.0, w, 0.0, 0.0, 0.0, self.rear_rate, self.front_rate])
+
+
+def mirror_motion(motion: CircularMotion) -> CircularMotion:
+    """Return the motion with left and right exchanged, of the same bicycle without a steer torque."""
+    flip = np.array([1.0, -1.0, 1.0])
+    return replace(
+        motion,
+        position=motion.position * flip,
+        lean=-motion.lean,
+        steer=-motion.steer,
+        yaw_rate=-motion.yaw_rate,
+        contact=motion.contact * flip,
+        force=motion.force * flip,
+    )
 
 
 class Expansion(NamedTuple):

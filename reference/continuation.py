@@ -10,14 +10,16 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
+from .bicycle import Bicycle
 from .circular import CONTACT, Condition, Steady, as_solved, newton, reverse_speeds
 from .kernels import curve as kernel
+from .kernels.circle import SIGMA_UNIT
 from .kernels.steady import UNKNOWNS
 from .surface import SurfaceOfRevolution, has_tip
 
 FARTHEST = 1e3  # distance of D from the origin [m]: a larger circle differs from its limit by round-off only
 LARGEST_LEAN = 1.5
-LARGEST_SIGMA = 100.0  # 200 rad/s: a curve can lead to infinite speed at finite angles
+_LARGEST_SPEED = 60.0  # of a rim [m/s], or 200 rad/s where wheels are large: a curve can lead to infinite speed
 LONGEST_STEP = 0.15
 _FIRST_STEP = 0.02
 _REAR_SIDE = CONTACT.start + 1  # eta of the rear contact; its xi is zero, as the rear wheel heads along its circle
@@ -104,6 +106,13 @@ def follow_curve(
             return
 
 
+def largest_sigma(bicycle: Bicycle) -> float:
+    """Return the unknown sigma at which a curve is ended: a small wheel turns fast at an ordinary speed."""
+    smallest = min(bicycle.rear_wheel_radius, bicycle.front_wheel_radius)
+    largest_rate = max(200.0, _LARGEST_SPEED / smallest)
+    return largest_rate**2 / SIGMA_UNIT
+
+
 def at_edge(surface: SurfaceOfRevolution, point: Point) -> bool:
     """Return whether a wheel is at the edge of the ground."""
     inner, outer = surface.extent
@@ -116,7 +125,8 @@ def at_edge(surface: SurfaceOfRevolution, point: Point) -> bool:
 def _follow_steps(equations: Steady, first: Point, longest: float, most: int) -> Iterator[Point]:
     """Yield a point and those that follow it, ignoring edges of the ground."""
     yield first
-    distance, ended, largest = min(_FIRST_STEP, longest), False, (LARGEST_LEAN, LARGEST_SIGMA, FARTHEST)
+    distance, ended = min(_FIRST_STEP, longest), False
+    largest = LARGEST_LEAN, largest_sigma(equations.bicycle), FARTHEST
     while most > 0 and not ended:
         unknowns, tangents = np.empty((2, min(_CHUNK, most) + 1, UNKNOWNS))
         unknowns[0], tangents[0] = first.unknowns, first.tangent

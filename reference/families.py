@@ -25,6 +25,7 @@ from .circular import (
     CircularMotion,
     Steady,
     as_solved,
+    mirror_motion,
     newton,
     plane_condition,
     rear_rate_condition,
@@ -33,16 +34,17 @@ from .circular import (
 from .continuation import (
     FARTHEST,
     LARGEST_LEAN,
-    LARGEST_SIGMA,
     LONGEST_STEP,
     Point,
     at_edge,
     crossings,
     follow_curve,
+    largest_sigma,
     metric,
     roots_along,
 )
 from .inputs import NO_INPUTS, Inputs
+from .kernels.circle import SIGMA_UNIT
 from .kernels.steady import STANDING, direction
 from .missing_motion import NoSuchMotion, SearchFailed
 from .rideability import assess_motions
@@ -53,6 +55,7 @@ from .surface import SurfaceOfRevolution, has_tip, is_level
 FAMILIES = (1, 2, 3, 4)
 
 _MEANT = 1e-3  # rad: so near to what was asked for, no other motion is searched for
+_SAME_ANGLES = 1e-7  # rad
 _NEAR_ENOUGH = 0.2  # rad: a motion further from the requested angles is another one
 
 
@@ -104,12 +107,11 @@ class Family:
         ``static``, ``pivot``, ``edge`` (a wheel is at the edge of the ground), ``tip`` (the rear wheel has reached
         the axis where the ground has no normal), ``large circle``, ``flat`` or ``fast front wheel``.
         """
-        surface = self.equations.surface
-        return _kind_of_end(surface, self.points[0]), _kind_of_end(surface, self.points[-1])
+        return _kind_of_end(self.equations, self.points[0]), _kind_of_end(self.equations, self.points[-1])
 
 
-def _kind_of_end(surface: SurfaceOfRevolution, point: Point) -> str:
-    u = point.unknowns
+def _kind_of_end(equations: Steady, point: Point) -> str:
+    u, surface = point.unknowns, equations.surface
     if _is_zero(u, SIGMA):
         return "static"
     if _is_zero(u, REAR_SPEED):
@@ -117,7 +119,8 @@ def _kind_of_end(surface: SurfaceOfRevolution, point: Point) -> str:
     if at_edge(surface, point):
         return "edge"
     # A curve that breaks off inside all limits ends before a tip, if there is one.
-    within = abs(u[LEAN]) < LARGEST_LEAN and u[SIGMA] < LARGEST_SIGMA and np.linalg.norm(u[:3]) < FARTHEST
+    slow = u[SIGMA] < largest_sigma(equations.bicycle)
+    within = abs(u[LEAN]) < LARGEST_LEAN and slow and np.linalg.norm(u[:3]) < FARTHEST
     if within and has_tip(surface):
         return "tip"
     if np.linalg.norm(u[:3]) > 0.3 * FARTHEST:
@@ -492,17 +495,26 @@ def find_motion(
             found += [(number, motion) for motion in (islice(met, 1) if near is None else met)]
         except ValueError as error:
             failures[number] = error
+    if near is not None and held == NO_INPUTS:
+        # Left and right are exchanged freely; the families' curves turn to the left.
+        found += [(number, mirror_motion(motion)) for number, motion in found]
     wanted = f"rear rate {rear_rate!r} rad/s on {surface}"
     if held != NO_INPUTS:
         wanted += f" under {held.describe()}"
+    # The front wheel's rate is about that at which its rim runs as fast as the rear one.
+    largest = np.sqrt(SIGMA_UNIT * largest_sigma(bicycle))
+    slow = rear_rate * np.hypot(1.0, bicycle.rear_wheel_radius / bicycle.front_wheel_radius) < largest
+    too_fast = f"motions whose wheels turn faster than {largest:.4g} rad/s together were not searched"
     if near is None:
         if not found:
             reason = _join_failures(failures) or "its curves, as followed from their anchors, do not reach it"
-            raise _not_found(f"{wanted} in family {family}", reason, failures)
+            if not slow:
+                reason += f"; {too_fast}"
+            raise _not_found(f"{wanted} in family {family}", reason, failures, slow)
         return found[0]
 
     def distance(item: tuple[int | None, CircularMotion]) -> float:
-        return float(np.hypot(item[1].lean - near[0], item[1].steer - near[1]))
+        return float(np.hypot(_turn(item[1].lean - near[0]), _turn(item[1].steer - near[1])))
 
     if family is None:
         if is_level(surface) and held == NO_INPUTS:
@@ -511,6 +523,9 @@ def find_motion(
         if all(distance(item) > _MEANT for item in found):
             found += _motions_without_number(Steady(bicycle, surface, held), rear_rate)
     nearest = min(found, key=distance, default=None)
+    if nearest is not None:
+        # A motion may be on the curves of several families: then it is of the first.
+        nearest = next(item for item in found if distance(item) < distance(nearest) + _SAME_ANGLES)
     if nearest is None or distance(nearest) > _NEAR_ENOUGH:
         curves = "the curves of the families, and " if numbers else "and "
         searched = f"Newton's method from there, {curves}{describe_search(held)}"
@@ -520,26 +535,41 @@ def find_motion(
         if _is_near_straight(near) and not is_level(surface):
             parts.insert(0, "no motion is straight on ground that is not level")
         parts.append(f"searched were {searched}, on circles of up to {FARTHEST:g} m")
+        wide = is_level(surface) or surface.extent[1] <= FARTHEST or not _is_near_straight(near)
+        if not wide:
+            parts.append("larger ones, which are nearly straight, were not")
+        if not slow:
+            parts.append(too_fast)
         reason = "; ".join([*parts, *([_join_failures(failures)] if failures else [])])
-        raise _not_found(f"{wanted} within {_NEAR_ENOUGH} rad of near = {near[0]:g}, {near[1]:g}", reason, failures)
+        wanted = f"{wanted} within {_NEAR_ENOUGH} rad of near = {near[0]:g}, {near[1]:g}"
+        raise _not_found(wanted, reason, failures, wide and slow)
     return nearest
 
 
 def _is_near_straight(near: tuple[float, float]) -> bool:
     """Return whether angles are near those of upright straight motion, the handlebar forward or reversed."""
-    return min(np.hypot(near[0], abs(near[1]) - steer) for steer in (0.0, np.pi)) <= _NEAR_ENOUGH
+    return min(np.hypot(_turn(near[0]), _turn(near[1] - steer)) for steer in (0.0, np.pi)) <= _NEAR_ENOUGH
+
+
+def _turn(angle: float) -> float:
+    """Return an angle without whole turns, from -pi to pi."""
+    return float(np.arctan2(np.sin(angle), np.cos(angle)))
 
 
 def _join_failures(failures: Mapping[int, ValueError]) -> str:
     return "; ".join(f"family {number}: {error}" for number, error in failures.items())
 
 
-def _not_found(wanted: str, reason: str, failures: Mapping[int, ValueError]) -> NoSuchMotion | SearchFailed:
+def _not_found(
+    wanted: str, reason: str, failures: Mapping[int, ValueError], complete: bool = True
+) -> NoSuchMotion | SearchFailed:
     """Return the error of a search without a result.
 
     Where an anchor was lost, its curve has not been searched. Where it ended in a fold, this bicycle has no such curve.
+    Nor is a search ``complete`` for fast motions, and for nearly straight ones in a bowl, whose circles may be larger
+    than all that are searched.
     """
-    if all(isinstance(error, NoSuchMotion) for error in failures.values()):
+    if complete and all(isinstance(error, NoSuchMotion) for error in failures.values()):
         return NoSuchMotion(f"no circular motion found with {wanted}; {reason}")
     return SearchFailed(f"no circular motion found with {wanted}, but the search is not complete; {reason}")
 
@@ -579,4 +609,4 @@ def _motions_without_number(equations: Steady, rear_rate: float) -> Iterator[tup
 
 
 def _same_angles(one: CircularMotion, other: CircularMotion) -> bool:
-    return bool(np.hypot(one.lean - other.lean, one.steer - other.steer) < 1e-7)
+    return bool(np.hypot(_turn(one.lean - other.lean), _turn(one.steer - other.steer)) < _SAME_ANGLES)

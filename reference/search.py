@@ -34,7 +34,7 @@ from .circular import (
     plane_condition,
     unknown_condition,
 )
-from .continuation import Point, metric, tangent
+from .continuation import Point, largest_sigma, metric, tangent
 from .inputs import NO_INPUTS, Inputs
 from .kernels import curve as kernel
 from .surface import SurfaceOfRevolution, evaluate, is_level
@@ -76,13 +76,13 @@ def search_starts(bicycle: Bicycle, surface: SurfaceOfRevolution, inputs: Inputs
     Point
         In the order of the grid, steers outermost; the tangents have either sign.
     """
-    equations = Steady(bicycle, surface, inputs)
+    equations, fastest = Steady(bicycle, surface, inputs), largest_sigma(bicycle)
     for steer in _starting_steers(inputs):
         for lean in LEANS:
             for guess in guesses_at(bicycle, surface, float(lean), float(steer), inputs):
                 for condition in (nearest_condition(), unknown_condition(SIGMA, 0.0)):
                     found = _solve(equations, guess, condition)
-                    if found is not None:
+                    if found is not None and found[SIGMA] < fastest:
                         yield Point(found, tangent(equations, found))
 
 

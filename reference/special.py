@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from .bicycle import Bicycle
 from .circular import REAR_SPEED, CircularMotion, Steady
 from .circular import STEER as STEER_UNKNOWN
-from .continuation import Point, arc_distance, roots_along, sign_changes
+from .continuation import Point, arc_distance, roots_along
 from .dae import consistent_state, dynamics
 from .families import Family, front_rate_slope, rear_rate_slope
 from .kernels.circle import STEP
@@ -25,6 +25,7 @@ from .surface import Plane, is_level
 
 LEAN, STEER, LEAN_RATE, STEER_RATE = (VARIABLES.index(name) for name in ("lean", "steer", "lean_rate", "steer_rate"))
 STRAIGHT = {1: ("B", 0.0), 2: ("C", np.pi)}
+_ROUND_OFF = 1e-9  # of the polynomial's coefficients, from determinants of 4 x 4 matrices
 SMALL_LEAN = 0.05  # [rad] the extremum of the front rate next to the pivoting motion has no letter
 
 
@@ -97,19 +98,37 @@ def special_points(family: Family) -> list[SpecialPoint]:
         for name, kind, motion in _name_points(family, ordered)
     ]
     if is_level(equations.surface) and family.number in STRAIGHT:
-        points.append(straight_motion(equations.bicycle, *STRAIGHT[family.number]))
+        straight = find_straight_motion(equations.bicycle, *STRAIGHT[family.number])
+        points += [] if straight is None else [straight]
     return points
 
 
-def straight_motion(bicycle: Bicycle, name: str, steer: float) -> SpecialPoint:
+def _smallest_root(determinant: Callable[[float], float], radius: float, squares: np.ndarray) -> float | None:
+    """Return the smallest positive squared speed at which a polynomial of the second degree in it is zero.
+
+    Parameters
+    ----------
+    determinant : callable
+        Of the rear rate [rad/s].
+    radius : float
+        Of the rear wheel [m].
+    squares : ndarray, shape (3,)
+        Squared speeds that the polynomial is determined from.
+    """
+    polynomial = np.polyfit(squares, [determinant(float(np.sqrt(square)) / radius) for square in squares], 2)
+    sizes = np.abs(polynomial) * squares.max() ** np.array([2, 1, 0])
+    # A leading coefficient that is round-off would have a root at a speed without meaning.
+    polynomial[sizes < _ROUND_OFF * sizes.max()] = 0
+    roots = np.roots(polynomial)
+    real = roots.real[(roots.real > 0) & (np.abs(roots.imag) < _ROUND_OFF * np.abs(roots))]
+    return float(real.min()) if real.size else None
+
+
+def find_straight_motion(bicycle: Bicycle, name: str, steer: float) -> SpecialPoint | None:
     """Find the upright straight motion on the plane that neighbouring circular motions tend to (B and C).
 
-    Its capsize eigenvalue is zero: the stiffness of lean and steer is singular.
-
-    Raises
-    ------
-    ValueError
-        If there is no such speed up to 30 m/s.
+    Its capsize eigenvalue is zero: the stiffness of lean and steer, linear in the squared speed, is singular. Of two
+    such motions the slower one is returned; None if there is none.
     """
     radius = bicycle.rear_wheel_radius
     block = [LEAN, STEER, LEAN_RATE, STEER_RATE]
@@ -118,11 +137,16 @@ def straight_motion(bicycle: Bicycle, name: str, steer: float) -> SpecialPoint:
         state = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.0, steer, (0.0, 0.0, rear_rate))
         return float(np.linalg.det(linearise(bicycle, Plane(), *state).jacobian[np.ix_(block, block)]))
 
-    rates = np.linspace(0.5, 30.0, 60) / radius
-    changes = sign_changes([determinant(rate) for rate in rates])
-    if not changes:
-        raise ValueError(f"no straight motion at steer = {steer!r} has circular neighbours")
-    rear_rate: Any = brentq(determinant, *rates[list(changes[0])], xtol=1e-13)
+    square = _smallest_root(determinant, radius, np.array([1.0, 16.0, 81.0]))
+    if square is None:
+        return None
+    # Once more, where it is: at a hundred times these speeds it is known to some digits only.
+    square = _smallest_root(determinant, radius, square * np.array([0.5, 1.0, 1.5])) or square
+    near = float(np.sqrt(square)) / radius
+    around = near * (1 - 1e-6), near * (1 + 1e-6)
+    if np.sign(determinant(around[0])) * np.sign(determinant(around[1])) >= 0:
+        return None  # it touches zero: no circles branch off
+    rear_rate: Any = brentq(determinant, *around, xtol=1e-13)
     q, rates = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.0, steer, (0.0, 0.0, rear_rate))
     now = dynamics(bicycle, Plane(), q, rates)
     why = explain_obstacles(bicycle, Plane(), q, now.contact, now.force)

@@ -224,7 +224,8 @@ def name_modes(matrices: CanonicalMatrices, speeds: Any) -> tuple[np.ndarray, np
     At a large speed v eigenvalues are proportional to it, but for one that falls off as 1/v: that is capsize. Of the
     three others a pair is weave and the remaining one castering; if all three are real, castering is the fastest to
     decay. From there they are followed down by continuity. Below the speed at which weave begins to oscillate, the two
-    real eigenvalues that it splits into both are weave.
+    real eigenvalues that it splits into both are weave. A pair is one mode or the two others: where a root of weave and
+    that of capsize meet and begin to oscillate, the names change places so that the pair is not divided.
 
     Parameters
     ----------
@@ -246,13 +247,20 @@ def name_modes(matrices: CanonicalMatrices, speeds: Any) -> tuple[np.ndarray, np
     followed = np.empty((path.size, 4), complex)
     values = matrices.eigenvalues(path)
     followed[0] = _by_mode(values[0])
-    orders = [list(order) for order in permutations(range(4))]
+    orders = np.array(list(permutations(range(4))))
     for k in range(1, path.size):
         # Weave's two columns are one mode: conjugates may change places.
         here = values[k][orders]
-        followed[k] = here[np.abs(here - followed[k - 1]).sum(axis=1).argmin()]
+        kept = here[~_divides_pair(here)]
+        followed[k] = kept[np.abs(kept - followed[k - 1]).sum(axis=1).argmin()]
     places = {speed: k for k, speed in enumerate(path)}
     return followed[[places[speed] for speed in wanted]], np.array(["weave", "weave", "capsize", "castering"])
+
+
+def _divides_pair(values: np.ndarray) -> np.ndarray:
+    """Return which rows (n, 4) have one of a pair among the first two columns and the other among the last two."""
+    oscillates = (np.abs(np.imag(values)) > _REAL * np.abs(values))[:, :2].any(axis=1)
+    return oscillates & (values[:, 1] != np.conj(values[:, 0]))
 
 
 def _by_mode(values: np.ndarray) -> np.ndarray:

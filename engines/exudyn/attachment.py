@@ -180,6 +180,12 @@ def reference_coordinates(mbs: exu.MainSystem, nodes: Sequence[Any]) -> np.ndarr
     return np.concatenate([np.atleast_1d(mbs.GetNode(node)["referenceCoordinates"]) for node in nodes])
 
 
+def read_node_coordinates(mbs: Any, nodes: Sequence[Any], quantity: Any, configuration: Any) -> np.ndarray:
+    """Return coordinates, or their rates, of nodes in a configuration, one node after the other, shape (n,)."""
+    # The engine returns a number for a node with one coordinate.
+    return np.concatenate([np.atleast_1d(mbs.GetNodeOutput(node, quantity, configuration)) for node in nodes])
+
+
 def stack_frames(attachments: Sequence[Attachment]) -> pose.Frames:
     """Collect attachments for compiled code; the coordinates are those of `list_nodes`, one node after the other."""
     starts, total = {}, 0

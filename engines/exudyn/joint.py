@@ -17,7 +17,9 @@ The object is declared holonomic as a whole. On position level a row of slip is 
 slips in a step, about ``newmarkRatio * step * slip``: it is zero exactly where the slip is, and its
 derivative with respect to the positions at the end of the step is the row's own Jacobian, as the engine expects. So
 gap and slip share one call, the slip is not differentiated, and the engine's initial accelerations, which
-omit the term (W q')_q q' of a constraint declared nonholonomic, are right.
+omit the term (W q')_q q' of a constraint declared nonholonomic, are right. For nodes with rotation vectors the engine
+alone gets that term wrong, and this joint corrects it in its own rows (see `constraints`). In the rows of the engine's
+own joints between such nodes it stays wrong, unless the rotation vectors are zero at the start.
 
 As in the engine's own disc, rows can be left out with ``constrainedAxes``: a vehicle with more constraints than it
 needs has redundant rows, with which the engine's linear solver fails. The ground may be fixed to a body, on which the
@@ -29,7 +31,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from struct import Struct
 from typing import Any
 
 import exudyn as exu
@@ -41,11 +42,10 @@ from exudyn.itemInterface import (
 )
 from numpy.typing import ArrayLike
 
-from ...reference.rim import rim_search
-from ...reference.surface import Surface
-from . import general, kernel
-from .attachment import INERTIAL_FRAME, Attachment, find_attachment, list_nodes, reference_coordinates, stack_frames
-from .pose import EULER_PARAMETERS, FIXED, TREE, Frames
+from ...reference.surface import Surface, SurfaceFunction
+from .attachment import INERTIAL_FRAME, Attachment, find_attachment, list_nodes, stack_frames
+from .constraints import make_constraint_functions
+from .pose import Frames
 
 SLIP_ROWS = (0, 1)  # of a wheel's three
 
@@ -137,10 +137,16 @@ def CreateRollingJointOnSurface(
     ------
     ValueError
         If the bodies, the radii, the axle, the flags or the surface are not as above.
+
+    Notes
+    -----
+    A solver ends with the engine's ModelError, which is a ValueError, if a wheel has no contact at the start, or if its
+    gap there is longer than the free fall in the first step: closing it would take more than the weight. A centre is
+    in place after it is moved by minus the gap along the normal, both from `velodrome.engines.rolling.observe_wheel`,
+    until no gap is left.
     """
-    if len(bodyNumbers) == 0 or surface is None:
-        raise ValueError("a rolling joint takes a surface, and at least one wheel in bodyNumbers")
-    count = len(bodyNumbers)
+    count = _count_wheels(bodyNumbers)
+    ground_surface = _check_surface(surface)
     centres = _read_vectors("axisPosition", axisPosition, count)
     axles = _read_vectors("axisVector", axisVector, count)
     wheels = [_offset(find_attachment(mbs, body), centre) for body, centre in zip(bodyNumbers, centres, strict=True)]
@@ -148,24 +154,26 @@ def CreateRollingJointOnSurface(
     nodes = list_nodes([*wheels, ground])
     if not nodes:
         raise ValueError("nothing can roll: the wheels and their ground are all fixed")
-    if any(len(list_nodes([each, ground])) == 1 and each.kind == ground.kind != TREE for each in wheels):
-        raise ValueError(f"nothing can roll: a wheel is fixed to the body of its ground, node {int(ground.node)}")
+    labels = [f"wheel {i} ({_name_item(number)})" for i, number in enumerate(bodyNumbers)]
+    for label, wheel in zip(labels, wheels, strict=True):
+        if _is_same_body(wheel, ground):
+            raise ValueError(f"nothing can roll: {label} is fixed to the body or link that carries its ground")
     if len(nodes) > 2:
         raise ValueError(
             f"the wheels and their ground belong to {len(nodes)} nodes; the engine's connector joins at most two, so "
             "give each wheel a joint of its own"
         )
-    radii = np.broadcast_to(np.asarray(discRadius, float), count).copy()
-    if not np.all(radii > 0) or not np.all(np.isfinite(radii)):
-        raise ValueError(f"discRadius is {discRadius!r}; a wheel's radius is a positive number [m]")
+    radii = _read_radii(discRadius, count)
     if not (math.isfinite(newmarkRatio) and newmarkRatio > 0):
         raise ValueError(f"newmarkRatio is {newmarkRatio!r}; it must be a positive number, about 0.5")
     frames = stack_frames([*wheels, ground])
     triads = np.stack([_make_triad(axle) @ each.rotation.T for axle, each in zip(axles, wheels, strict=True)])
     order = _number_rows(constrainedAxes, count)
-    start = reference_coordinates(mbs, nodes)
-    rolling = (frames, triads, radii, order)
-    constraint, jacobian = _make_user_functions(rolling, start, surface, newmarkRatio)
+    joint = RollingJoint(None, tuple(nodes), frames, ground_surface, triads, radii, order)
+    owner = f"rolling joint {name!r}" if name else "rolling joint"
+    constraint, jacobian = make_constraint_functions(
+        mbs, joint, newmarkRatio, [f"{label} of the {owner}" for label in labels]
+    )
     item = ObjectConnectorCoordinateVector(
         name=name,
         markerNumbers=_add_markers(mbs, nodes),
@@ -176,13 +184,58 @@ def CreateRollingJointOnSurface(
         activeConnector=activeConnector,
         visualization={"show": False},
     )
-    return RollingJoint(mbs.AddObject(item), tuple(nodes), frames, surface, triads, radii, order)
+    return replace(joint, objectNumber=mbs.AddObject(item))
 
 
 def slip_equations(mbs: exu.MainSystem, joint: RollingJoint) -> list[int]:
     """Return the indices of the slip rows among the algebraic equations of an assembled system."""
     equations = mbs.systemData.GetObjectLTGAE(joint.objectNumber)
     return [equations[row] for row in joint.order[:, SLIP_ROWS].ravel() if row >= 0]
+
+
+def _count_wheels(wheels: Any) -> int:
+    """Return the number of wheels; raise if they are not listed."""
+    if isinstance(wheels, str) or not hasattr(wheels, "__len__"):
+        raise ValueError(f"bodyNumbers is {wheels!r}; it must be a list, also of a single wheel")
+    if len(wheels) == 0:
+        raise ValueError("a rolling joint takes at least one wheel in bodyNumbers")
+    return len(wheels)
+
+
+def _check_surface(surface: Any) -> Surface:
+    """Return a surface; raise if it is not an instance with a compiled height function."""
+    if not isinstance(getattr(surface, "function", None), SurfaceFunction):
+        raise ValueError(
+            f"surface is {surface!r}; a rolling joint takes a surface of velodrome.reference.surface, such as Plane()"
+        )
+    return surface
+
+
+def _name_item(number: Any) -> str:
+    """Return the name of a body, node or marker in messages."""
+    kind = type(number).__name__.removesuffix("Index").lower()
+    return f"{kind if kind in ('node', 'marker') else 'body'} {int(number)}"
+
+
+def _is_same_body(wheel: Attachment, ground: Attachment) -> bool:
+    """Return whether a wheel and its ground are fixed to one body or link of a kinematic tree, or both at rest."""
+    if len({None if each.node is None else int(each.node) for each in (wheel, ground)}) > 1:
+        return False
+    # The joints that lead to a link tell it apart from all others.
+    return np.array_equal(wheel.path.joints, ground.path.joints)
+
+
+def _read_radii(values: Any, wheels: int) -> np.ndarray:
+    """Return the radii (k,) of wheels from one for all of them or one for each."""
+    try:
+        radii = np.asarray(values, float)
+    except (TypeError, ValueError):
+        radii = np.array(np.nan)
+    if not (np.all(radii > 0) and np.all(np.isfinite(radii))):
+        raise ValueError(f"discRadius is {values!r}; a wheel's radius is a positive number [m]")
+    if radii.shape not in ((), (wheels,)):
+        raise ValueError(f"discRadius is {values!r}; it must be one radius for all wheels, or one for each of {wheels}")
+    return np.broadcast_to(radii, wheels).copy()
 
 
 def _read_vectors(name: str, values: ArrayLike, wheels: int) -> np.ndarray:
@@ -231,64 +284,3 @@ def _make_triad(axle: np.ndarray) -> np.ndarray:
     across = np.cross(other, along)
     across /= np.linalg.norm(across)
     return np.stack([np.cross(along, across), along, across])
-
-
-def _is_common(frames: Frames, order: np.ndarray) -> bool:
-    """Whether the joint is of the kind that `kernel` is for, as in a bicycle."""
-    *wheels, ground = frames.kinds
-    return (
-        ground == FIXED
-        and not frames.positions[-1].any()
-        and np.array_equal(frames.rotations[-1], np.eye(3))
-        and all(kind == EULER_PARAMETERS for kind in wheels)
-        and len(set(frames.starts[:-1])) == len(wheels)
-        and bool(np.all(order >= 0))
-    )
-
-
-def _make_user_functions(
-    rolling: tuple[Frames, np.ndarray, np.ndarray, np.ndarray], start: np.ndarray, surface: Surface, ratio: float
-) -> Any:
-    """Make the connector's two user functions, which share one evaluation; ``start`` has coordinates (n,).
-
-    The engine requests the Jacobian and the constraints at every iterate, with the same coordinates.
-    """
-    frames, triads, radii, order = rolling
-    count, size = int(order.max()) + 1, len(start)
-    function = surface.function.real
-    where = (rim_search(surface, radii), function, surface.parameters)
-    rows, values, scale = np.zeros((count, size)), np.zeros((2, count)), np.zeros(1)
-    if _is_common(frames, order):
-        state = np.stack([start, np.zeros(size)]).reshape(-1, 7)
-        evaluate = kernel.constraints(state, frames.positions[:-1], triads, radii, *where, scale, rows, values).__next__
-    else:
-        state = np.stack([start, np.zeros(size)])
-        evaluate = general.attached_constraints(
-            state, frames, triads, radii, order, *where, scale, rows, values
-        ).__next__
-    evaluate()  # compiles
-    memory, pack = state.data.cast("B"), Struct(f"{2 * size}d").pack_into
-    on_position_level, on_velocity_level = values[0].tolist, values[1].tolist
-    begun: Any = exu.ConfigurationType.StartOfStep
-    evaluated_at: tuple[Any, Any, Any] = (None, None, None)
-
-    def update(mbs, time, coordinates, rates):
-        nonlocal evaluated_at
-        if time != evaluated_at[0]:
-            scale[0] = ratio * (time - mbs.systemData.GetTime(begun))
-        pack(memory, 0, *coordinates, *rates)
-        evaluate()
-        evaluated_at = (time, coordinates, rates)
-
-    def constraint(mbs, time, _item, coordinates, rates, velocity_level):
-        if (time, coordinates, rates) != evaluated_at:
-            update(mbs, time, coordinates, rates)
-        return on_velocity_level() if velocity_level else on_position_level()
-
-    # The generator does not keep the surface's compiled function alive, but the default argument does.
-    def jacobian(mbs, time, _item, coordinates, rates, _velocity_level, _function=function):
-        if (time, coordinates, rates) != evaluated_at:
-            update(mbs, time, coordinates, rates)
-        return rows  # the engine makes a copy
-
-    return constraint, jacobian

@@ -10,7 +10,7 @@ from exudyn.itemInterface import SensorUserFunction
 
 from ...reference.rim import rim_search
 from . import general
-from .attachment import reference_coordinates
+from .attachment import read_node_coordinates, reference_coordinates
 from .joint import RollingJoint
 
 Quantity = Literal["ContactPoint", "Gap", "Slip", "ContactForce"]
@@ -34,7 +34,9 @@ def CreateRollingJointSensor(
     quantity : {"ContactPoint", "Gap", "Slip", "ContactForce"}
         Point of the edge closest to the surface, (3,) [m]; its distance from the surface, (1,) [m];
         the material velocity there relative to the ground, lateral and forward, (2,) [m/s]; force of the ground on the
-        wheel, (3,) [N], which has no component along axes that are not constrained. Vectors in inertial axes.
+        wheel, (3,) [N], which has no component along axes that are not constrained. Vectors in inertial axes. After
+        the engine's static solver, ``SolveStatic``, the force has the opposite sign, as the engine's own constraint
+        forces have: that solver gives Lagrange multipliers the other sign, and a sensor cannot tell the solver.
     wheel : int
         Index of the wheel in the joint.
     name, storeInternal, fileName
@@ -80,7 +82,7 @@ def _make_user_function(mbs: exu.MainSystem, joint: RollingJoint, quantity: Quan
     # The generator does not keep the surface's compiled function alive, but the default argument does.
     def value(mbs, _time, _sensors, _factors, configuration, _function=function):
         for k, output in enumerate((kind.CoordinatesTotal, kind.Coordinates_t)):
-            state[k] = np.concatenate([mbs.GetNodeOutput(node, output, configuration) for node in nodes])
+            state[k] = read_node_coordinates(mbs, nodes, output, configuration)
         measure()
         if quantity == "ContactForce":
             multipliers = np.atleast_1d(mbs.GetObjectOutput(joint.objectNumber, kind.Force, configuration))

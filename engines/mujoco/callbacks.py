@@ -22,6 +22,10 @@ from ..engine import EngineError
 from . import compiled
 from .library import collision_slot, control_slot
 
+REPLACED = (
+    "MuJoCo's control callback was replaced inside the block, so that evaluations were missed; "
+    "set your own before the block, which calls it"
+)
 _lock = Lock()
 _owners: dict[int, int] = {}  # board's number by the address of the state
 
@@ -53,10 +57,7 @@ def claim_board(data: mujoco.MjData, kind: int) -> Iterator[np.ndarray]:
         yield board
         # Exact contacts put the callback back before it is missed.
         if kind != compiled.CONTACTS and control_slot().value != compiled.control.address:
-            raise EngineError(
-                "MuJoCo's control callback was replaced inside the block, so that evaluations were missed; "
-                "set your own before the block, which calls it"
-            )
+            raise EngineError(REPLACED)
     finally:
         with _lock:
             board["model"] = board["data"] = 0

@@ -7,16 +7,21 @@ closest approach of the two (`velodrome.reference.kernels.contact`). The materia
     acceleration  Jp q'' + gamma,    gamma = Jp' q' + w x (r a' t)
 
 where Jp' is the derivative for the material point and r a' t is the velocity of the contact along the rim. MuJoCo's
-contact rows prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `correct_reference` subtracts gamma.
+contact rows prescribe J q'' = aref, aref = -b J q' - k gap, as if gamma were zero; `_correct_reference` subtracts
+gamma.
 
-`press` does not use MuJoCo's contacts. It solves, for the constrained force components on all wheels,
+`_press` does not use MuJoCo's contacts. It solves, for the constrained force components on all wheels,
 
     Jp M^-1 Jp^T F = -(Jp a + gamma + s^2 gap n + 2 s v),    M a = all forces but those of contacts
 
 and adds Jp^T F to MuJoCo's passive forces. The stabilisation rate s contributes nothing where the constraints hold.
 
-`_assess_solution` assesses the solution of MuJoCo's solver when the next evaluation begins, the first moment after the
-solution at which a callback is called (the criterion is in `convergence`).
+MuJoCo may keep reference accelerations and passive forces from the last evaluation (``mj_forwardSkip``); both functions
+see that and correct them once. MuJoCo's counters tell how often it has solved without the callback (`_count_missed`),
+and its sum of forces whether these have changed since the callback (`_compare_forces`).
+
+`_assess_solution` assesses the solution of MuJoCo's solver when the next evaluation or inverse dynamics begins, the
+first moment after the solution at which a callback is called (the criterion is in `convergence`).
 
 MuJoCo has one control callback and one collision function per process. `control` and `touch` serve up to
 `BOARD_COUNT` states at once: each has a `BLACKBOARD`, which holds numbers and the addresses of arrays that keep their
@@ -49,11 +54,15 @@ BOARD_COUNT = 64  # largest number of states at once
 WHEEL_COUNT = 64  # largest number of wheels on a blackboard
 # What a blackboard is for: wheels in MuJoCo's contacts, wheels under forces of rolling, or MuJoCo's solver alone.
 CONTACTS, ROLLING, WATCHING = 1, 2, 3
-# Rows whose own share in the constraint space, a pivot relative to its diagonal, is smaller count as redundant.
-DEPENDENT = 1e-8
-# Largest number of refinements of forces in redundant rows; each reduces the residual by `DEPENDENT` over that share.
-REFINEMENTS = 30
-REFINED = 1e-13  # residual of the refinement, relative to the accelerations: some hundred roundings
+# Rows of rolling, scaled to the same size, are independent if the smallest eigenvalue of their Gram matrix is above
+# `INDEPENDENT`, half the squared angle of two of them: 0.25 degrees. Below `REDUNDANT`, a thousand roundings, they say
+# the same. Forces that keep rows between the two apart would grow as the inverse angle; no vehicle is built for them.
+INDEPENDENT = 1e-5
+REDUNDANT = 1e-12
+# A row whose square is smaller than this, relative to the largest row's, is one that no motion of the model changes.
+VANISHING = 1e-24
+# Forces of rolling belong to all other forces up to this share of the largest; round-off is a millionth of it.
+SAME_FORCES = 1e-9
 # A wheel whose centre is less than this above its contact counts as lying flat [m].
 FLAT = 1e-4
 
@@ -115,6 +124,22 @@ BLACKBOARD = np.dtype(
         ("efc_aref_at", np.int64),
         ("efc_R_at", np.int64),
         ("efc_KBIP_at", np.int64),
+        ("efc_vel_at", np.int64),
+        ("efc_pos_at", np.int64),
+        ("efc_margin_at", np.int64),
+        # Offsets of MuJoCo's counters of solutions and of inverse dynamics, each of which contains a solution.
+        ("solutions_at", np.int64),
+        ("inverses_at", np.int64),
+        ("solved", np.int64),  # number of solutions when the callback was last called
+        # Addresses of options and what they must not contain; no addresses where nobody asks.
+        ("disableflags", _ADDRESS),
+        ("enableflags", _ADDRESS),
+        ("solver", _ADDRESS),
+        ("noslip_iterations", _ADDRESS),
+        ("never_disabled", np.int64),
+        ("never_enabled", np.int64),
+        ("refused_solver", np.int64),  # -1 if there is none
+        ("most_noslip", np.int64),
         ("contact_size", np.int64),
         ("dist_at", np.int64),
         ("frame_at", np.int64),
@@ -143,9 +168,26 @@ BLACKBOARD = np.dtype(
         ("skipped", np.int64),  # MuJoCo left out a wheel's contact or its rows
         ("crowded", np.int64),  # MuJoCo's own constraints acted beside the forces of rolling
         ("strange", np.int64),  # another state of the same model
+        ("missed", np.int64),  # MuJoCo solved without having called the callback
+        ("altered", np.int64),  # an option was one that is refused
+        ("changed", np.int64),  # MuJoCo's other forces were not those that the forces of rolling belong to
+        ("infinite", np.int64),  # the forces of rolling were not finite
+        ("unreached", np.int64, WHEEL_COUNT),  # a wheel under forces of rolling had no contact point
         ("push", np.float64),  # largest normal force of rolling on a wheel [N]
         ("pull", np.float64),  # largest one that holds a wheel down [N]
         ("contradiction", np.float64),  # largest residual of the forces of rolling, relative to the accelerations
+        ("contradicting", np.float64, WHEEL_COUNT),  # shares of the wheels in its square
+        ("dependence", np.float64),  # first eigenvalue between `REDUNDANT` and `INDEPENDENT`; 0 if there is none
+        ("dependent", np.float64, WHEEL_COUNT),  # shares of the wheels in its eigenvector
+        # Arrays (n,): passive forces without and with those of rolling; all forces that these belong to.
+        ("passive_before", _ADDRESS),
+        ("passive_after", _ADDRESS),
+        ("smooth_after", _ADDRESS),
+        (
+            "pressed",
+            np.int64,
+        ),  # 1: forces of rolling are in the passive forces, and nobody has looked at what became of them
+        ("smooth_size", np.float64),  # largest of all forces in the last evaluation
     ],
     align=True,
 )
@@ -352,66 +394,6 @@ def _find_wheel(board, geom, ground):
     return -1
 
 
-@compile_callback(COLLISION, error_model="numpy")
-def touch(model, data, made, ground, geom, margin):
-    """Collision callback for a plane and a cylinder: the contact of a knife edge with the true ground.
-
-    Planes and cylinders that are not on a blackboard, and other states, get MuJoCo's own function. A wheel without a
-    contact point makes no contact and is counted.
-    """
-    head = _find_header()
-    table = _blackboards(head)
-    at = _find_board(head, table, model, data)
-    if at >= 0:
-        board = table[at]
-        k = _find_wheel(board, geom, ground)
-        if k >= 0:
-            _keep_control(head)
-            found, centre, here = _find_contact(board, k)
-            if not found:
-                board.lost += 1
-                board.touched[k], board.gap[k] = 1, np.nan
-                return types.int32(0)
-            board.found += 1
-            board.touched[k], board.gap[k] = 2, here.gap
-            out = _real_array(_address_of(made), 10)
-            out[0] = here.gap
-            for i in range(3):
-                out[1 + i] = centre[i] + here.arm[i]
-                out[4 + i] = here.normal[i]
-                out[7 + i] = here.tangent[i]
-            return types.int32(1)
-    return _function_at(head.collision, _COLLISION)(model, data, made, ground, geom, margin)
-
-
-@jit
-def _row_axes(board, contact_at, pyramidal):
-    """Return the directions (3 or 4, 3) of one contact's rows: normal and tangents, or the edges of a pyramid."""
-    frame, friction = _real_array(contact_at + board.frame_at, 9), _real_array(contact_at + board.friction_at, 2)
-    axes = np.empty((4 if pyramidal else 3, 3))
-    for j in range(3):
-        if pyramidal:
-            for i in range(2):
-                for side in range(2):
-                    axes[2 * i + side, j] = frame[j] + (1 - 2 * side) * friction[i] * frame[3 * (i + 1) + j]
-        else:
-            for i in range(3):
-                axes[i, j] = frame[3 * i + j]
-    return axes
-
-
-@jit
-def _correct_rows(board, contact_at, pyramidal, first_row, aref, kbip, along):
-    """Subtract gamma along each row, and the effect of the margin, from one contact's reference accelerations."""
-    margin = _real_array(contact_at + board.margin_at, 1)[0]
-    # MuJoCo keeps a wheel at the distance of its margin; subtracting this makes it touch.
-    stiffness = kbip[4 * first_row] * kbip[4 * first_row + 2]
-    for i in range(len(along)):
-        aref[first_row + i] -= along[i]
-        if i == 0 or pyramidal:
-            aref[first_row + i] -= stiffness * margin
-
-
 @jit
 def _stored_inertia(board):
     """Return the inertia matrix (n, n) of the last evaluation."""
@@ -500,6 +482,93 @@ def _assess_solution(board):
         board.wrong_step, board.wrong_residual = step, residual
 
 
+@compile_callback(COLLISION, error_model="numpy")
+def touch(model, data, made, ground, geom, margin):
+    """Collision callback for a plane and a cylinder: the contact of a knife edge with the true ground.
+
+    Planes and cylinders that are not on a blackboard, and other states, get MuJoCo's own function. A wheel without a
+    contact point makes no contact and is counted.
+    """
+    head = _find_header()
+    table = _blackboards(head)
+    at = _find_board(head, table, model, data)
+    if at >= 0:
+        board = table[at]
+        k = _find_wheel(board, geom, ground)
+        if k >= 0:
+            _keep_control(head)
+            # Inverse dynamics asks for contacts too, and overwrites the solution without calling the other callback.
+            _assess_solution(board)
+            found, centre, here = _find_contact(board, k)
+            if not found:
+                board.lost += 1
+                board.touched[k], board.gap[k] = 1, np.nan
+                return types.int32(0)
+            board.found += 1
+            board.touched[k], board.gap[k] = 2, here.gap
+            out = _real_array(_address_of(made), 10)
+            out[0] = here.gap
+            for i in range(3):
+                out[1 + i] = centre[i] + here.arm[i]
+                out[4 + i] = here.normal[i]
+                out[7 + i] = here.tangent[i]
+            return types.int32(1)
+    return _function_at(head.collision, _COLLISION)(model, data, made, ground, geom, margin)
+
+
+@jit
+def _row_axes(board, contact_at, pyramidal):
+    """Return the directions (3 or 4, 3) of one contact's rows: normal and tangents, or the edges of a pyramid."""
+    frame, friction = _real_array(contact_at + board.frame_at, 9), _real_array(contact_at + board.friction_at, 2)
+    axes = np.empty((4 if pyramidal else 3, 3))
+    for j in range(3):
+        if pyramidal:
+            for i in range(2):
+                for side in range(2):
+                    axes[2 * i + side, j] = frame[j] + (1 - 2 * side) * friction[i] * frame[3 * (i + 1) + j]
+        else:
+            for i in range(3):
+                axes[i, j] = frame[3 * i + j]
+    return axes
+
+
+@jit
+def _is_corrected(board, base, first_row, aref, kbip, along, shift):
+    """Return whether rows have been corrected before, in an evaluation that keeps MuJoCo's velocities.
+
+    Of MuJoCo's own definition, aref = -b v - k d (pos - margin), and the corrected one the nearer decides. They differ
+    by the correction: where that is lost in round-off, so is what depends on the answer.
+    """
+    count = first_row + len(along)
+    speed = _real_array(_read_pointer(base + types.uintp(board.efc_vel_at)), count)
+    place = _real_array(_read_pointer(base + types.uintp(board.efc_pos_at)), count)
+    margin = _real_array(_read_pointer(base + types.uintp(board.efc_margin_at)), count)
+    plain, corrected = 0.0, 0.0
+    for i in range(len(along)):
+        row = first_row + i
+        defined = -kbip[4 * row + 1] * speed[row] - kbip[4 * row] * kbip[4 * row + 2] * (place[row] - margin[row])
+        plain += (aref[row] - defined) ** 2
+        corrected += (aref[row] + along[i] + shift[i] - defined) ** 2
+    return corrected < plain
+
+
+@jit
+def _correct_rows(board, base, contact_at, pyramidal, first_row, aref, kbip, along):
+    """Subtract gamma along each row, and the effect of the margin, from one contact's reference accelerations."""
+    margin = _real_array(contact_at + board.margin_at, 1)[0]
+    # MuJoCo keeps a wheel at the distance of its margin; subtracting this makes it touch.
+    stiffness = kbip[4 * first_row] * kbip[4 * first_row + 2]
+    shift = np.zeros(len(along))
+    for i in range(len(along)):
+        if i == 0 or pyramidal:
+            shift[i] = stiffness * margin
+    if _is_corrected(board, base, first_row, aref, kbip, along, shift):
+        return
+    for i in range(len(along)):
+        aref[first_row + i] -= along[i]
+        aref[first_row + i] -= shift[i]
+
+
 @jit
 def _store_inertia(board):
     """Store this evaluation's inertia, which the assessment needs and MuJoCo will overwrite."""
@@ -510,9 +579,44 @@ def _store_inertia(board):
 
 
 @jit
+def _count_solutions(board):
+    """Return how often MuJoCo has solved the equations of motion of the state, inverse dynamics left out."""
+    solutions = _read_integer(board.data + types.uintp(board.solutions_at))
+    return solutions - _read_integer(board.data + types.uintp(board.inverses_at))
+
+
+@jit
+def _count_missed(board, solutions):
+    """Count solutions since the callback was last called, but for the one that followed it."""
+    if solutions > board.solved + 1:
+        board.missed += solutions - board.solved - 1
+        board.solved, board.pressed = solutions - 1, 0
+
+
+@jit
+def _compare_forces(board, solutions):
+    """Count the last evaluation if MuJoCo solved with other forces than those that the forces of rolling belong to."""
+    if board.pressed == 0 or solutions != board.solved + 1:
+        return
+    board.pressed = 0
+    smooth, expected = _real_array(board.qfrc_smooth, board.speeds), _real_array(board.smooth_after, board.speeds)
+    difference, reset = 0.0, True
+    for i in range(board.speeds):
+        difference = max(difference, abs(smooth[i] - expected[i]))
+        reset = reset and smooth[i] == 0
+    if difference > SAME_FORCES * board.smooth_size and not reset:
+        board.changed += 1
+
+
+@jit
 def judge(board):
     """Assess the last evaluation of a blackboard (1,) unless a later evaluation has done so."""
-    _assess_solution(board[0])
+    entry = board[0]
+    _assess_solution(entry)
+    if entry.kind != WATCHING and entry.data != 0:
+        solutions = _count_solutions(entry)
+        _count_missed(entry, solutions)
+        _compare_forces(entry, solutions)
 
 
 @jit
@@ -583,12 +687,12 @@ def _correct_reference(board, model, data):
         pyramidal = kind == board.pyramidal_type
         each = 4 if pyramidal else 3
         aref = _real_array(_read_pointer(base + types.uintp(board.efc_aref_at)), first + each)
-        kbip = _real_array(_read_pointer(base + types.uintp(board.efc_KBIP_at)), 4 * first + 4)
+        kbip = _real_array(_read_pointer(base + types.uintp(board.efc_KBIP_at)), 4 * (first + each))
         softness = _real_array(_read_pointer(base + types.uintp(board.efc_R_at)), first + each)
         centre, here = _evaluate_contact(board, k)
         _, gamma = _contact_motion(board, k, model, data, centre, here, velocities, turning)
         axes = _row_axes(board, contact_at, pyramidal)
-        _correct_rows(board, contact_at, pyramidal, first, aref, kbip, axes @ np.array(gamma))
+        _correct_rows(board, base, contact_at, pyramidal, first, aref, kbip, axes @ np.array(gamma))
         rows[used : used + each] = axes @ velocities
         numbers[0, used : used + each], numbers[1, used : used + each] = softness[first:], aref[first:]
         used += each
@@ -598,41 +702,112 @@ def _correct_reference(board, model, data):
 
 
 @jit
-def solve_rows(schur, target, size):
-    """Overwrite ``target`` (n,) with forces F, S F = target, and return the largest |S F - target| over |target|.
+def _add_least_forces(values, vectors, weight, left, force):
+    """Add to forces (n,) the smallest ones whose accelerations are ``left`` (n,), as far as there are any."""
+    size = len(force)
+    for k in range(size):
+        if values[k] > INDEPENDENT:
+            along = 0.0
+            for i in range(size):
+                along += vectors[i, k] * weight[i] * left[i]
+            for i in range(size):
+                force[i] += weight[i] * vectors[i, k] * along / values[k]
 
-    Redundant rows make S singular. Then F is refined from zero with S + d diag(S), d = `DEPENDENT`, in place of S:
-    F += (S + d diag(S))^-1 (target - S F). That converges to the F of least size sum of S_ii F_i^2 without a decision
-    on how many rows are redundant. Rows that contradict each other leave a residual.
+
+@jit
+def solve_independent_rows(schur, target, size):
+    """Overwrite ``target`` (n,) with the forces F, S F = target, if the rows are independent; return whether they are.
+
+    They are if each row's own share beside the rows before it, a pivot of S relative to its diagonal, is above
+    `INDEPENDENT`.
     """
-    factors, least = schur.copy(), 1.0
+    largest, smallest, least = 0.0, np.inf, 1.0
+    for i in range(size):
+        largest, smallest = max(largest, schur[i, i]), min(smallest, schur[i, i])
+    if not smallest > VANISHING * largest:
+        return False
+    factors = schur.copy()
     factorise(factors, size)
     for i in range(size):
         least = min(least, factors[i, i] / schur[i, i])
-    if least > DEPENDENT:
-        solve_factorised(factors, target, size)
-        return 0.0
-    factors[:] = schur
-    for i in range(size):
-        factors[i, i] *= 1 + DEPENDENT
-    factorise(factors, size)
-    force, left, size_of, largest = np.zeros(size), target.copy(), 0.0, 0.0
-    for i in range(size):
-        size_of = max(size_of, abs(target[i]))
-    for _ in range(REFINEMENTS):
-        solve_factorised(factors, left, size)
+    if not least > INDEPENDENT:
+        return False
+    solve_factorised(factors, target, size)
+    return True
+
+
+@jit
+def _reduce_forces(values, vectors, weight, cost, force):
+    """Reduce forces (n,) to the ones of least cost, sum of c_i F_i^2, among those with the same accelerations."""
+    size, count = len(force), 0
+    free = np.empty((size, size))
+    for k in range(size):
+        if -0.5 < values[k] <= INDEPENDENT:
+            for i in range(size):
+                free[count, i] = weight[i] * vectors[i, k]
+            count += 1
+    if count == 0:
+        return
+    normal, right = np.zeros((count, count)), np.zeros(count)
+    for k in range(count):
         for i in range(size):
-            force[i] += left[i]
-        largest = 0.0
+            right[k] -= free[k, i] * cost[i] * force[i]
+            for j in range(count):
+                normal[k, j] += free[k, i] * cost[i] * free[j, i]
+    factorise(normal, count)
+    solve_factorised(normal, right, count)
+    for k in range(count):
+        for i in range(size):
+            force[i] += right[k] * free[k, i]
+
+
+@jit
+def solve_dependent_rows(schur, target, cost, share):
+    """Overwrite ``target`` (n,) with forces F, S F = target; return the largest |S F - target| and a dependence.
+
+    The eigenvalues of D S D decide, D = diag(S)^(-1/2). Those above `INDEPENDENT` determine the accelerations; of the
+    forces with these accelerations F is the smallest, in the sum of c_i F_i^2 with the ``cost`` c (n,) of each row.
+    Redundant rows share a force, rows that no motion changes have none, and rows that contradict each other leave a
+    residual. The smallest eigenvalue between `REDUNDANT` and `INDEPENDENT` is returned as the dependence, 0 if there is
+    none: such rows neither say the same nor differ. ``share`` (2, n) gets the share of each row in the square of the
+    residual, and of the dependence's eigenvector.
+    """
+    size = len(target)
+    share[:] = 0.0
+    weight, scaled, largest = np.zeros(size), np.empty((size, size)), 0.0
+    for i in range(size):
+        largest = max(largest, schur[i, i])
+        for j in range(size):
+            if not np.isfinite(schur[i, j]):
+                return np.nan, 0.0
+    for i in range(size):
+        if schur[i, i] > VANISHING * largest:
+            weight[i] = 1 / np.sqrt(schur[i, i])
+    for i in range(size):
+        for j in range(size):
+            # Half of both triangles, which round otherwise.
+            scaled[i, j] = weight[i] * weight[j] * (schur[i, j] + schur[j, i]) / 2
+        if weight[i] == 0:
+            scaled[i, i] = -1.0  # apart from all others
+    values, vectors = np.linalg.eigh(scaled)
+    force, left, residual, dependence = np.zeros(size), target.copy(), 0.0, 0.0
+    for _ in range(2):  # the second time removes what rounding has left
+        _add_least_forces(values, vectors, weight, left, force)
         for i in range(size):
             left[i] = target[i]
             for j in range(size):
                 left[i] -= schur[i, j] * force[j]
-            largest = max(largest, abs(left[i]))
-        if largest <= REFINED * size_of:
-            break
-    target[:size] = force
-    return largest / size_of if size_of > 0 else 0.0
+    for i in range(size):
+        residual = max(residual, abs(left[i]))
+        share[0, i] = left[i] ** 2
+    for k in range(size - 1, -1, -1):
+        if REDUNDANT < values[k] < INDEPENDENT:
+            dependence = values[k]
+            for i in range(size):
+                share[1, i] = vectors[i, k] ** 2
+    _reduce_forces(values, vectors, weight, cost, force)
+    target[:] = force
+    return residual, dependence
 
 
 @jit
@@ -701,37 +876,152 @@ def _store_force(board, k, force, first):
 
 
 @jit
+def _take_back(board):
+    """Take the forces of rolling out of passive forces that MuJoCo has kept from the last evaluation."""
+    passive = _real_array(board.qfrc_passive, board.speeds)
+    before, after = _real_array(board.passive_before, board.speeds), _real_array(board.passive_after, board.speeds)
+    for i in range(board.speeds):
+        if passive[i] != after[i]:
+            return
+    passive[:] = before
+
+
+@jit
+def _row_owners(board, size):
+    """Return the wheel of each row (n,): wheels without a contact point have none."""
+    owner, first = np.empty(size, np.int64), 0
+    for k in range(board.wheels):
+        if np.isfinite(board.gap[k]):
+            for i in range(3):
+                if board.constrained[k, i]:
+                    owner[first], first = k, first + 1
+    return owner
+
+
+@jit
+def _find_scale(board, model, data, rows, owner, free):
+    """Return the size of the terms that make up the accelerations of rows (m, n), which may cancel to round-off.
+
+    Gamma's terms are of the size w^2 r, w the wheel's angular velocity.
+    """
+    s, qvel, largest = board.stabilisation, _real_array(board.qvel, board.speeds), 0.0
+    moving, turning = np.empty((3, board.speeds)), np.empty((3, board.speeds))
+    for row in range(len(owner)):
+        k = owner[row]
+        centre, here = _evaluate_contact(board, k)
+        _contact_motion(board, k, model, data, centre, here, moving, turning)
+        squared, total = 0.0, 0.0
+        for i in range(3):
+            spin = 0.0
+            for j in range(board.speeds):
+                spin += turning[i, j] * qvel[j]
+            squared += spin * spin
+        for j in range(board.speeds):
+            total += abs(rows[row, j] * free[j]) + 2 * s * abs(rows[row, j] * qvel[j])
+        largest = max(largest, total + squared * board.radius[k] + s * s * abs(here.gap))
+    return largest
+
+
+@jit
+def _press_dependent(board, model, data, rows, schur, force, free):
+    """Solve rows (m, n) that are not all independent for their forces (m,), and record how far they agree."""
+    size = len(rows)
+    share, owner, cost = np.empty((2, size)), _row_owners(board, size), np.zeros(size)
+    # One for the rows of a wheel, so that the smallest forces do not depend on the directions of the axes.
+    for i in range(size):
+        for j in range(size):
+            if owner[i] == owner[j]:
+                cost[i] += schur[j, j]
+    residual, dependence = solve_dependent_rows(schur, force[:size], cost, share)
+    if dependence > 0 and board.dependence == 0:
+        board.dependence = dependence
+        for i in range(size):
+            board.dependent[owner[i]] += share[1, i]
+    scale_of = _find_scale(board, model, data, rows, owner, free)
+    # Without any acceleration there is no residual either.
+    if residual > board.contradiction * scale_of:
+        board.contradiction, total = residual / scale_of, 0.0
+        board.contradicting[:] = 0.0
+        for i in range(size):
+            total += share[0, i]
+        for i in range(size):
+            board.contradicting[owner[i]] += share[0, i] / total
+
+
+@jit
+def _store_sums(board, free_forces, passive):
+    """Store the passive forces with those of rolling, and the sum of forces that MuJoCo should find."""
+    after, expected = _real_array(board.passive_after, board.speeds), _real_array(board.smooth_after, board.speeds)
+    before, bias = _real_array(board.passive_before, board.speeds), _real_array(board.qfrc_bias, board.speeds)
+    board.pressed, board.smooth_size = 1, 0.0
+    for i in range(board.speeds):
+        after[i], rolling = passive[i], passive[i] - before[i]
+        expected[i] = free_forces[i] + rolling
+        # The norms of the parts, so that sums that cancel do not pass for small.
+        parts = abs(free_forces[i] + bias[i]) + abs(bias[i]) + abs(before[i]) + abs(rolling)
+        board.smooth_size = max(board.smooth_size, parts)
+
+
+@jit
 def _press(board, model, data):
-    """Apply the contact forces of rolling without slip, beside MuJoCo's passive forces."""
+    """Apply the contact forces of rolling without slip, beside MuJoCo's passive forces.
+
+    A wheel without a contact point gets no force and is counted; the others roll on.
+    """
     n, most = board.speeds, 3 * board.wheels
     rows, spread, turning, force = np.empty((most, n)), np.empty((most, n)), np.empty((3, n)), np.empty(most)
+    _take_back(board)
     # MuJoCo computes the same again after this callback.
     _actuation(model, data)
     _acceleration(model, data)
     free, passive = _real_array(board.qacc_smooth, n), _real_array(board.qfrc_passive, n)
+    before = _real_array(board.passive_before, n)
+    before[:] = passive
     board.crowded += _read_integer(_address_of(data) + types.uintp(board.nefc_at)) > 0
     size = 0
     for k in range(board.wheels):
         found, centre, here = _find_contact(board, k)
         if not found:
             board.lost += 1
+            board.unreached[k] += 1
             board.gap[k] = np.nan
-            return
+            continue
         board.found += 1
         size = _fill_rows(board, k, model, data, centre, here, rows, turning, free, force, size)
     _solve_mass(model, data, spread.ctypes, rows.ctypes, types.int32(size))
-    residual = solve_rows(rows[:size] @ spread[:size].T, force, size)
-    board.contradiction = max(board.contradiction, residual)
+    schur = rows[:size] @ spread[:size].T
+    if not solve_independent_rows(schur, force, size):
+        _press_dependent(board, model, data, rows[:size], schur, force, free)
+    for i in range(size):
+        if not np.isfinite(force[i]):
+            board.infinite += 1
+            break
     for i in range(size):
         for j in range(n):
             passive[j] += rows[i, j] * force[i]
+    _store_sums(board, _real_array(board.qfrc_smooth, n), passive)
     first = 0
     for k in range(board.wheels):
+        if not np.isfinite(board.gap[k]):
+            board.force[k, :] = 0.0
+            continue
         first = _store_force(board, k, force, first)
         along = 0.0
         for i in range(3):
             along += board.force[k, i] * board.normal[k, i]
         board.push, board.pull = max(board.push, along), max(board.pull, -along)
+
+
+@jit
+def _watch_options(board):
+    """Count an evaluation with an option that is refused; it may have been set inside the block."""
+    if board.disableflags == 0:
+        return
+    disabled = _read_integer(board.disableflags) & board.never_disabled
+    enabled = _read_integer(board.enableflags) & board.never_enabled
+    hidden = _read_integer(board.noslip_iterations) > board.most_noslip
+    if disabled != 0 or enabled != 0 or hidden or _read_integer(board.solver) == board.refused_solver:
+        board.altered += 1
 
 
 @compile_callback(CONTROL, error_model="numpy")
@@ -748,6 +1038,12 @@ def control(model, data):
                 table[i].strange += 1
         return
     board = table[at]
+    if board.kind != WATCHING:
+        solutions = _count_solutions(board)
+        _count_missed(board, solutions)
+        _compare_forces(board, solutions)
+        board.solved = solutions
+        _watch_options(board)
     if board.kind == ROLLING:
         _press(board, model, data)
         return

@@ -24,10 +24,11 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
-from . import compiled
+from . import compiled, layout
 from .callbacks import claim_board
 from .settings import WRONG
 
+_TIMER = mujoco.mjtTimer
 STATE = (
     "qvel",
     "geom_xpos",
@@ -72,6 +73,7 @@ class SolverConvergence:
     def detach(self) -> None:
         """Keep the record as it is when the block ends: its blackboard will be used again."""
         self._board = self._board.copy()
+        self._board["data"] = 0
 
     @property
     def unconverged(self) -> int:
@@ -105,13 +107,20 @@ def watch_state(
     converged_below : float
         Relative residual up to which an evaluation counts as converged.
     """
-    entry, inertia, smooth = board[0], np.zeros(len(data.M)), np.zeros(model.nv)
+    entry, inertia, smooth, forces = board[0], np.zeros(len(data.M)), np.zeros(model.nv), np.zeros((3, model.nv))
     for name in STATE:
         entry[name] = getattr(data, name).ctypes.data
     for name in ("M_rownnz", "M_rowadr", "M_colind"):
         entry[name] = getattr(model, name).ctypes.data
     entry["kept_M"], entry["M_entries"], entry["speeds"] = inertia.ctypes.data, len(inertia), model.nv
     entry["kept_smooth"] = smooth.ctypes.data
+    for name, array in zip(("passive_before", "passive_after", "smooth_after"), forces, strict=True):
+        entry[name] = array.ctypes.data
+    offsets = layout.find_layout()
+    entry["solutions_at"], entry["inverses_at"] = offsets.solutions, offsets.inverses
+    timers = [data.timer[int(timer)].number for timer in (_TIMER.mjTIMER_CONSTRAINT, _TIMER.mjTIMER_INVERSE)]
+    # As if the callback had been called before the last solution.
+    entry["solved"] = timers[0] - timers[1] - 1
     entry["evaluations_per_step"] = 4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1
     entry["converged_below"], entry["wrong_above"] = converged_below, WRONG
     entry["last_unconverged"] = entry["wrong_step"] = entry["largest_residual"] = -1

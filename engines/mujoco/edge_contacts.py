@@ -12,11 +12,16 @@ import numpy as np
 
 from ..engine import EngineError
 from . import compiled
+from .callbacks import REPLACED
 from .convergence import SolverConvergence, share
+from .library import control_slot
+from .options import find_refused_option
 
 # Rolling constraints that leave more than this share of the accelerations contradict each other. Consistent ones leave
-# `compiled.REFINED`; a hundredth of a degree between two axles that should be one leaves 1e-4.
-CONTRADICTION = 1e-6
+# some hundred roundings; an angle of 1e-8 rad between two axles that should be one leaves about as much.
+CONTRADICTION = 1e-9
+# Share in a dependence or a contradiction from which on a wheel is named: a tenth in amplitude.
+NAMED = 0.01
 # Share of the largest normal force up to which one that pulls counts as round-off of a wheel without load.
 UNLOADED = 1e-9
 _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
@@ -98,6 +103,11 @@ class EdgeContacts(SolverConvergence):
             return f"MuJoCo's contact solver stopped unconverged: {share(self.wrong[1])}"
         if any(self._data.warning[kind].number for kind in _UNSTABLE):
             return "MuJoCo's state became infinite or huge"
+        rolling = self._board["kind"][0] == compiled.ROLLING
+        return self._find_missed(rolling) or self._find_changed() or (self._find_strain() if rolling else None)
+
+    def _find_missed(self, rolling: bool) -> str | None:
+        """Return what the callbacks have missed."""
         record = self._board[0]
         if record["skipped"]:
             return (
@@ -109,17 +119,85 @@ class EdgeContacts(SolverConvergence):
                 f"another state of the same model was evaluated {record['strange']} times, without its wheels; "
                 "it needs a block of its own"
             )
+        # Exact contacts put the callback back before it is missed.
+        if self._is_open() and rolling and control_slot().value != compiled.control.address:
+            return REPLACED
+        if record["missed"]:
+            return (
+                f"MuJoCo solved {record['missed']} evaluations of this state without its control callback, and so "
+                "without its wheels: with a copy of the model, by single stages or with other callbacks; a state that "
+                "was copied in by mj_copyData looks the same, one copied by mj_getState and mj_setState does not"
+            )
+        return None
+
+    def _find_changed(self) -> str | None:
+        """Return what was changed inside the block that must not change."""
+        record, wheels = self._board[0], len(self._reach)
+        # Blocks that leave options to the caller do not watch them.
+        watched = record["disableflags"] != 0
+        refused = find_refused_option(self._model, int(record["kind"])) if watched else None
+        if refused is not None:
+            return f"inside the block, {refused}"
+        if record["altered"]:
+            return (
+                f"options were changed inside the block, for {record['altered']} evaluations, to some that are refused "
+                "at its start"
+            )
+        sizes = self._model.geom_size[record["geom"][:wheels], 0]
+        if changed := [k for k in range(wheels) if sizes[k] != record["radius"][k]]:
+            return (
+                f"the radius of the wheel {self._name(changed[0])} was changed inside the block, which began with "
+                f"{record['radius'][changed[0]]:g} m"
+            )
+        return None
+
+    def _find_strain(self) -> str | None:
+        """Return why forces of rolling are not those of the model's wheels."""
+        record, wheels = self._board[0], len(self._reach)
         if record["crowded"]:
             return (
                 f"MuJoCo's own constraints acted in {record['crowded']} evaluations, of which the forces of rolling "
                 "know nothing; remove contacts, limits, equalities and friction losses, or use knife_edges"
             )
+        if record["infinite"]:
+            return f"the forces of rolling were not finite in {record['infinite']} evaluations"
+        if np.any(record["unreached"][:wheels]):
+            k = int(np.argmax(record["unreached"][:wheels]))
+            return (
+                f"the wheel {self._name(k)} had no contact point with the ground in {record['unreached'][k]} "
+                "evaluations, and so no force"
+            )
         if record["contradiction"] > CONTRADICTION:
             return (
                 f"the constraints of rolling contradict each other by {record['contradiction']:.2g} of the "
-                "accelerations; `constrained` can leave out the lateral velocity of all but one wheel on an axle"
+                f"accelerations, on {self._name_all('contradicting')}; `constrained` can leave out the lateral "
+                "velocity of all but one wheel on an axle"
+            )
+        if record["dependence"] > 0:
+            return (
+                f"the constraints of rolling on {self._name_all('dependent')} are nearly redundant: they differ by "
+                f"{np.sqrt(record['dependence']):.2g} rad, which is neither nothing nor enough to tell their forces "
+                "apart; make them equal, or leave some out by `constrained`"
+            )
+        if record["changed"]:
+            return (
+                f"forces other than the wheels' were changed after MuJoCo's control callback in {record['changed']} "
+                "evaluations, so that the wheels' do not belong to them: set controls and applied forces before "
+                "mj_step1, and copy states with mj_getState and mj_setState"
             )
         return None
+
+    def _is_open(self) -> bool:
+        return bool(self._board["data"][0])
+
+    def _name(self, wheel: int) -> str:
+        return repr(self._model.geom(int(self._board["geom"][0, wheel])).name)
+
+    def _name_all(self, field: str) -> str:
+        """Return the names of the wheels with a share in what a field records."""
+        shares = self._board[field][0, : len(self._reach)]
+        names = [self._name(k) for k in range(len(shares)) if shares[k] > NAMED]
+        return f"the wheel{'s' if len(names) > 1 else ''} {', '.join(names)}"
 
     def check(self) -> None:
         """Raise an error if forces of an evaluation in this block cannot be right.

@@ -24,8 +24,8 @@ wheel out, the block ends with an error, which `EdgeContacts.check` raises earli
 
 `rolling_forces` replaces MuJoCo's contacts by the exact forces of rolling without slip.
 
-Several blocks may be open at once, in threads as well, one for each state. The user's control callback works as ever.
-``mj_inverse`` is not corrected.
+Several blocks may be open at once, in threads as well, one for each state. The user's control callback is called first;
+under `rolling_forces` it must be set before the block. ``mj_inverse`` is not corrected.
 """
 
 # MuJoCo's compiled bindings carry no types.
@@ -33,8 +33,10 @@ Several blocks may be open at once, in threads as well, one for each state. The 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from numbers import Real
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -42,14 +44,24 @@ import numpy as np
 from ...reference.rim import rim_search
 from ...reference.surface import Surface
 from . import compiled, layout
-from .callbacks import claim_board
+from .callbacks import claim_board, find_board
 from .convergence import WRONG, watch_state
 from .edge_contacts import EdgeContacts
+from .options import find_refused_option, watch_options
 from .solver_limits import raise_solver_limits
 
 ALL_AXES = (True, True, True)
-# Flags without which the contacts, or the callback that completes them, are not computed.
-_NEEDED = {"CONTACT": "contacts", "CONSTRAINT": "constraint forces", "ACTUATION": "control callbacks"}
+# Numbers and pointers of `mjData` that the callbacks read anew in every evaluation.
+_FOLLOWED = (
+    *("ncon", "nefc", "contact", "efc_aref", "efc_KBIP", "efc_R"),
+    *("efc_type", "efc_vel", "efc_pos", "efc_margin"),
+)
+# Largest tilt of a plane that counts as level [rad]; round-off in a quaternion is 1e-16.
+LEVEL = 1e-9
+# Largest product of the rate of stabilisation and the step at which slip, v' = -2 s v, and gaps,
+# x" = -2 s x' - s^2 x, decay. RK4 is stable on the real axis down to -2.785, twice the product. MuJoCo's other methods
+# take v += h a, x += h v, so that gaps begin to grow where 4 - 4 s h - (s h)^2 = 0, and slip at s h = 1.
+FASTEST_RK4, FASTEST_EULER = 2.785 / 2, 2 * (2**0.5 - 1)
 
 
 @contextmanager
@@ -84,17 +96,12 @@ def knife_edges(
         If the state has a block already or this version of MuJoCo has another memory layout; at the end of the
         block, if forces were wrong by more than `convergence.WRONG` or a wheel was left out.
     """
-    _check_options(model, _NEEDED)
-    if model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
-        raise ValueError("the solver is PGS, whose convergence nobody can tell; knife edges need Newton or CG")
-    if model.opt.noslip_iterations:
-        raise ValueError(
-            "noslip_iterations hide whether the solver has converged; `stiffen` leaves less slip than they do"
-        )
+    _check_arguments(model, data, surface, wheels, compiled.CONTACTS)
     with (
         raise_solver_limits(model),
         watched_edges(model, data, surface, wheels, WRONG) as contacts,
     ):
+        watch_options(find_board(data), model)
         yield contacts
         contacts.check()
 
@@ -138,16 +145,23 @@ def rolling_forces(
     """Apply the exact forces of rolling without slip to wheels, in place of MuJoCo's contacts.
 
     The forces are solved from MuJoCo's own mass matrix and all its other forces in every evaluation of the dynamics and
-    added to ``qfrc_passive``. The constraints are bilateral: wheels neither lift off nor slide. Nothing is iterated,
-    except where constraints are redundant, such as the lateral ones of two wheels on one axle: accelerations are
-    determined there, the division of the force between the wheels is not, and the smallest forces are taken.
+    added to ``qfrc_passive``. The constraints are bilateral: wheels neither lift off nor slide. Nothing is iterated.
+    Where constraints are redundant, such as the lateral ones of two wheels on one axle, accelerations are determined,
+    the division of the force between the wheels is not, and the smallest forces are taken. Constraints that are nearly
+    redundant, as of axles that differ by less than 0.2 degrees and more than a millionth of a radian, are an error.
+
+    The forces belong to the controls, applied forces and wrenches at the moment at which MuJoCo calls its control
+    callback. With ``mj_step1`` and ``mj_step2`` these must be set before ``mj_step1``, or in a control callback: other
+    forces between the two are an error. Copy states with ``mj_getState`` and ``mj_setState``; ``mj_copyData`` copies
+    MuJoCo's counters too, and may look like steps without the callback. Sensors of force and ``cfrc_int`` do not know
+    the force of the ground, which is among the passive forces.
 
     Parameters
     ----------
     model, data, surface, wheels
         As in `knife_edges`; no contact pairs are needed.
     stabilisation : float
-        Rate at which gaps and slip decay to zero [1/s].
+        Rate at which gaps and slip decay to zero [1/s]; at most 0.8 (RK4: 1.3) a step.
     constrained : mapping, optional
         Which velocities of a wheel's contact are zero, by the wheel's geom name: lateral, forward and normal. All of
         those of wheels that it does not name.
@@ -155,13 +169,18 @@ def rolling_forces(
     Raises
     ------
     ValueError
-        As in `knife_edges` for wheels, sleeping and disabled actuation; for unknown names in ``constrained`` or if
-        nothing is constrained.
+        As in `knife_edges` for wheels, sleeping and disabled actuation; for a rate that is negative or faster than the
+        step allows; for unknown names in ``constrained``, values that are not three truth values, or if nothing is
+        constrained.
     EngineError
         As in `knife_edges`; at the end of the block, if MuJoCo's own constraints acted (contacts, limits, equalities,
-        friction losses), constraints of rolling contradicted each other or the control callback was replaced.
+        friction losses), constraints of rolling contradicted each other or were nearly redundant, a wheel had no
+        contact point, MuJoCo solved with other forces than the callback saw, or the control callback was replaced.
     """
-    _check_options(model, ("ACTUATION",))
+    _check_arguments(model, data, surface, wheels, compiled.ROLLING)
+    _check_rate(stabilisation, model)
+    for name, given in dict(constrained or {}).items():
+        _check_axes(name, given)
     chosen = dict.fromkeys(wheels, ALL_AXES) | dict(constrained or {})
     if unknown := [name for name in chosen if name not in wheels]:
         raise ValueError(f"constrained names {unknown[0]!r}, which is none of the wheels {', '.join(wheels)}")
@@ -169,6 +188,7 @@ def rolling_forces(
         raise ValueError("nothing is constrained; at least one velocity of a wheel must be")
     axes = [chosen[name] for name in wheels]
     with watched_rolling(model, data, surface, wheels, stabilisation, axes) as contacts:
+        watch_options(find_board(data), model)
         yield contacts
         contacts.check()
 
@@ -205,8 +225,15 @@ def stiffen(model: mujoco.MjModel, wheels: Mapping[str, str], softness: float) -
 
     MuJoCo takes R = (1 - impedance) / impedance times the mean inverse weight of the wheel's body. This function
     scales that weight, which only constraints use.
+
+    Raises
+    ------
+    ValueError
+        If a geom is missing or the factor is not a finite number above 0.
     """
-    for body in {int(model.geom(name).bodyid[0]) for name in wheels}:
+    if not (isinstance(softness, Real) and 0 < float(softness) < np.inf):
+        raise ValueError(f"softness must be a finite number above 0, such as 1e-5, not {softness!r}")
+    for body in {int(_find_geom(model, name).bodyid[0]) for name in wheels}:
         model.body_invweight0[body] *= softness
 
 
@@ -219,16 +246,64 @@ def _record(contacts: EdgeContacts) -> Iterator[EdgeContacts]:
         contacts.detach()
 
 
-def _check_options(model: mujoco.MjModel, needed: Iterable[str]) -> None:
-    for name in needed:
-        if model.opt.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"):
-            raise ValueError(f"the flag {name.lower()} is disabled, without which there are no {_NEEDED[name]}")
-    if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
-        raise ValueError("the flag sleep is enabled; the forces on wheels need all bodies awake")
+def _check_arguments(
+    model: mujoco.MjModel, data: mujoco.MjData, surface: Surface, wheels: Mapping[str, str], kind: int
+) -> None:
+    refused = find_refused_option(model, kind)
+    if refused is not None:
+        raise ValueError(refused)
+    if data.signature != model.signature:
+        raise ValueError("data belongs to another model; mujoco.MjData(model) makes one for this model")
+    if not isinstance(surface, Surface):
+        raise ValueError(f"surface must be one of velodrome.reference.surface, not {surface!r}")
+    for name in (*wheels, *wheels.values()):
+        _find_geom(model, name)
+
+
+def _check_rate(stabilisation: float, model: mujoco.MjModel) -> None:
+    if not (isinstance(stabilisation, Real) and 0 <= float(stabilisation) < np.inf):
+        raise ValueError(f"stabilisation must be a finite rate of 0 or more [1/s], not {stabilisation!r}")
+    fastest = FASTEST_RK4 if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else FASTEST_EULER
+    if stabilisation * model.opt.timestep > fastest:
+        raise ValueError(
+            f"stabilisation is {stabilisation:g} 1/s; at steps of {model.opt.timestep:g} s gaps or slip grow from "
+            f"{fastest / model.opt.timestep:.4g} 1/s on"
+        )
+
+
+def _check_axes(name: str, axes: Any) -> None:
+    three = isinstance(axes, Sequence | np.ndarray) and len(axes) == 3
+    if not three or any(not isinstance(axis, bool | np.bool_) for axis in axes):
+        raise ValueError(f"constrained[{name!r}] must be three truth values, lateral, forward and normal, not {axes!r}")
+
+
+def _find_geom(model: mujoco.MjModel, name: str) -> Any:
+    """Return MuJoCo's view of a geom.
+
+    Raises
+    ------
+    ValueError
+        If there is none of this name.
+    """
+    try:
+        return model.geom(name)
+    except (KeyError, TypeError) as error:
+        names = [model.geom(i).name for i in range(model.ngeom)]
+        known = ", ".join(repr(each) for each in names if each) or "none with a name"
+        raise ValueError(f"the model has no geom {name!r}; its geoms are {known}") from error
+
+
+def _moves(model: mujoco.MjModel, body: int) -> bool:
+    """Return whether a joint can move a body; those of the world and of mocap have none."""
+    while body:
+        if model.body_dofnum[body]:
+            return True
+        body = int(model.body_parentid[body])
+    return False
 
 
 def _find_pair(model: mujoco.MjModel, wheel: str, ground: str) -> int:
-    ids = {model.geom(wheel).id, model.geom(ground).id}
+    ids = {_find_geom(model, wheel).id, _find_geom(model, ground).id}
     pairs = [i for i in range(model.npair) if {int(model.pair_geom1[i]), int(model.pair_geom2[i])} == ids]
     if len(pairs) != 1:
         raise ValueError(f"there must be one contact pair of {ground!r} and {wheel!r}, not {len(pairs)}")
@@ -256,7 +331,7 @@ def _write_blackboard(
     board = entries[0]
     board["surface"], board["parameters"] = function.address, parameters.ctypes.data
     board["parameter_count"] = len(parameters)
-    for name in ("ncon", "nefc", "contact", "efc_aref", "efc_KBIP", "efc_R", "efc_type"):
+    for name in _FOLLOWED:
         board[f"{name}_at"] = offsets.data[name]
     for name, field in (
         ("dist", "dist"),
@@ -282,12 +357,18 @@ def _write_blackboard(
 def _write_wheels(board: np.void, model: mujoco.MjModel, wheels: Mapping[str, str]) -> None:
     board["wheels"] = len(wheels)
     for k, (wheel, ground) in enumerate(wheels.items()):
-        geom, plane = model.geom(wheel), model.geom(ground)
+        geom, plane = _find_geom(model, wheel), _find_geom(model, ground)
         if geom.type[0] != mujoco.mjtGeom.mjGEOM_CYLINDER:
             raise ValueError(f"{wheel!r} must be a cylinder, whose radius and axis are the wheel's")
         if plane.type[0] != mujoco.mjtGeom.mjGEOM_PLANE or plane.bodyid[0] != 0:
             raise ValueError(f"{ground!r} must be a plane that belongs to the world")
-        if model.body_weldid[geom.bodyid[0]] == 0:
-            raise ValueError(f"{wheel!r} must belong to a body that moves")
+        tilt = 2 * float(np.hypot(plane.quat[1], plane.quat[2]))
+        if tilt > LEVEL:
+            raise ValueError(
+                f"{ground!r} is tilted by {tilt:.3g} rad; the plane only names the ground and must be level, "
+                "the surface has the slope, such as InclinedPlane"
+            )
+        if not _moves(model, int(geom.bodyid[0])):
+            raise ValueError(f"{wheel!r} must belong to a body that moves by a joint")
         board["geom"][k], board["body"][k], board["ground"][k] = geom.id, geom.bodyid[0], plane.id
         board["radius"][k] = geom.size[0]

@@ -43,6 +43,7 @@ _CALLED = {
     "mj_fwdActuation": "const mjModel * | mjData *",
     "mj_fwdAcceleration": "const mjModel * | mjData *",
 }
+_OPTIONS = ("disableflags", "enableflags", "solver", "noslip_iterations")
 _PRE_CONTACT = {"dist": 0, "pos": 8, "normal": 32, "tangent": 56}
 # Two spheres sunk into a plane; raised by 1 m they have no contacts.
 _PROBE = """<mujoco><option cone="elliptic"/><worldbody><geom type="plane" size="0 0 1"/>
@@ -60,11 +61,15 @@ class Layout:
         Offset by name of the fields of `mjData` and of `mjContact`.
     contact_size : int
         Size of `mjContact`.
+    solutions, inverses : int
+        Offsets of `mjData`'s counters of solutions, those of inverse dynamics included, and of inverse dynamics.
     """
 
     data: dict[str, int]
     contact: dict[str, int]
     contact_size: int
+    solutions: int
+    inverses: int
 
 
 def _layout_error(what: str) -> EngineError:
@@ -122,6 +127,10 @@ def _check_state(layout: Layout, data: mujoco.MjData) -> None:
     for name in ("ncon", "nefc"):
         if ctypes.c_int.from_address(base + layout.data[name]).value != getattr(data, name):
             raise _layout_error(name)
+    for name, offset in (("CONSTRAINT", layout.solutions), ("INVERSE", layout.inverses)):
+        number = data.timer[int(getattr(mujoco.mjtTimer, f"mjTIMER_{name}"))].number
+        if not 0 < number == ctypes.c_int.from_address(base + offset).value:
+            raise _layout_error("its counters")
     views = {"qpos": data.qpos, "qvel": data.qvel, "geom_xpos": data.geom_xpos}
     if data.nefc:
         views |= {
@@ -129,6 +138,9 @@ def _check_state(layout: Layout, data: mujoco.MjData) -> None:
             "efc_KBIP": data.efc_KBIP,
             "efc_R": data.efc_R,
             "efc_type": data.efc_type,
+            "efc_vel": data.efc_vel,
+            "efc_pos": data.efc_pos,
+            "efc_margin": data.efc_margin,
             "contact": data.contact.dist,
         }
     for name, view in views.items():
@@ -140,6 +152,29 @@ def _check_state(layout: Layout, data: mujoco.MjData) -> None:
             raise _layout_error(f"a contact's {name}")
         if view.strides[0] != layout.contact_size:
             raise _layout_error("its contacts")
+
+
+def find_options(model: mujoco.MjModel) -> dict[str, int]:
+    """Return the addresses of a model's options that blocks watch, by name.
+
+    Raises
+    ------
+    EngineError
+        If this version of MuJoCo has another layout than it describes.
+    """
+    offsets = _structure_layout("mjOption")[0]
+    base = model.opt.gravity.ctypes.data - offsets["gravity"]
+    found = {name: base + offsets[name] for name in _OPTIONS}
+    for name, address in found.items():
+        if ctypes.c_int.from_address(address).value != getattr(model.opt, name):
+            raise _layout_error(f"the option {name}")
+    return found
+
+
+def _find_counter(name: str) -> int:
+    """Return the offset in `mjData` of the number of calls that a timer has counted."""
+    fields, size, _ = _structure_layout("mjTimerStat")
+    return _structure_layout("mjData")[0]["timer"] + size * int(getattr(mujoco.mjtTimer, name)) + fields["number"]
 
 
 @cache
@@ -154,7 +189,13 @@ def find_layout() -> Layout:
     try:
         _check_functions()
         contact, contact_size, _ = _structure_layout("mjContact")
-        layout = Layout(_structure_layout("mjData")[0], contact, contact_size)
+        layout = Layout(
+            data=_structure_layout("mjData")[0],
+            contact=contact,
+            contact_size=contact_size,
+            solutions=_find_counter("mjTIMER_CONSTRAINT"),
+            inverses=_find_counter("mjTIMER_INVERSE"),
+        )
         with callbacks_set_aside():
             model = mujoco.MjModel.from_xml_string(_PROBE)
             if not model._address:
@@ -163,7 +204,11 @@ def find_layout() -> Layout:
                 data = mujoco.MjData(model)
                 data.qpos[[2, 9]] += height
                 mujoco.mj_forward(model, data)
+                mujoco.mj_inverse(model, data)
                 _check_state(layout, data)
+            # Numbers that no other field has.
+            model.opt.disableflags, model.opt.enableflags, model.opt.noslip_iterations = 21, 5, 37
+            find_options(model)
     except (AttributeError, KeyError) as error:
         raise EngineError(f"MuJoCo {mujoco.__version__} describes itself otherwise than 4.0: {error}") from error
     return layout

@@ -59,7 +59,7 @@ def _make_eigenvalue_columns(study: BicycleStudy) -> list[Column]:
         cells = []
         for k in places:
             values = [study.followed[k, c] for c, name in enumerate(study.modes) if name == mode]
-            if len(values) == 2 and _is_complex(values[0]):
+            if len(values) == 2 and _is_complex(values[0]) and values[1] == values[0].conjugate():
                 cells.append(_format_eigenvalue(values[0], sign="±"))
             else:
                 # Capsize and castering may be a pair as well: each then shows its half.

@@ -9,7 +9,7 @@ import numpy as np
 from ...reference.circular import LEAN, REAR_SPEED, STEER
 from ...reference.continuation import sign_changes
 from ...reference.families import FAMILIES, Family, front_rate_slope, trace
-from ...reference.special import SpecialPoint, special_points, straight_motion
+from ...reference.special import SpecialPoint, find_straight_motion, special_points
 from .evidence import LONGEST_PAPER_STEP, OTHER_STEP, Evidence, families_command_line
 from .ledger import LedgerLine, SelfCheck, above, below, claim_line, count_line, figure_line, source, untestable_line
 from .limits import find_limit
@@ -132,7 +132,9 @@ def _first_family_lines(evidence: Evidence) -> Iterator[LedgerLine]:
         claim="B is the limit speed of upright straight motion",
         thresholds=[below("difference from the published capsize speed", off, 1e-12, "m/s")],
         measured=f"{speed:.14f} m/s, the published capsize speed to {off:.0e}",
-        source=source("speed at which straight motion's capsize eigenvalue is zero", straight_motion, command=_COMMAND),
+        source=source(
+            "speed at which straight motion's capsize eigenvalue is zero", find_straight_motion, command=_COMMAND
+        ),
         checks=[evidence.residual()],
     )
 
@@ -149,7 +151,7 @@ def _straight_motion_lines(evidence: Evidence, number: int, name: str) -> Iterat
     claim = f"{name}: front rate"
     solved = source(
         "straight motion whose capsize eigenvalue is zero, and the limit of the family's large circles",
-        straight_motion,
+        find_straight_motion,
         trace,
         command=_COMMAND,
     )

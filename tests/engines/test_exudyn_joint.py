@@ -174,8 +174,13 @@ def body(mbs: Any) -> Any:
     ("change", "complaint"),
     [
         ({"bodyNumbers": []}, "at least one wheel in bodyNumbers"),
+        ({"bodyNumbers": 0}, "must be a list, also of a single wheel"),
         ({"surface": None}, "takes a surface"),
+        ({"surface": "plane"}, "surface is 'plane'; a rolling joint takes a surface"),
+        ({"surface": Plane}, "takes a surface of velodrome.reference.surface, such as Plane()"),
         ({"discRadius": 0.0}, "radius is a positive number"),
+        ({"discRadius": "0.2 m"}, "radius is a positive number"),
+        ({"discRadius": [0.2, 0.2, 0.2]}, "one radius for all wheels, or one for each of 2"),
         ({"discRadius": [0.2, np.nan]}, "radius"),
         ({"axisVector": [0, 0, 0]}, "not all zero"),
         ({"newmarkRatio": 0.0}, "about 0.5"),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from velodrome.engines.engine import EngineError
-from velodrome.engines.mujoco.compiled import DEPENDENT, solve_rows
+from velodrome.engines.mujoco.compiled import INDEPENDENT, solve_dependent_rows, solve_independent_rows
 from velodrome.engines.rolling import observe_wheel
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "examples" / "rolling"))
@@ -73,6 +73,35 @@ def test_contradicting_rows_are_seen() -> None:
     whole = replace(cart, wheels=tuple(replace(wheel, constrained=(True, True, True)) for wheel in cart.wheels))
     with pytest.raises(EngineError, match="constraints of rolling contradict each other"):
         RIDES.ride_vehicle(whole, 0.01, 0.001, "forces", samples=1)
+
+
+def make_toe(angle: float) -> Any:
+    """Return the tricycle with all wheels held laterally and the right axle turned by an angle [rad]."""
+    vehicle = VEHICLES.make_tricycle()
+    number, turn = vehicle.number("right"), VEHICLES.rotation_about(np.array([0.0, 0.0, 1.0]), angle)
+    bodies, hinges = list(vehicle.bodies), list(vehicle.hinges)
+    bodies[number] = replace(bodies[number], rotation=bodies[number].rotation @ turn)
+    hinges = [replace(h, axis=bodies[number].rotation[:, 1]) if h.body == "right" else h for h in hinges]
+    wheels = tuple(replace(wheel, constrained=(True, True, True)) for wheel in vehicle.wheels)
+    return replace(vehicle, wheels=wheels, bodies=tuple(bodies), hinges=tuple(hinges))
+
+
+@pytest.mark.parametrize("angle", [1e-7, 1e-5, 1e-3])
+def test_axles_that_nearly_agree_are_refused_by_name(angle) -> None:
+    """The right wheel's lateral direction turns by the angle, and the wheel's acceleration across it remains."""
+    with pytest.raises(EngineError, match=r"contradict each other by .* on the wheels 'left', 'right'") as error:
+        RIDES.ride_vehicle(make_toe(angle), 0.1, 0.001, "forces", samples=1)
+    share = float(str(error.value).split(" by ")[1].split()[0])
+    # A share of accelerations of about its own size, and no more than the angle.
+    assert angle / 30 < share < angle
+
+
+def test_axles_that_agree_but_for_round_off_roll() -> None:
+    """An angle of 1e-10 moves the vehicle by as much of its way, and no force by more than its share."""
+    found, expected = (RIDES.ride_vehicle(make_toe(angle), 0.5, 0.001, "forces", samples=5) for angle in (1e-10, 0.0))
+    assert found.standing
+    np.testing.assert_allclose(found.position, expected.position, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.force, expected.force, rtol=0, atol=1e-8 * find_weight(make_toe(0.0)))
 
 
 @pytest.mark.parametrize("name", ["cart", "tandem"])
@@ -151,12 +180,25 @@ def make_rows(scales: list[float]) -> tuple[np.ndarray, np.ndarray]:
     return rows @ rows.T, rows
 
 
+def test_cost_of_forces_decides_which_are_the_smallest() -> None:
+    schur, rows = make_rows([1.0] * 5)
+    target, cost = rows @ np.ones(8), np.array([1.0, 4.0, 0.5, 2.0, 9.0])
+    found = target.copy()
+    solve_dependent_rows(schur, found, cost, np.empty((2, 5)))
+    root = np.sqrt(cost)
+    least = np.linalg.lstsq(schur / root, target, rcond=1e-10)[0] / root
+    np.testing.assert_allclose(found, least, rtol=0, atol=1e-10 * np.abs(least).max())
+
+
 @pytest.mark.parametrize("scales", [[1.0] * 5, [1.0, 1e3, 1e-3, 1e2, 1.0]])
 def test_redundant_rows_have_the_smallest_forces(scales) -> None:
     schur, rows = make_rows(scales)
     target = rows @ np.random.default_rng(2).normal(size=8)
     found = target.copy()
-    assert solve_rows(schur, found, 5) < 1e-12
+    assert not solve_independent_rows(schur, found, 5)
+    residual, dependence = solve_dependent_rows(schur, found, np.diag(schur).copy(), np.empty((2, 5)))
+    assert residual < 1e-12 * np.abs(target).max()
+    assert dependence == 0
     np.testing.assert_allclose(schur @ found, target, rtol=0, atol=1e-12 * np.abs(target).max())
     # Of all solutions the least in sqrt(S_ii) F_i: a least-squares problem without a weight.
     weight = np.sqrt(np.diag(schur))
@@ -168,14 +210,33 @@ def test_contradicting_rows_leave_a_residual() -> None:
     schur, rows = make_rows([1.0] * 5)
     target = rows @ np.ones(8)
     target[4] += 1e-3 * np.abs(target).max()
-    assert solve_rows(schur, target, 5) > 1e-4
+    share = np.empty((2, 5))
+    residual, dependence = solve_dependent_rows(schur, target, np.ones(5), share)
+    assert residual > 1e-4 * np.abs(target).max()
+    assert dependence == 0
+    # Row 4 is row 2 again: these two contradict each other, and no other.
+    np.testing.assert_allclose(share[0, [0, 1, 3]], 0, atol=1e-12 * share[0].max())
 
 
 def test_independent_rows_are_solved_directly() -> None:
     rows = np.random.default_rng(3).normal(size=(4, 8))
     schur, target = rows @ rows.T, np.arange(1.0, 5.0)
     found = target.copy()
-    assert solve_rows(schur, found, 4) == 0.0
-    assert np.linalg.det(schur / np.diag(schur)) > DEPENDENT
+    assert solve_independent_rows(schur, found, 4)
+    assert np.linalg.det(schur / np.diag(schur)) > INDEPENDENT
     condition = np.linalg.cond(schur)
     np.testing.assert_allclose(found, np.linalg.solve(schur, target), rtol=10 * condition * ROUND_OFF)
+
+
+@pytest.mark.parametrize("angle", [1e-5, 1e-4, 1e-3])
+def test_nearly_dependent_rows_are_told_and_have_no_large_forces(angle) -> None:
+    """Two rows at an angle have the eigenvalue 1 - cos(angle) of their Gram matrix; which force parts them is moot."""
+    rows = np.array([[1.0, 0.0], [np.cos(angle), np.sin(angle)]])
+    schur, target, share = rows @ rows.T, np.array([1.0, 1.0 + 0.5 * angle]), np.empty((2, 2))
+    assert not solve_independent_rows(schur, target.copy(), 2)
+    residual, dependence = solve_dependent_rows(schur, target, np.ones(2), share)
+    # The entries of the matrix are rounded.
+    np.testing.assert_allclose(dependence, 1 - np.cos(angle), rtol=0, atol=10 * ROUND_OFF)
+    np.testing.assert_allclose(residual, 0.25 * angle, rtol=1e-3)
+    np.testing.assert_allclose(share[1], 0.5, rtol=1e-9)
+    np.testing.assert_allclose(target, 0.5, atol=angle)

@@ -143,3 +143,23 @@ def test_a_family_that_a_bicycle_does_not_have_ends_in_a_fold() -> None:
 def test_a_search_that_finds_nothing_says_how_it_searched() -> None:
     with pytest.raises(ValueError, match=r"the nearest is at .*; searched were Newton's method from there"):
         find_motion(Bicycle(), Plane(), 1.0, near=(1.0, 3.0))
+
+
+def test_a_small_wheel_may_turn_fast() -> None:
+    """A front wheel of 50 mm turns at 200 rad/s where the bicycle rides at 10 m/s; no curve is cut there."""
+    bicycle = replace(
+        Bicycle(),
+        wheelbase=1.9,
+        front_wheel_radius=0.05,
+        front_wheel_mass=0.3,
+        front_wheel_Ixx=0.0002,
+        front_wheel_Iyy=0.0004,
+        front_frame_x=1.8,
+        front_frame_z=0.5,
+    )
+    curves, _ = trace_all(bicycle, Paraboloid(0.005), 0.1)
+    assert all(curve.numbers for curve in curves)
+    assert min(len(curve.points) for curve in curves) > 20
+    number, motion = find_motion(bicycle, Paraboloid(0.005), 40.0, 1)
+    assert (number, find_motion(bicycle, Paraboloid(0.005), 40.0, near=(motion.lean, motion.steer))[0]) == (1, 1)
+    assert abs(motion.front_rate) > 200

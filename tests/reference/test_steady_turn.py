@@ -8,14 +8,38 @@ import numpy as np
 import pytest
 
 from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.bowls import Sphere
 from velodrome.reference.families import find_motion
-from velodrome.reference.missing_motion import NoSuchMotion
+from velodrome.reference.missing_motion import NoSuchMotion, SearchFailed
+from velodrome.reference.special import find_straight_motion
 from velodrome.reference.stability import free_eigenvalues, growth_rate, linearise
 from velodrome.reference.steady_turn import make_straight_motion, solve_steady_turn
 from velodrome.reference.surface import Paraboloid, Plane
 from velodrome.reference.upright import canonical_matrices, capsize_speed, stable_speeds
 
 MASSLESS = {f"{wheel}_wheel_{what}": 0.0 for wheel in ("rear", "front") for what in ("mass", "Ixx", "Iyy")}
+# Two masses on two wheels of a millionth of a kilogram, without trail (Kooijman et al. 2011).
+SKATE = Bicycle(
+    wheelbase=1.0,
+    trail=0.0,
+    steer_axis_tilt=np.pi / 36,
+    rear_wheel_radius=0.1,
+    rear_wheel_mass=1e-6,
+    rear_wheel_Ixx=5e-9,
+    rear_wheel_Iyy=1e-8,
+    rear_frame_x=1.2,
+    rear_frame_z=0.4,
+    rear_frame_mass=10.0,
+    front_frame_x=1.02,
+    front_frame_z=0.2,
+    front_frame_mass=1.0,
+    front_wheel_radius=0.1,
+    front_wheel_mass=1e-6,
+    front_wheel_Ixx=5e-9,
+    front_wheel_Iyy=1e-8,
+    **{f"{frame}_frame_I{axis}{axis}": 1e-6 for frame in ("rear", "front") for axis in "xyz"},
+    **{f"{frame}_frame_Ixz": 0.0 for frame in ("rear", "front")},
+)
 BICYCLES = {
     "benchmark": Bicycle(),
     "trail": replace(Bicycle(), trail=0.2),
@@ -43,6 +67,58 @@ def test_straight_motion_has_the_eigenvalues_and_the_verdict_of_the_linear_equat
     assert growth_rate(Plane(), values, 0.0) == pytest.approx(expected.real.max(), abs=1e-9)
     stable = any(low < speed < high for low, high in stable_speeds(matrices))
     assert (growth_rate(Plane(), values, 0.0) < 0) == stable
+
+
+@pytest.mark.parametrize("near", [(0.0, -np.pi + 0.01), (2 * np.pi, np.pi), (0.0, 3 * np.pi)])
+def test_angles_count_without_whole_turns(near: tuple[float, float]) -> None:
+    number, motion = find_motion(Bicycle(), Plane(), 15.0, near=near)
+    assert (number, motion.steer, motion.yaw_rate) == (None, np.pi, 0.0)
+
+
+@pytest.mark.parametrize(("surface", "rate"), [(Plane(), 20.08), (Paraboloid(0.005), 18.0)])
+def test_a_mirror_image_belongs_to_the_same_family(surface: Plane | Paraboloid, rate: float) -> None:
+    number, motion = find_motion(Bicycle(), surface, rate, 1)
+    again, image = find_motion(Bicycle(), surface, rate, near=(-motion.lean, -motion.steer))
+    assert (again, image.lean, image.steer, image.yaw_rate) == (number, -motion.lean, -motion.steer, -motion.yaw_rate)
+    reduced = linearise(Bicycle(), surface, *image.state())
+    assert np.abs(reduced.field).max() < 1e-9
+    np.testing.assert_allclose(
+        reduced.eigenvalues, linearise(Bicycle(), surface, *motion.state()).eigenvalues, atol=1e-9
+    )
+
+
+def test_nearly_straight_motion_in_a_bowl_is_not_denied() -> None:
+    """Circles of more than a kilometre are not searched; here there is one of 1.1 km."""
+    with pytest.raises(SearchFailed, match="on circles of up to 1000 m"):
+        find_motion(Bicycle(), Paraboloid(1e-6), 20.0808, near=(0.0, 0.0))
+    with pytest.raises(NoSuchMotion):
+        find_motion(Bicycle(), Sphere(20.0), 5.0, near=(0.0, 0.0))
+
+
+def test_fast_motion_is_not_denied() -> None:
+    """Curves are followed up to 200 rad/s of both wheels together."""
+    for family, near in ((2, None), (None, (1.2, 3.0))):
+        with pytest.raises(SearchFailed, match="whose wheels turn faster than 200 rad/s together were not searched"):
+            find_motion(Bicycle(), Paraboloid(0.005), 500.0, family, near)
+    with pytest.raises(NoSuchMotion):
+        find_motion(Bicycle(), Paraboloid(0.005), 10.0, 2)
+
+
+@pytest.mark.parametrize(("trail", "branches"), [(0.08, True), (-0.1, False)])
+def test_circles_branch_off_straight_motion_at_the_capsize_speed(trail: float, branches: bool) -> None:
+    bicycle = replace(Bicycle(), trail=trail)
+    speed, point = capsize_speed(canonical_matrices(bicycle)), find_straight_motion(bicycle, "B", 0.0)
+    assert (point is not None) == (speed is not None) == branches
+    if point is not None and speed is not None:
+        assert point.rear_rate * bicycle.rear_wheel_radius == pytest.approx(speed, rel=1e-11)
+
+
+def test_a_capsize_speed_of_kilometres_a_second_is_found() -> None:
+    speed, point = capsize_speed(canonical_matrices(SKATE)), find_straight_motion(SKATE, "B", 0.0)
+    assert speed is not None
+    assert speed > 1000.0
+    assert point is not None
+    assert point.rear_rate * SKATE.rear_wheel_radius == pytest.approx(speed, rel=1e-7)
 
 
 @pytest.mark.parametrize("bicycle", BICYCLES.values(), ids=BICYCLES)
@@ -104,6 +180,6 @@ def test_no_large_circle_is_made_up_where_there_is_none(excess: float) -> None:
 
 def test_no_motion_is_straight_in_a_bowl() -> None:
     with pytest.raises(
-        NoSuchMotion, match=r"no motion is straight on ground that is not level; the nearest is at -0\.3"
+        SearchFailed, match=r"no motion is straight on ground that is not level; the nearest is at -0\.3"
     ):
         find_motion(Bicycle(), Paraboloid(0.005), 19.0, near=(0.0, 0.0))

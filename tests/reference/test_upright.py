@@ -97,6 +97,25 @@ def test_modes_are_followed_by_continuity() -> None:
     assert np.all(np.real(values[1:, 3]) < np.real(values[1:, 2]))
 
 
+@pytest.mark.parametrize(
+    "bicycle",
+    [
+        # Without tilt and trail a root of weave and that of capsize meet, and oscillate at low speeds.
+        replace(Bicycle(), steer_axis_tilt=0.0, trail=0.0),
+        replace(Bicycle(), front_frame_mass=0.0, **{f"front_frame_I{axes}": 0.0 for axes in ("xx", "yy", "zz", "xz")}),
+        Bicycle(),
+    ],
+)
+def test_no_pair_of_eigenvalues_is_divided_between_modes(bicycle: Bicycle) -> None:
+    matrices, speeds = canonical_matrices(bicycle), np.linspace(0.0, 10.0, 101)
+    followed, names = name_modes(matrices, speeds)
+    assert list(names) == ["weave", "weave", "capsize", "castering"]
+    np.testing.assert_array_equal(np.sort_complex(followed), np.sort_complex(matrices.eigenvalues(speeds)))
+    for pair in (followed[:, :2], followed[:, 2:]):
+        oscillates = np.abs(np.imag(pair)).max(axis=1) > 1e-6 * np.abs(pair).max(axis=1)
+        assert np.array_equal(pair[oscillates, 1], pair[oscillates, 0].conj())
+
+
 def test_deviations_of_the_speeds_are_those_of_a_sample() -> None:
     deviations = {"trail": 2e-4, "rear_frame_z": 2e-3, "rear_frame_Ixz": 0.02, "gravity": 0.01}
     found = speed_deviations(Bicycle(), deviations)

@@ -17,6 +17,7 @@ MEASURED: dict[str, Any] = {
     "not_finite": [],
     "radius_drift_rate": -1.23e-5,
     "energy_drift": 6.2e-8,
+    "energy_drift_rate": 3e-9,
     "max_slip": 3.1e-12,
     "cpu_time": 0.24,
     "required_friction": 0.7,
@@ -30,7 +31,7 @@ MEASURED: dict[str, Any] = {
     "ended": None,
     "horizon": None,
 }
-ALONE = dict.fromkeys(MEASURED) | {"energy_drift": 8e-14, "cpu_time": 0.01}
+ALONE = dict.fromkeys(MEASURED) | {"energy_drift": 8e-14, "energy_drift_rate": 1e-14, "cpu_time": 0.01}
 
 
 def text(growth_rate: float = -0.4, **changes: Any) -> str:
@@ -86,6 +87,7 @@ def test_no_news_is_no_remark() -> None:
             ["exudyn: its ride equals the reference's to the last bit, so nothing was compared"],
         ),
         ({"horizon": 7.25}, ["exudyn", "7.25 s", "instability"]),
+        ({"energy_drift_rate": None}, ["exudyn: its energy drift is no more than 6.2e-08, the error of the damping's"]),
         ({"contact_force_error_at": 0.0}, ["exudyn", "first sample"]),
     ],
 )
