@@ -1,4 +1,4 @@
-"""Contacts of knife-edge wheels with the ground in JAX, and how they move: the equations of `reference.kernels.contact`.
+"""Contacts of knife-edge wheels with the ground in JAX: the equations of `velodrome.reference.kernels.contact`.
 
 A wheel of centre c, axle y and radius r touches the ground at its rim point c + d, d = r e(a), closest to the surface
 point u = (xi, eta, f). With axes x (level) and z of the wheel's plane, e = -sin(a) x - cos(a) z and t = de/da,
