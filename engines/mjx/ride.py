@@ -65,6 +65,9 @@ def _make_ride(setup: MjxSetup, given_tree: Any, data_tree: Any) -> Any:
     def advance(given: list[Any], leaves: list[Any], counts: Any) -> Any:
         model, inputs = jax.tree.unflatten(given_tree, given)
         data = jax.tree.unflatten(data_tree, leaves)
+        if setup.planes:
+            # For the first step; later ones find them in place.
+            data, _ = native.place_mjx_planes(setup, model, inputs, data)
 
         def is_fit(now: Progression) -> Any:
             return now.standing & now.finite & (now.worst <= WRONG)
