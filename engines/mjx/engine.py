@@ -13,6 +13,7 @@ from typing import Any, Generic, TypeVar
 from ..engine import Problem, Progress, Trajectory, package_version
 from ..mujoco.engine import GIVES, assemble_trajectory, step_counts
 from .ground import choose_height
+from .process import process_kept
 from .settings import ArraySettings, MjxMultiplierSettings, MjxSettings
 
 S = TypeVar("S", bound=ArraySettings)
@@ -75,7 +76,8 @@ class MjxEngine(Generic[S]):
             If the model is refused, a wheel has no contact point at the start, or the contact solver fails there.
         """
         counts = step_counts(problem.times, settings.step)
-        from .ride import ride_in_mjx
+        with process_kept():
+            from .ride import ride_in_mjx
 
         ridden = ride_in_mjx(problem, settings, counts, progress)
         return assemble_trajectory(self.name, self.version, problem, settings, ridden)

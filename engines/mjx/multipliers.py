@@ -17,28 +17,24 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from mujoco import mjx
+from mujoco.mjx._src.smooth import solve_m
+from mujoco.mjx._src.support import jac_dot
 
 from .contact import find_rim_contact
-from .library import jac_dot, mjx, solve_m
-from .native import measure_energies
-from .setup import MjxInputs, MjxSample, MjxSetup, StepReport
+from .setup import MjxInputs, MjxSetup, StepReport
 
-# Stages of the classical Runge-Kutta method: where each is evaluated, and its weight.
-_STAGES = ((0.0, 1 / 6), (1 / 2, 1 / 3), (1 / 2, 1 / 3), (1.0, 1 / 6))
+# The classical Runge-Kutta method: of the rates before, those that lead to stages two to four and to the new state.
+_TABLEAU = (
+    (1 / 2, 0.0, 0.0, 0.0),
+    (0.0, 1 / 2, 0.0, 0.0),
+    (0.0, 0.0, 1.0, 0.0),
+    (1 / 6, 1 / 3, 1 / 3, 1 / 6),
+)
 
 
-def roll(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any) -> tuple[Any, Any, Any, Any]:
-    """Evaluate the dynamics under the forces of rolling.
-
-    Returns
-    -------
-    data : mjx.Data
-        The evaluated state, without the forces of the ground.
-    acceleration : array, shape (9,)
-    force : array, shape (2, 3)
-        Forces of the ground on the wheels, inertial axes [N].
-    standing : array, shape ()
-    """
+def roll(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any) -> tuple[Any, StepReport]:
+    """Evaluate the dynamics under the forces of rolling; ``qacc`` of the data is the acceleration under them."""
     data = mjx.forward(model, data)
     rows, biases, standing = [], [], jnp.array(True)
     for k, body in enumerate(setup.wheels):
@@ -62,7 +58,8 @@ def roll(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any) -> tuple[Any
     jacobian, bias = jnp.concatenate(rows), jnp.concatenate(biases)
     softness = jax.vmap(lambda row: solve_m(model, data, row))(jacobian)
     force = -jnp.linalg.solve(jacobian @ softness.T, jacobian @ data.qacc_smooth + bias)
-    return data, data.qacc_smooth + force @ softness, force.reshape(2, 3), standing
+    report = StepReport(force.reshape(2, 3), standing, jnp.zeros_like(force[0]))
+    return data.replace(qacc=data.qacc_smooth + force @ softness), report
 
 
 def _position_rate(qpos: Any, qvel: Any) -> Any:
@@ -75,36 +72,29 @@ def _position_rate(qpos: Any, qvel: Any) -> Any:
     return jnp.concatenate([qvel[:3], 0.5 * turn, qvel[6:]])
 
 
-def step_rolling(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any) -> tuple[Any, StepReport]:
-    """Take a step of the classical Runge-Kutta method."""
-    step, start = model.opt.timestep, (data.qpos, data.qvel)
+def step_rolling(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any, first: Any) -> tuple[Any, StepReport]:
+    """Take a step of the classical Runge-Kutta method from an evaluated state, and evaluate the new one.
+
+    Parameters and results are those of `velodrome.engines.mjx.native.step_on_planes`.
+    """
+    start, step = (data.qpos, data.qvel), model.opt.timestep
 
     def take_stage(carry: Any, stage: Any) -> tuple[Any, Any]:
-        (before, total), (node, weight) = carry, stage
-        qpos, qvel = (at + step * node * rate for at, rate in zip(start, before, strict=True))
-        _, acceleration, _, standing = roll(setup, model, inputs, data.replace(qpos=qpos, qvel=qvel))
-        rates = (_position_rate(qpos, qvel), acceleration)
-        return (rates, tuple(add + weight * rate for add, rate in zip(total, rates, strict=True))), standing
+        (data, rates), (weights, number) = carry, stage
+        now = (_position_rate(data.qpos, data.qvel), data.qacc)
+        rates = tuple(known.at[number].set(rate) for known, rate in zip(rates, now, strict=True))
+        qpos, qvel = (
+            jnp.where(first, at, at + step * (weights @ known)) for at, known in zip(start, rates, strict=True)
+        )
+        # The kinematics take a quaternion of any length; the new state's is a unit again.
+        quaternion = qpos[3:7]
+        unit = quaternion / jnp.sqrt(quaternion @ quaternion)
+        qpos = qpos.at[3:7].set(jnp.where(first | (number < 3), quaternion, unit))
+        data, report = roll(setup, model, inputs, data.replace(qpos=qpos, qvel=qvel))
+        return (data, rates), report
 
-    still = tuple(jnp.zeros_like(at) for at in start)
-    stages = tuple(jnp.array(column, data.qpos.dtype) for column in zip(*_STAGES, strict=True))
-    (_, mean), standing = jax.lax.scan(take_stage, (still, still), stages)
-    qpos, qvel = (at + step * rate for at, rate in zip(start, mean, strict=True))
-    quaternion = qpos[3:7]
-    qpos = qpos.at[3:7].set(quaternion / jnp.sqrt(quaternion @ quaternion))
-    return data.replace(qpos=qpos, qvel=qvel), StepReport(jnp.all(standing), jnp.zeros_like(step))
-
-
-def sample_rolling(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any) -> tuple[MjxSample, StepReport]:
-    """Evaluate everything at the state."""
-    data, _, force, standing = roll(setup, model, inputs, data)
-    bodies = jnp.array(setup.bodies)
-    sample = MjxSample(
-        qpos=data.qpos,
-        qvel=data.qvel,
-        position=data.xipos[bodies],
-        quaternion=data.xquat[bodies],
-        force=force,
-        energy=measure_energies(model, data),
-    )
-    return sample, StepReport(standing, jnp.zeros_like(data.qpos[0]))
+    rates = tuple(jnp.zeros((4, *at.shape), at.dtype) for at in start)
+    stages = (jnp.array(_TABLEAU, data.qpos.dtype), jnp.arange(4))
+    (data, _), reports = jax.lax.scan(take_stage, (data, rates), stages)
+    last = StepReport(*(values[-1] for values in reports))
+    return data, last._replace(standing=jnp.all(reports.standing))

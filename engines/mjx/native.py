@@ -8,11 +8,20 @@ from __future__ import annotations
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
+from mujoco import mjx
+from mujoco.mjx._src.smooth import solve_m
+from mujoco.mjx._src.support import contact_force
 
 from .contact import RimContact, find_rim_contact
-from .library import contact_force, mjx, solve_m
-from .setup import MjxInputs, MjxSample, MjxSetup, StepReport
+from .setup import MjxInputs, MjxSetup, StepReport
+
+_INTEGRATORS = {
+    mjx.IntegratorType.EULER: mjx.euler,
+    mjx.IntegratorType.IMPLICITFAST: mjx.implicit,
+    mjx.IntegratorType.RK4: mjx.rungekutta4,
+}
 
 
 def find_wheel_contacts(setup: MjxSetup, inputs: MjxInputs, data: Any) -> list[RimContact]:
@@ -23,8 +32,8 @@ def find_wheel_contacts(setup: MjxSetup, inputs: MjxInputs, data: Any) -> list[R
     ]
 
 
-def place_mjx_planes(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any) -> tuple[Any, Any]:
-    """Move the planes to the tangent planes below the wheels; return the data and whether both wheels stand."""
+def place_mjx_planes(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any) -> Any:
+    """Move the planes to the tangent planes below the wheels; return the data."""
     here = find_wheel_contacts(setup, inputs, mjx.kinematics(model, data))
     position, quaternion = data.mocap_pos, data.mocap_quat
     for plane, contact in zip(setup.planes, here, strict=True):
@@ -32,21 +41,33 @@ def place_mjx_planes(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any) 
         length = jnp.sqrt(2 * (1 + z))
         turn = jnp.stack([(1 + z) / length, -y / length, x / length, jnp.zeros_like(z)])
         position, quaternion = position.at[plane].set(contact.foot), quaternion.at[plane].set(turn)
-    data = data.replace(mocap_pos=position, mocap_quat=quaternion)
-    return data, here[0].standing & here[1].standing
+    return data.replace(mocap_pos=position, mocap_quat=quaternion)
 
 
-def step_on_planes(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any) -> tuple[Any, StepReport]:
-    """Take a step of MJX with the planes where they are, and place them for the next one."""
-    data = mjx.step(model, data)
-    residual = measure_residual(model, data)
+def step_on_planes(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any, first: Any) -> tuple[Any, StepReport]:
+    """Take a step of MJX from an evaluated state, and evaluate the new one.
+
+    The order of `mjx.step` is turned round, so that what is sampled at a state is what the next step starts from.
+
+    Parameters
+    ----------
+    setup, model, inputs
+    data : mjx.Data
+    first : array, shape ()
+        Whether the state is not evaluated yet: then it is, and no step is taken.
+    """
+    integrate = _INTEGRATORS[model.opt.integrator]
+    data = jax.tree.map(lambda before, after: jnp.where(first, before, after), data, integrate(model, data))
     if setup.planes:
-        data, standing = place_mjx_planes(setup, model, inputs, data)
-    else:
-        # The poses are those before the step; the planes of the next one need no others.
-        here = find_wheel_contacts(setup, inputs, data)
-        standing = here[0].standing & here[1].standing
-    return data, StepReport(standing, residual)
+        data = place_mjx_planes(setup, model, inputs, data)
+    data = mjx.forward(model, data)
+    here = find_wheel_contacts(setup, inputs, data)
+    report = StepReport(
+        force=jnp.stack([contact_force(model, data, k, to_world_frame=True)[:3] for k in range(2)]),
+        standing=here[0].standing & here[1].standing,
+        residual=measure_residual(model, data),
+    )
+    return data, report
 
 
 def measure_residual(model: Any, data: Any) -> Any:
@@ -61,31 +82,3 @@ def measure_residual(model: Any, data: Any) -> Any:
     gradient = mjx.mul_m(model, data, data.qacc - data.qacc_smooth) - data.qfrc_constraint
     scale = jnp.maximum(data.qacc_smooth @ data.qfrc_smooth, square(data.qfrc_constraint))
     return jnp.sqrt(square(gradient) / jnp.where(scale > 0, scale, 1))
-
-
-def measure_energies(model: Any, data: Any) -> Any:
-    """Return the potential and the kinetic energy (2,) of the last evaluation's state."""
-    potential = -jnp.sum(model.body_mass[:, None] * data.xipos * model.opt.gravity)
-    return jnp.stack([potential, 0.5 * data.qvel @ mjx.mul_m(model, data, data.qvel)])
-
-
-def sample_on_planes(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any) -> tuple[MjxSample, StepReport]:
-    """Evaluate everything at the state, as the next step will, and leave the state as it is."""
-    if setup.planes:
-        data, standing = place_mjx_planes(setup, model, inputs, data)
-        data = mjx.forward(model, data)
-    else:
-        data = mjx.forward(model, data)
-        here = find_wheel_contacts(setup, inputs, data)
-        standing = here[0].standing & here[1].standing
-    force = jnp.stack([contact_force(model, data, k, to_world_frame=True)[:3] for k in range(2)])
-    bodies = jnp.array(setup.bodies)
-    sample = MjxSample(
-        qpos=data.qpos,
-        qvel=data.qvel,
-        position=data.xipos[bodies],
-        quaternion=data.xquat[bodies],
-        force=force,
-        energy=measure_energies(model, data),
-    )
-    return sample, StepReport(standing, measure_residual(model, data))

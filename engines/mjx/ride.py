@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from mujoco import mjx
 
 from ...reference.kinematics import WHEELS
 from ..engine import EngineError, Problem, Progress
@@ -16,16 +17,13 @@ from ..mujoco.ride import Recording, RideState, bodies, set_start
 from ..mujoco.settings import WRONG
 from . import multipliers, native
 from .ground import choose_height
-from .library import mjx
 from .settings import ArraySettings, MjxMultiplierSettings, MjxSettings
-from .setup import MjxInputs, MjxSample, MjxSetup
+from .setup import MjxInputs, MjxSetup, StepReport
 
 # Numbers beyond this are a failure, as MuJoCo's own mjMAXVAL says.
 _HUGE = 1e10
 _STEPS = {"contacts": native.step_on_planes, "multipliers": multipliers.step_rolling}
-_SAMPLES = {"contacts": native.sample_on_planes, "multipliers": multipliers.sample_rolling}
-
-
+_RECORDED = ("qpos", "qvel", "position", "quaternion", "force", "energy")
 # Outputs of one call of the compiled function: a call takes as long as some outputs.
 _BLOCK = 32
 
@@ -36,19 +34,20 @@ class Progression(NamedTuple):
     Attributes
     ----------
     data : mjx.Data
+    report : StepReport
     steps : array, shape ()
-        Steps taken in the call.
-    standing, finite : array, shape ()
-        Whether both wheels have a contact, and whether the state's numbers are finite and not huge.
+        Steps taken in the call; -1 before the state is evaluated.
+    finite : array, shape ()
+        Whether the state's numbers are finite and not huge.
     worst : array, shape ()
-        Largest relative residual of the contact solver.
+        Largest relative residual of the contact solver in the call.
     unconverged : array, shape ()
-        Number of steps with a residual above the limit.
+        Number of new states in the call with a residual above the limit.
     """
 
     data: Any
+    report: StepReport
     steps: Any
-    standing: Any
     finite: Any
     worst: Any
     unconverged: Any
@@ -60,42 +59,58 @@ def _make_ride(setup: MjxSetup, given_tree: Any, data_tree: Any) -> Any:
     It takes and returns the leaves of JAX's trees. ``given_tree`` is the structure of the model and the inputs,
     ``data_tree`` that of the data.
     """
-    take_step, take_sample = _STEPS[setup.rolling], _SAMPLES[setup.rolling]
+    take_step = _STEPS[setup.rolling]
 
     def advance(given: list[Any], leaves: list[Any], counts: Any) -> Any:
         model, inputs = jax.tree.unflatten(given_tree, given)
-        data = jax.tree.unflatten(data_tree, leaves)
-        if setup.planes:
-            # For the first step; later ones find them in place.
-            data, _ = native.place_mjx_planes(setup, model, inputs, data)
-
-        def is_fit(now: Progression) -> Any:
-            return now.standing & now.finite & (now.worst <= WRONG)
 
         def go_on(now: Progression) -> Progression:
-            data, report = take_step(setup, model, inputs, now.data)
+            first = now.steps < 0
+            data, report = take_step(setup, model, inputs, now.data, first)
             return Progression(
                 data=data,
+                report=report,
                 steps=now.steps + 1,
-                standing=report.standing,
                 finite=_is_finite(data),
                 worst=jnp.maximum(now.worst, report.residual),
-                unconverged=now.unconverged + (report.residual > inputs.converged_below),
+                unconverged=now.unconverged + (~first & (report.residual > inputs.converged_below)),
             )
 
         def reach_output(now: Progression, count: Any) -> tuple[Progression, dict[str, Any]]:
-            now = jax.lax.while_loop(lambda now: is_fit(now) & (now.steps < count), go_on, now)
-            sample, report = take_sample(setup, model, inputs, now.data)
-            # What the sample finds belongs to the step that is not taken yet.
-            now = now._replace(standing=now.standing & report.standing, worst=jnp.maximum(now.worst, report.residual))
-            return now, now._replace(data=None)._asdict() | sample._asdict()
+            def is_going(now: Progression) -> Any:
+                return (now.steps < count) & now.report.standing & now.finite & (now.worst <= WRONG)
 
-        zero, whole = jnp.zeros_like(counts[0]), jnp.array(True)
-        start = Progression(data, zero, whole, _is_finite(data), jnp.zeros_like(inputs.converged_below), zero)
+            now = jax.lax.while_loop(is_going, go_on, now)
+            return now, _sample_state(setup, model, now)
+
+        data, none = jax.tree.unflatten(data_tree, leaves), jnp.zeros_like(counts[0])
+        real = jnp.zeros_like(inputs.converged_below)
+        report = StepReport(jnp.zeros((2, 3), real.dtype), jnp.array(True), real)
+        start = Progression(data, report, none - 1, jnp.array(True), real, none)
         end, found = jax.lax.scan(reach_output, start, counts)
         return jax.tree.leaves(end.data), found
 
     return jax.vmap(advance, in_axes=(None, 0, None)) if setup.batch_size > 1 else advance
+
+
+def _sample_state(setup: MjxSetup, model: Any, now: Progression) -> dict[str, Any]:
+    """Return what is recorded of an evaluated state, by the names of a `Recording`, and how the ride goes."""
+    data, bodies = now.data, jnp.array(setup.bodies)
+    potential = -jnp.sum(model.body_mass[:, None] * data.xipos * model.opt.gravity)
+    kinetic = 0.5 * data.qvel @ mjx.mul_m(model, data, data.qvel)
+    return {
+        "qpos": data.qpos,
+        "qvel": data.qvel,
+        "position": data.xipos[bodies],
+        "quaternion": data.xquat[bodies],
+        "force": now.report.force,
+        "energy": jnp.stack([potential, kinetic]),
+        "standing": now.report.standing,
+        "steps": now.steps,
+        "finite": now.finite,
+        "worst": now.worst,
+        "unconverged": now.unconverged,
+    }
 
 
 _compiled: dict[Any, Any] = {}
@@ -209,7 +224,7 @@ def _record_ride(
         endings = (_find_ending(found, i, (steps + found["steps"][i]) * settings.step) for i in range(len(block)))
         reached, ended = next(((i, why) for i, why in enumerate(endings) if why is not None), (len(block), None))
         last = min(reached, len(block) - 1)
-        for name in MjxSample._fields:
+        for name in _RECORDED:
             getattr(recording, name)[first : first + reached] = found[name][:reached]
         recording.time[first : first + reached] = block[:reached] * settings.step
         samples += reached

@@ -38,6 +38,11 @@ class ArraySettings(StepSettings):
         """Relative round-off of the numbers that it computes with."""
         return _ROUND_OFF[self.precision]
 
+    @property
+    def noise(self) -> float:
+        """Relative error that a step may add beyond its method: a pose is the result of some eight roundings."""
+        return max(super().noise, 4 * self.round_off)
+
     @model_validator(mode="after")
     def _place_is_in_batch(self) -> Self:
         if self.batch_place >= self.batch_size:

@@ -57,35 +57,18 @@ class MjxInputs(NamedTuple):
 
 
 class StepReport(NamedTuple):
-    """What a step tells besides the new state: arrays of JAX.
+    """What a step tells of the new state besides its data: arrays of JAX.
 
     Attributes
     ----------
+    force : array, shape (2, 3)
+        Forces of the ground on the wheels, inertial axes [N].
     standing : array, shape ()
         Whether both wheels have a contact.
     residual : array, shape ()
         Residual of the contact solver, relative to the forces.
     """
 
+    force: Any
     standing: Any
     residual: Any
-
-
-class MjxSample(NamedTuple):
-    """One sample of a ride: arrays of JAX, as in `velodrome.engines.mujoco.ride.Recording`.
-
-    Attributes
-    ----------
-    qpos, qvel : array, shapes (10,), (9,)
-    position, quaternion : array, shapes (4, 3), (4, 4)
-    force : array, shape (2, 3)
-    energy : array, shape (2,)
-        Potential and kinetic energy [J].
-    """
-
-    qpos: Any
-    qvel: Any
-    position: Any
-    quaternion: Any
-    force: Any
-    energy: Any
