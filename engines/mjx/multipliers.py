@@ -22,6 +22,7 @@ from mujoco.mjx._src.smooth import solve_m
 from mujoco.mjx._src.support import jac_dot
 
 from .contact import find_rim_contact
+from .native import are_standing
 from .setup import MjxInputs, MjxSetup, StepReport
 
 # The classical Runge-Kutta method: of the rates before, those that lead to stages two to four and to the new state.
@@ -33,10 +34,13 @@ _TABLEAU = (
 )
 
 
-def roll(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any) -> tuple[Any, StepReport]:
-    """Evaluate the dynamics under the forces of rolling; ``qacc`` of the data is the acceleration under them."""
-    data = mjx.forward(model, data)
-    rows, biases, standing = [], [], jnp.array(True)
+def roll(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any, first: Any) -> tuple[Any, StepReport]:
+    """Evaluate the dynamics under the forces of rolling; ``qacc`` of the data is the acceleration under them.
+
+    ``first`` tells that the data hold no evaluated state before this one.
+    """
+    before, data = data, mjx.forward(model, data)
+    rows, biases, contacts = [], [], []
     for k, body in enumerate(setup.wheels):
         centre, axle, spin = data.xpos[body], data.xmat[body][:, 1], data.cvel[body][:3]
 
@@ -54,11 +58,15 @@ def roll(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any) -> tuple[Any
         error = s * s * here.gap * here.normal + 2 * s * velocity
         rows.append(jacobian.T)
         biases.append(jacobian_rate.T @ data.qvel + jnp.cross(spin, run) + error)
-        standing = standing & here.standing
+        contacts.append(here)
     jacobian, bias = jnp.concatenate(rows), jnp.concatenate(biases)
     softness = jax.vmap(lambda row: solve_m(model, data, row))(jacobian)
     force = -jnp.linalg.solve(jacobian @ softness.T, jacobian @ data.qacc_smooth + bias)
-    report = StepReport(force.reshape(2, 3), standing, jnp.zeros_like(force[0]))
+    report = StepReport(
+        force=force.reshape(2, 3),
+        standing=are_standing(setup, contacts, before, data, first),
+        residual=jnp.zeros_like(force[0]),
+    )
     return data.replace(qacc=data.qacc_smooth + force @ softness), report
 
 
@@ -90,7 +98,7 @@ def step_rolling(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any, firs
         quaternion = qpos[3:7]
         unit = quaternion / jnp.sqrt(quaternion @ quaternion)
         qpos = qpos.at[3:7].set(jnp.where(first | (number < 3), quaternion, unit))
-        data, report = roll(setup, model, inputs, data.replace(qpos=qpos, qvel=qvel))
+        data, report = roll(setup, model, inputs, data.replace(qpos=qpos, qvel=qvel), first)
         return (data, rates), report
 
     rates = tuple(jnp.zeros((4, *at.shape), at.dtype) for at in start)

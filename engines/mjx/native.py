@@ -56,18 +56,31 @@ def step_on_planes(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any, fi
     first : array, shape ()
         Whether the state is not evaluated yet: then it is, and no step is taken.
     """
-    integrate = _INTEGRATORS[model.opt.integrator]
-    data = jax.tree.map(lambda before, after: jnp.where(first, before, after), data, integrate(model, data))
+    integrate, before = _INTEGRATORS[model.opt.integrator], data
+    data = jax.tree.map(lambda old, new: jnp.where(first, old, new), data, integrate(model, data))
     if setup.planes:
         data = place_mjx_planes(setup, model, inputs, data)
     data = mjx.forward(model, data)
     here = find_wheel_contacts(setup, inputs, data)
     report = StepReport(
         force=jnp.stack([contact_force(model, data, k, to_world_frame=True)[:3] for k in range(2)]),
-        standing=here[0].standing & here[1].standing,
+        standing=are_standing(setup, here, before, data, first),
         residual=measure_residual(model, data),
     )
     return data, report
+
+
+def are_standing(setup: MjxSetup, here: list[RimContact], before: Any, data: Any, first: Any) -> Any:
+    """Return whether both wheels have contacts, and neither has lain flat since the evaluated state before.
+
+    The axle's part along the ground changes its sign where a wheel lies flat; steps turn it by far less than a quarter.
+    """
+    standing = here[0].standing & here[1].standing
+    for contact, body in zip(here, setup.wheels, strict=True):
+        old, new = before.xmat[body][:, 1], data.xmat[body][:, 1]
+        along = new - (new @ contact.normal) * contact.normal
+        standing = standing & (first | (old @ along > 0))
+    return standing
 
 
 def measure_residual(model: Any, data: Any) -> Any:
