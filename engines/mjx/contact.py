@@ -9,6 +9,9 @@ Newton's method solves them for p = (xi, eta, a). Its derivatives are those of o
 the solution and the Jacobian count as constants: the implicit function theorem.
 """
 
+# JAX is an extra, without which its types are not known.
+# pyright: reportMissingImports=false
+
 from __future__ import annotations
 
 from typing import Any, NamedTuple

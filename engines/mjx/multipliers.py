@@ -11,6 +11,9 @@ contributes nothing where the wheels roll. The integrator is the classical Runge
 quaternion's own derivative, which has order 4; MJX's RK4 turns the frame by averaged angular velocities, order 2.
 """
 
+# JAX is an extra, without which its types are not known; MJX takes ids of bodies as numbers too.
+# pyright: reportMissingImports=false, reportAttributeAccessIssue=false, reportArgumentType=false
+
 from __future__ import annotations
 
 from typing import Any

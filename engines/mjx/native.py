@@ -4,6 +4,9 @@ On curved ground the planes below the wheels are moved to the tangent planes bef
 `velodrome.engines.mujoco.planes`, here inside the compiled loop.
 """
 
+# JAX is an extra, without which its types are not known.
+# pyright: reportMissingImports=false, reportAttributeAccessIssue=false
+
 from __future__ import annotations
 
 from typing import Any

@@ -1,5 +1,8 @@
 """Ride a bicycle in MJX: put the model and its start into JAX, step in one compiled loop per output, record."""
 
+# JAX is an extra, without which its types are not known; MuJoCo's compiled bindings carry none.
+# pyright: reportMissingImports=false, reportAttributeAccessIssue=false
+
 from __future__ import annotations
 
 from time import process_time
@@ -165,7 +168,7 @@ def build_setup(problem: Problem, settings: ArraySettings) -> tuple[MjxSetup, An
     inputs = MjxInputs(
         parameters=jnp.asarray(problem.surface.parameters, kind),
         radii=jnp.asarray([getattr(problem.bicycle, f"{name}_radius") for name in names], kind),
-        stabilisation=jnp.asarray(settings.stabilisation if rolls else 0.0, kind),
+        stabilisation=jnp.asarray(settings.stabilisation if isinstance(settings, MjxMultiplierSettings) else 0.0, kind),
         converged_below=jnp.asarray(settings.converged_below if isinstance(settings, MjxSettings) else 0.0, kind),
     )
     return setup, put, inputs, state

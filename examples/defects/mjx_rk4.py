@@ -5,6 +5,9 @@ halved. MJX 3.17's RK4 turns a free joint by the weighted mean of the stages' an
 different orientations: its error falls by 4, order 2. MuJoCo in C had the same order before version 4.0.
 """
 
+# MuJoCo's compiled bindings carry no types, and JAX may be missing where types are checked.
+# pyright: reportAttributeAccessIssue=false, reportMissingImports=false
+
 from __future__ import annotations
 
 from importlib.metadata import version

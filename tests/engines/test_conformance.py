@@ -18,6 +18,7 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ("exudyn", {"jacobian": "iteration", "step": 5e-4}),
     ("exudyn-plane-normal", {"solver": "trapezoidal-index2"}),
     ("mujoco-native", {"integrator": "RK4", "cone": "pyramidal"}),
+    ("mujoco-native", {"integrator": "discrete"}),
     ("mujoco-default", {"integrator": "implicit"}),
     ("mujoco-exact-contact", {"integrator": "implicitfast"}),
     ("mujoco-multipliers", {"step": 1e-3, "integrator": "Euler"}),

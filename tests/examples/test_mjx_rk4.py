@@ -1,5 +1,8 @@
 """MJX's RK4 has order 2 on a free body; a right one has order 4, so that the script would say when it is mended."""
 
+# JAX is an extra, without which its types are not known.
+# pyright: reportMissingImports=false, reportAttributeAccessIssue=false
+
 from __future__ import annotations
 
 import runpy
