@@ -1,6 +1,6 @@
 """MJX as an engine: the model of `mujoco-native` under its own contacts, and its tree under the forces of rolling.
 
-JAX compiles a ride once for each ground, precision, solver and size of a batch, which takes some 10 to 25 s of CPU time
+JAX compiles a ride once for each ground, precision, solver and size of a batch, which takes some 8 to 18 s of CPU time
 and no part of a trajectory's CPU time; later rides of a process share the code. JAX keeps compiled code on disk, for
 other processes, in the folder that the environment variable JAX_COMPILATION_CACHE_DIR names.
 """

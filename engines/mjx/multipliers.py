@@ -37,7 +37,7 @@ _TABLEAU = (
 )
 
 
-def roll(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any, first: Any) -> tuple[Any, StepReport]:
+def evaluate_rolling(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any, first: Any) -> tuple[Any, StepReport]:
     """Evaluate the dynamics under the forces of rolling; ``qacc`` of the data is the acceleration under them.
 
     ``first`` tells that the data hold no evaluated state before this one.
@@ -101,7 +101,7 @@ def step_rolling(setup: MjxSetup, model: Any, inputs: MjxInputs, data: Any, firs
         quaternion = qpos[3:7]
         unit = quaternion / jnp.sqrt(quaternion @ quaternion)
         qpos = qpos.at[3:7].set(jnp.where(first | (number < 3), quaternion, unit))
-        data, report = roll(setup, model, inputs, data.replace(qpos=qpos, qvel=qvel), first)
+        data, report = evaluate_rolling(setup, model, inputs, data.replace(qpos=qpos, qvel=qvel), first)
         return (data, rates), report
 
     rates = tuple(jnp.zeros((4, *at.shape), at.dtype) for at in start)

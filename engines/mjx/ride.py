@@ -16,6 +16,7 @@ from mujoco import mjx
 from ...reference.kinematics import WHEELS
 from ..engine import EngineError, Problem, Progress
 from ..mujoco.convergence import share
+from ..mujoco.model import Touching
 from ..mujoco.ride import Recording, RideState, bodies, set_start
 from ..mujoco.settings import WRONG
 from . import multipliers, native
@@ -147,7 +148,7 @@ def build_setup(problem: Problem, settings: ArraySettings) -> tuple[MjxSetup, An
         If MuJoCo or MJX refuses the model.
     """
     height, rolls = choose_height(problem.surface), isinstance(settings, MjxMultiplierSettings)
-    touching = "nothing" if rolls else "plane" if height is None else "planes"
+    touching: Touching = "nothing" if rolls else "plane" if height is None else "planes"
     model, data = set_start(problem, settings, touching)
     names = [f"{wheel}_wheel" for wheel in WHEELS]
     planes = [model.body(f"ground_{wheel}").mocapid[0] for wheel in WHEELS] if touching == "planes" else []
