@@ -15,7 +15,7 @@ from .settings import StepSettings
 from .state import from_mujoco
 
 if TYPE_CHECKING:
-    from .ride import Rig
+    from .ride import RideState, Rig
 
 S = TypeVar("S", bound=StepSettings)
 GIVES = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
@@ -106,28 +106,49 @@ class MujocoEngine(Generic[S]):
         module, name = self.builder.split(":")
         build: Callable[[Problem, Any], Rig] = getattr(import_module(module), name)
         ridden = ride_rig(build(problem, settings), settings.step, counts, progress)
-        recording = ridden.recording
-        q, qd = from_mujoco(recording.time, recording.qpos, recording.qvel, problem.q)
-        observed = observe(problem.bicycle, problem.surface, q, qd)
-        return Trajectory(
-            engine=self.name,
-            version=self.version,
-            settings=settings.model_dump(mode="json"),
-            time=recording.time,
-            q=q,
-            qd=qd,
-            body_position=recording.position,
-            body_quaternion=recording.quaternion,
-            contact_point=observed.point if observed.found else None,
-            contact_force=recording.force,
-            gap=observed.gap if observed.found else None,
-            slip=observed.slip if observed.found else None,
-            kinetic_energy=recording.energy[:, 1],
-            potential_energy=recording.energy[:, 0],
-            steps=ridden.steps,
-            cpu_time=ridden.cpu_time,
-            ended=ridden.ended,
-            friction=settings.least_friction,
-            unconverged_steps=ridden.unconverged_steps,
-            largest_residual=ridden.largest_residual,
-        )
+        return assemble_trajectory(self.name, self.version, problem, settings, ridden)
+
+
+def assemble_trajectory(
+    name: str, version: str, problem: Problem, settings: StepSettings, ridden: RideState
+) -> Trajectory:
+    """Return the trajectory of a ride in MuJoCo's coordinates.
+
+    Parameters
+    ----------
+    name, version : str
+        Those of the engine.
+    problem : Problem
+    settings : StepSettings
+    ridden : RideState
+
+    Returns
+    -------
+    Trajectory
+        Gap and slip are those of the wheels' knife edges on the true surface.
+    """
+    recording = ridden.recording
+    q, qd = from_mujoco(recording.time, recording.qpos, recording.qvel, problem.q)
+    observed = observe(problem.bicycle, problem.surface, q, qd)
+    return Trajectory(
+        engine=name,
+        version=version,
+        settings=settings.model_dump(mode="json"),
+        time=recording.time,
+        q=q,
+        qd=qd,
+        body_position=recording.position,
+        body_quaternion=recording.quaternion,
+        contact_point=observed.point if observed.found else None,
+        contact_force=recording.force,
+        gap=observed.gap if observed.found else None,
+        slip=observed.slip if observed.found else None,
+        kinetic_energy=recording.energy[:, 1],
+        potential_energy=recording.energy[:, 0],
+        steps=ridden.steps,
+        cpu_time=ridden.cpu_time,
+        ended=ridden.ended,
+        friction=settings.least_friction,
+        unconverged_steps=ridden.unconverged_steps,
+        largest_residual=ridden.largest_residual,
+    )

@@ -23,7 +23,7 @@ import numpy as np
 
 from ...reference.bicycle import Bicycle
 from ...reference.kinematics import WHEELS
-from .settings import ContactSettings, StepSettings
+from .settings import SoftContactSettings, StepSettings
 from .tangent import HALF_THICKNESS
 
 Touching = Literal["plane", "planes", "edges", "nothing"]
@@ -86,19 +86,20 @@ def _add_options(root: Element, bicycle: Bicycle, settings: StepSettings) -> Non
         "integrator": settings.integrator,
         "gravity": _number_text(0.0, 0.0, -bicycle.gravity),
     }
-    if isinstance(settings, ContactSettings):
+    if isinstance(settings, SoftContactSettings):
         options |= {
             "cone": settings.cone,
             "impratio": _number_text(settings.impratio),
             "tolerance": _number_text(settings.tolerance),
-            "noslip_iterations": str(settings.noslip_iterations),
         } | {name: str(value) for name, value in settings.solver_options.items()}
     option = SubElement(root, "option", options)
     # An unstable run must end; without this flag MuJoCo would reset the state to the model's initial state.
     SubElement(option, "flag", autoreset="disable")
 
 
-def _add_contact_pairs(root: Element, settings: ContactSettings, planes: dict[str, str], touching: Touching) -> None:
+def _add_contact_pairs(
+    root: Element, settings: SoftContactSettings, planes: dict[str, str], touching: Touching
+) -> None:
     contact = SubElement(root, "contact")
     margin, reach = (EDGE_MARGIN, EDGE_REACH) if touching == "edges" else (MARGIN, 0.0)
     for wheel in WHEELS:
@@ -123,7 +124,7 @@ def mjcf(bicycle: Bicycle, settings: StepSettings, touching: Touching, steer_dam
     ----------
     bicycle : Bicycle
     settings : StepSettings
-        `ContactSettings` where there is contact.
+        `SoftContactSettings` where there is contact.
     touching : {"plane", "planes", "edges", "nothing"}
     steer_damping : float
         [N m s/rad].
@@ -146,6 +147,6 @@ def mjcf(bicycle: Bicycle, settings: StepSettings, touching: Touching, steer_dam
     front = _add_body(rear, bicycle, "front_frame", origin, origin)
     _add_hinge(front, "steer", bicycle.steer_axis, steer_damping)
     _add_wheel(front, bicycle, "front", origin, touching)
-    if isinstance(settings, ContactSettings):
+    if isinstance(settings, SoftContactSettings):
         _add_contact_pairs(root, settings, planes, touching)
     return tostring(root, encoding="unicode")

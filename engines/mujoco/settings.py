@@ -29,7 +29,11 @@ WRONG = 0.01
 SLOPE = 1e-14
 
 
-Integrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
+# "discrete" solves for the contact forces in the effective inertia of the whole step; MuJoCo 4.0 is the first with it.
+Integrator = Literal["Euler", "implicit", "implicitfast", "RK4", "discrete"]
+# Exact contacts are corrected for the inertia of the tree itself; without contacts "discrete" is "implicitfast".
+TreeIntegrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
+_OF_ORDER = "MuJoCo's integrator; RK4 is of order 4, the others are of order 1"
 
 
 class StepSettings(Settings):
@@ -42,14 +46,17 @@ class StepSettings(Settings):
         description="time step [s]; must divide the output interval",
         json_schema_extra={"unit": "s"},
     )
-    integrator: Integrator = Field(
-        default="RK4", description="MuJoCo's integrator; RK4 is of order 4, the others are of order 1"
-    )
+    integrator: Integrator = Field(default="RK4", description=_OF_ORDER)
+
+    @property
+    def round_off(self) -> float:
+        """Relative round-off of the numbers that it computes with."""
+        return SOLVER_ROUND_OFF
 
     @property
     def noise(self) -> float:
         """Relative error that a step may add beyond its method."""
-        return SOLVER_ROUND_OFF
+        return self.round_off
 
     @property
     def least_friction(self) -> float | None:
@@ -57,8 +64,8 @@ class StepSettings(Settings):
         return None
 
 
-class ContactSettings(StepSettings):
-    """How MuJoCo softens its contacts and solves for their forces."""
+class SoftContactSettings(StepSettings):
+    """How MuJoCo softens its contacts and solves for their forces, in C and in its ports."""
 
     time_constant: float | None = Field(
         default=None,
@@ -90,13 +97,6 @@ class ContactSettings(StepSettings):
         description="coefficient of sliding friction, the same in all directions",
         json_schema_extra={"unit": "1"},
     )
-    noslip_iterations: int = Field(
-        default=0,
-        ge=0,
-        le=1000,
-        description="iterations of the pass that makes friction hard after the solver",
-        json_schema_extra={"unit": "1"},
-    )
     tolerance: float = Field(
         default=1e-8,
         gt=0,
@@ -108,7 +108,7 @@ class ContactSettings(StepSettings):
     @property
     def noise(self) -> float:
         """Relative error that a step may add beyond its method: what the contact solver leaves unconverged."""
-        return max(self.tolerance, SOLVER_ROUND_OFF)
+        return max(self.tolerance, self.round_off)
 
     @property
     def condition(self) -> float:
@@ -124,7 +124,7 @@ class ContactSettings(StepSettings):
         stiffness: a residual r of the forces costs r^2 / condition. Round-off leaves some of that of an
         acceleration, times the condition.
         """
-        return min(sqrt(self.tolerance * self.condition) + 10 * SOLVER_ROUND_OFF * self.condition, WRONG)
+        return min(sqrt(self.tolerance * self.condition) + 10 * self.round_off * self.condition, WRONG)
 
     @property
     def least_friction(self) -> float:
@@ -142,7 +142,7 @@ class ContactSettings(StepSettings):
         return 2 / (self.impedance[1] * self.contact_time)
 
     @property
-    def solver_options(self) -> dict[str, float]:
+    def solver_options(self) -> dict[str, float | str]:
         """Options of MuJoCo's contact solver beside its tolerance; none: MuJoCo's own."""
         return {}
 
@@ -156,6 +156,23 @@ class ContactSettings(StepSettings):
         if max(self.impedance[:2]) > LARGEST_IMPEDANCE:
             raise ValueError(f"impedance is {self.impedance!r}; no impedance may exceed {LARGEST_IMPEDANCE!r}")
         return self
+
+
+class ContactSettings(SoftContactSettings):
+    """Settings of MuJoCo's contacts in C, with a pass that its ports lack."""
+
+    noslip_iterations: int = Field(
+        default=0,
+        ge=0,
+        le=1000,
+        description="iterations of the pass that makes friction hard after the solver",
+        json_schema_extra={"unit": "1"},
+    )
+
+    @property
+    def solver_options(self) -> dict[str, float | str]:
+        """Options of MuJoCo's contact solver beside its tolerance."""
+        return {"noslip_iterations": self.noslip_iterations}
 
 
 _ON_PLANES = "MuJoCo's integrator; on a curved surface RK4's stages see the ground as at the start of the step"
@@ -198,6 +215,10 @@ class DefaultSettings(ContactSettings):
 class ExactContactSettings(ContactSettings):
     """Settings of MuJoCo's solver on exact contacts, whose rows keep MuJoCo's form and are nearly rigid."""
 
+    integrator: TreeIntegrator = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
+        default="RK4", description=_OF_ORDER
+    )
+
     # A row's error decays at 2 / time_constant, which the integrator must resolve; it adds no creep any more.
     time_constant: float | None = Field(
         default=0.05,
@@ -239,7 +260,7 @@ class ExactContactSettings(ContactSettings):
         return super().condition / self.softness
 
     @property
-    def solver_options(self) -> dict[str, float]:
+    def solver_options(self) -> dict[str, float | str]:
         """Options of MuJoCo's contact solver beside its tolerance, for rows as stiff as these.
 
         Wheels that roll need one iteration from the start that `compiled.correct_reference` gives. The solution for a
@@ -250,7 +271,8 @@ class ExactContactSettings(ContactSettings):
         progress, and the solver stops at arbitrary forces. A line search stops at a slope of the order of the forces'
         round-off.
         """
-        return {"iterations": 10_000, "ls_iterations": 200, "ls_tolerance": max(0.01, SLOPE / self.tolerance)}
+        limits = {"iterations": 10_000, "ls_iterations": 200, "ls_tolerance": max(0.01, SLOPE / self.tolerance)}
+        return super().solver_options | limits
 
     @model_validator(mode="after")
     def _forces_have_digits(self) -> Self:
@@ -265,6 +287,10 @@ class ExactContactSettings(ContactSettings):
 
 class MultiplierSettings(StepSettings):
     """MuJoCo's tree and integrator, without its contacts."""
+
+    integrator: TreeIntegrator = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
+        default="RK4", description=_OF_ORDER
+    )
 
     stabilisation: float = Field(
         default=20.0,

@@ -113,7 +113,7 @@ def test_residual_is_the_gradient_of_the_solver_s_cost(iterations) -> None:
         assert convergence.wrong == (0, convergence.largest)
 
 
-@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast", "RK4"])
+@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast", "RK4", "discrete"])
 def test_watch_sees_every_stage_and_changes_nothing(integrator) -> None:
     problem, settings = circle(1.0), NativeSettings(integrator=integrator)
     model, data = set_start(problem, settings, "plane")

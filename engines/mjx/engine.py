@@ -1,0 +1,95 @@
+"""MJX as an engine: the model of `mujoco-native` under its own contacts, and its tree under the forces of rolling.
+
+JAX compiles a ride once for each ground, precision, solver and size of a batch, which takes some 8 to 18 s of CPU time
+and no part of a trajectory's CPU time; later rides of a process share the code. JAX keeps compiled code on disk, for
+other processes, in the folder that the environment variable JAX_COMPILATION_CACHE_DIR names.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from ..engine import Problem, Progress, Trajectory, package_version
+from ..mujoco.engine import GIVES, assemble_trajectory, step_counts
+from .ground import choose_height
+from .process import process_kept
+from .settings import ArraySettings, MjxMultiplierSettings, MjxSettings
+
+S = TypeVar("S", bound=ArraySettings)
+
+
+@dataclass(frozen=True)
+class MjxEngine(Generic[S]):
+    """A model in MJX as an engine.
+
+    Attributes
+    ----------
+    name : str
+    settings : type
+    description : str
+        The engine in one line.
+    gives : tuple of str
+    """
+
+    name: str
+    settings: type[S]
+    description: str
+    gives: tuple[str, ...] = GIVES
+    takes_inputs = True
+
+    @property
+    def version(self) -> str:
+        """Version of MJX, with those of JAX, which compiles it, and of MuJoCo, which builds its model."""
+        return f"{package_version('mujoco-mjx')} (jax {package_version('jax')}, mujoco {package_version('mujoco')})"
+
+    def check(self, problem: Problem, settings: Any) -> None:
+        """Refuse ground without a closed form, and output times that are not multiples of the step; see `Engine`."""
+        choose_height(problem.surface)
+        step_counts(problem.times, settings.step)
+
+    def step_noise(self, settings: Any) -> float:
+        """Return the larger of round-off and what the contact solver may leave unconverged in a step; see `Engine`."""
+        return settings.noise
+
+    def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
+        """Run a problem.
+
+        Parameters
+        ----------
+        problem : Problem
+            Its output times must be multiples of the step.
+        settings : ArraySettings
+        progress : callable
+            Called with the simulated time [s] after every 32 outputs.
+
+        Returns
+        -------
+        Trajectory
+            Gap and slip are those of the wheels' knife edges on the true surface.
+
+        Raises
+        ------
+        ValueError
+            If an output time lies between two steps, or the ground has no closed form.
+        EngineError
+            If the model is refused, a wheel has no contact point at the start, or the contact solver fails there.
+        """
+        counts = step_counts(problem.times, settings.step)
+        with process_kept():
+            from .ride import ride_in_mjx
+
+        ridden = ride_in_mjx(problem, settings, counts, progress)
+        return assemble_trajectory(self.name, self.version, problem, settings, ridden)
+
+
+ENGINE = MjxEngine(
+    "mjx",
+    MjxSettings,
+    description="MJX, MuJoCo's port to JAX, with the model of mujoco-native",
+)
+MULTIPLIERS = MjxEngine(
+    "mjx-multipliers",
+    MjxMultiplierSettings,
+    description="MJX's tree under the exact forces of rolling, without its contacts and integrators",
+)
