@@ -3,7 +3,7 @@
 from .balance import InputWork, conserved_energy, measure_work
 from .consistency import LARGEST_NOISE, TURNING, Mismatch, describe_mismatch, evaluate_ride, find_mismatches
 from .convergence import extrapolate, observed_orders
-from .creep import Creep, contact_accelerations, measure_creep
+from .creep import Creep, contact_acceleration, measure_creep
 from .fall import cut_at_fall, fell_at, until_fall
 from .friction import normal_force, required_friction
 from .identify import DISTURBANCES, IDENTIFY_LEVELS, STENCIL_WEIGHT, Identified, identify, interval_of, jacobian_at
@@ -47,7 +47,7 @@ __all__ = [
     "comparison_horizon",
     "compute_metrics",
     "conserved_energy",
-    "contact_accelerations",
+    "contact_acceleration",
     "cut_at_fall",
     "describe_mismatch",
     "eigenvalue_document",

@@ -46,15 +46,21 @@ LEAGUE_COLUMNS = (
     _column("rate error", "rate_error"),
     _column("energy drift", "energy_drift"),
     _column("radius drift", "radius_drift_rate"),
-    _column("mean slip", "mean_slip"),
+    LeagueColumn(
+        "mean slip",
+        "m/s",
+        "mean_slip",
+        ".2e",
+        "Speed of a wheel's material at its contact point, averaged over both wheels and all samples.",
+    ),
     _column("force error", "contact_force_error"),
     LeagueColumn(
         "order",
         "1",
         "observed_order",
         ".2f",
-        "Order of convergence that the steps show, without the reference. The page gives the range of the orders over "
-        "parts of the ride beside it; a wide range says that the order is not settled.",
+        "Order of convergence that three steps show, without the reference. The page gives below it the least and the "
+        "largest order over parts of the ride; a wide range says that the order is not settled.",
     ),
     LeagueColumn("step", "s", "step", ".2e", "Mean step of the figures of this row, that of the engine's settings."),
     LeagueColumn(
@@ -156,7 +162,7 @@ def make_league_page(document: Mapping[str, Any]) -> str:
 def _list_facts(document: Mapping[str, Any]) -> list[tuple[str, str]]:
     file = document["settings_file"]
     return [
-        ("Engines", str(len(document["engines"]))),
+        ("Engines", ", ".join(document["engines"])),
         ("Scenarios", ", ".join(document["scenarios"])),
         ("Steps", f"that of the settings, halved {document['levels'] - 1} times"),
         ("Settings", "the engines' defaults" if file is None else f"the engines' defaults, replaced by {file}"),

@@ -29,7 +29,7 @@ def show_league(console: Console, document: Mapping[str, Any]) -> None:
         print_table(console, columns)
         for name, points in find_creeping(document, scenario).items():
             step, time = points[0]
-            line = f"{name} creeps: slip = {time:.3g} s of the contacts' own acceleration, {time / step:.3g} steps"
+            line = f"{name} creeps: slip = J̇q̇ / b with 1 / b = {time:.3g} s, {time / step:.3g} steps"
             console.print(line, style="dim", markup=False, highlight=False, soft_wrap=True)
         for name, ride in rides:
             if ride["status"] == "ended":

@@ -78,7 +78,7 @@ class LeagueRide:
     cpu_per_second : float or None
         CPU time of a simulated second, the least of two rides [s].
     creep_time : float or None
-        Mean slip over the mean size of the contacts' own acceleration [s].
+        Mean slip over the mean size of J' q' in the reference's ride, 1 / b of `velodrome.reports.measure.creep` [s].
     same_bits_twice : bool or None
         Whether a second ride was the same to the last bit.
     same_bits_elsewhere : dict
