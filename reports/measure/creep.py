@@ -1,4 +1,4 @@
-"""Creep of wheels: their mean slip against the acceleration that rolling needs in the reference's ride.
+"""Creep of wheels: the slip of a method that leaves out a part of the acceleration of rolling.
 
 The derivative of the rolling constraint J q' = 0 is J q'' + J' q' = 0. A method that prescribes the velocity of a
 contact at the end of a step with the Jacobian of its start, or J q'' alone, omits J' q'. The slip v then follows
@@ -31,55 +31,58 @@ _STRAIGHT = 2.0**-26  # half of the digits: smaller shares of an acceleration th
 
 @dataclass(frozen=True)
 class Creep:
-    """Mean slip of a ride, and what it is compared with.
+    """Slip of a ride, and the part of it that the law of creep explains.
 
     Attributes
     ----------
-    slip : float
-        Mean magnitude of the slip of both wheels, from 0.2 s on [m/s].
-    acceleration : float
-        Mean magnitude of J' q' along the ground in the reference's ride, over the same samples [m/s^2].
+    time : float
+        Time 1 / b that fits b v = J' q' best in the sense of least squares [s].
+    share : float
+        Share of the mean square of the slip that the law with this b explains, at most 1.
+    slip_time : float
+        Root mean square of the slip over that of J' q' [s]: what ``time`` is where the law explains all slip.
     """
 
-    slip: float
-    acceleration: float
-
-    @property
-    def time(self) -> float:
-        """Time 1 / b of the law b slip = J' q' [s]."""
-        return self.slip / self.acceleration
+    time: float
+    share: float
+    slip_time: float
 
 
-def measure_creep(trajectory: Trajectory, reference: Trajectory, bicycle: Bicycle, surface: Surface) -> Creep | None:
-    """Measure the mean slip of a ride, and J' q' in the reference's.
+def measure_creep(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> Creep | None:
+    """Fit the law of creep to the slip of a ride, of both wheels in both directions.
+
+    J' q' is that of the ride's own coordinates, so that a ride that has drifted from the reference's follows the same
+    law.
 
     Parameters
     ----------
     trajectory : Trajectory
-    reference : Trajectory
-        Sampled at the same times, at least as long.
     bicycle : Bicycle
     surface : Surface
 
     Returns
     -------
     Creep or None
-        Of the samples before either falls. None where there are none after contacts have settled, a wheel has no
-        contact, or the ride is straight to half of all digits, so that J' q' is round-off.
+        Of the samples before a fall and from 0.2 s on, when contacts have settled. None where there are none, a wheel
+        has no contact, or the ride is straight to half of all digits, so that J' q' is round-off.
     """
     followed = until_fall(evaluate_ride(trajectory, bicycle, surface), bicycle, surface)
-    reference = until_fall(reference, bicycle, surface)
-    n = min(len(followed.time), len(reference.time))
-    settled = followed.time[:n] >= SETTLED_SHARE
-    if not settled.any():
-        return None
+    settled = followed.time >= SETTLED_SHARE
     assert followed.slip is not None
-    speed = np.linalg.norm(followed.slip[:n][settled], axis=2)
-    own = contact_acceleration(bicycle, surface, reference.q[:n][settled], reference.qd[:n][settled])
-    found = Creep(float(speed.mean()), float(np.linalg.norm(own, axis=2).mean()))
+    if not settled.any() or not np.isfinite(followed.slip).all():
+        return None
+    slip = followed.slip[settled]
+    try:
+        own = contact_acceleration(bicycle, surface, followed.q[settled], followed.qd[settled])
+    except ValueError:  # a wheel has no contact
+        return None
     # The size of the accelerations whose sum is J' q'.
-    size = largest_speed(reference) ** 2 / min(bicycle.rear_wheel_radius, bicycle.front_wheel_radius)
-    return found if np.isfinite(found.slip) and found.acceleration > _STRAIGHT * size else None
+    size = largest_speed(followed) ** 2 / min(bicycle.rear_wheel_radius, bicycle.front_wheel_radius)
+    square, both = float(np.square(own).sum()), float((own * slip).sum())
+    if not square > (_STRAIGHT * size) ** 2 * own.size:
+        return None
+    total = float(np.square(slip).sum())
+    return Creep(both / square, both**2 / (square * total) if total > 0 else 0.0, float(np.sqrt(total / square)))
 
 
 def contact_acceleration(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> np.ndarray:

@@ -15,8 +15,10 @@ from . import words
 from .document import list_engine_styles, load_template, read_part
 from .loglog import draw_loglog
 
-# Wheels whose slip is below this share of the law's, step times acceleration, are said to roll exactly.
+# Wheels whose slip is below this share of h J' q', the law's with one step h for 1 / b, are said to roll without creep.
 CREEPS = 0.01
+# Wheels creep if the law explains most of the square of their slip; other slip is sliding, sinking or a fall.
+EXPLAINED = 0.5
 
 
 @dataclass(frozen=True)
@@ -101,14 +103,32 @@ def rank_rides(document: Mapping[str, Any], scenario: str) -> list[tuple[str, Ma
             return 0, 0.0, name
         if ride["status"] == "rode":
             return 1, ride["position_error"], name
-        return (2, -(ride["fell_at"] or 0.0), name) if ride["status"] in ("fell", "ended") else (3, 0.0, name)
+        if ride["status"] in ("fell", "ended"):
+            return 2, -(ride["fell_at"] or 0.0), name
+        return (3 if ride["status"] == "unsuitable" else 4), 0.0, name
 
     found = {name: entry["scenarios"].get(scenario) for name, entry in document["engines"].items()}
     return sorted(((name, ride) for name, ride in found.items() if ride is not None), key=rank)
 
 
+def classify_slip(ride: Mapping[str, Any]) -> str | None:
+    """Return ``rolls``, ``creeps`` or ``slides``; None where there is no figure of creep.
+
+    Parameters
+    ----------
+    ride : mapping
+        An engine's part of a scenario in the document of `velodrome league`.
+    """
+    creep = ride["creep"]
+    if creep is None:
+        return None
+    if creep["slip_time"] < CREEPS * ride["step"]:
+        return "rolls"
+    return "creeps" if creep["share"] > EXPLAINED and creep["time"] > 0 else "slides"
+
+
 def find_creeping(document: Mapping[str, Any], scenario: str) -> dict[str, list[tuple[float, float]]]:
-    """Return step and creep time of every level of the engines that creep: their slip is near the law's or above it.
+    """Return step and time 1 / b of every level of the engines whose slip follows the law of creep.
 
     Parameters
     ----------
@@ -119,19 +139,15 @@ def find_creeping(document: Mapping[str, Any], scenario: str) -> dict[str, list[
     Returns
     -------
     dict
-        Pairs of step and creep time [s] by engine.
+        Pairs of step and 1 / b [s] by engine.
     """
     found = {}
     for name, entry in document["engines"].items():
         ride = entry["scenarios"].get(scenario)
-        if ride is not None and _creeps(ride):
-            points = [(point["step"], point["creep_time"]) for point in ride["points"]]
-            found[name] = points or [(ride["step"], ride["creep_time"])]
+        if ride is not None and classify_slip(ride) == "creeps":
+            points = [(point["step"], point["creep"]["time"]) for point in ride["points"] if point["creep"] is not None]
+            found[name] = points or [(ride["step"], ride["creep"]["time"])]
     return found
-
-
-def _creeps(ride: Mapping[str, Any]) -> bool:
-    return ride["creep_time"] is not None and ride["creep_time"] > CREEPS * ride["step"]
 
 
 def make_league_page(document: Mapping[str, Any]) -> str:
@@ -155,6 +171,7 @@ def make_league_page(document: Mapping[str, Any]) -> str:
         columns=LEAGUE_COLUMNS,
         sections=[_make_section(document, name, names) for name in document["scenarios"]],
         share=CREEPS,
+        explained=EXPLAINED,
         style=Markup(read_part("page.css")),
     )
 
@@ -198,7 +215,8 @@ def _make_section(document: Mapping[str, Any], scenario: str, names: list[str]) 
             names,
         ),
         "creep": draw_loglog(creeping, names, law),
-        "rolling": [
-            name for name, ride in rides if name != REFERENCE and ride["creep_time"] is not None and not _creeps(ride)
-        ],
+        "slip": {
+            kind: [name for name, ride in rides if name != REFERENCE and classify_slip(ride) == kind]
+            for kind in ("rolls", "slides")
+        },
     }

@@ -32,7 +32,7 @@ from ...engines.engine import (
     why_failed,
 )
 from ...reports.drawing import make_remarks
-from ...reports.measure import Creep, Level, engine_document, measure_creep, measure_order_range
+from ...reports.measure import Level, engine_document, measure_creep, measure_order_range
 from ..error import MissingMotionError, ScenarioError
 from ..files import make_folder, write_json, write_text
 from ..run import RunPlan, RunWatch, Trace, claimed_noise, describe_run_environment, measure_one
@@ -77,14 +77,14 @@ class LeagueRide:
         Mean step [s].
     cpu_per_second : float or None
         CPU time of a simulated second, the least of two rides [s].
-    creep_time : float or None
-        Mean slip over the mean size of J' q' in the reference's ride, 1 / b of `velodrome.reports.measure.creep` [s].
+    creep : dict or None
+        ``time``, ``share`` and ``slip_time`` of `velodrome.reports.measure.creep.Creep`.
     same_bits_twice : bool or None
         Whether a second ride was the same to the last bit.
     same_bits_elsewhere : dict
         The same by variant, for the engine's ``bit_variants``.
     points : list of dict
-        The levels that rode to the end, as in `velodrome precision`, with ``cpu_per_second`` and ``creep_time``.
+        The levels that rode to the end, as in `velodrome precision`, with ``cpu_per_second`` and ``creep``.
     failures : list of dict
         Levels that did not, ``step`` and ``reason``.
     remarks : list of str
@@ -107,7 +107,7 @@ class LeagueRide:
     limit_error: float | None = None
     step: float | None = None
     cpu_per_second: float | None = None
-    creep_time: float | None = None
+    creep: dict[str, float] | None = None
     same_bits_twice: bool | None = None
     same_bits_elsewhere: dict[str, bool | None] = field(default_factory=dict)
     points: list[dict[str, Any]] = field(default_factory=list)
@@ -342,7 +342,7 @@ def _ride(
     again = _ride_again(engine, problem, settings, watch)
     study = engine_document(found, failures, reference, start.size, None)
     measured = first.metrics
-    creep = [_measure_creep(level, problem, reference) for level in (first, *found)]
+    creep = [_measure_creep(level.trajectory, problem) for level in (first, *found)]
     costs = [cost for cost in (_cost(first.trajectory), again and _cost(again)) if cost]
     return LeagueRide(
         status=_find_status(measured),
@@ -360,11 +360,11 @@ def _ride(
         limit_error=study["richardson_error"],
         step=first.step,
         cpu_per_second=min(costs, default=None),
-        creep_time=None if creep[0] is None else creep[0].time,
+        creep=creep[0],
         same_bits_twice=None if again is None else equal_to_the_bit(first.trajectory, again),
         same_bits_elsewhere=_compare_variants(engine, settings, problem, first.trajectory, watch),
         points=[
-            {**point, "cpu_per_second": _cost(level.trajectory), "creep_time": None if one is None else one.time}
+            {**point, "cpu_per_second": _cost(level.trajectory), "creep": one}
             for point, level, one in zip(study["points"], found, creep[1:], strict=True)
         ],
         failures=study["failures"],
@@ -452,8 +452,9 @@ def _cost(trajectory: Trajectory) -> float | None:
     return trajectory.cpu_time / simulated if simulated > 0 and trajectory.cpu_time > 0 else None
 
 
-def _measure_creep(level: Level, problem: Problem, reference: Trajectory) -> Creep | None:
-    return measure_creep(level.trajectory, reference, problem.bicycle, problem.surface)
+def _measure_creep(trajectory: Trajectory, problem: Problem) -> dict[str, float] | None:
+    found = measure_creep(trajectory, problem.bicycle, problem.surface)
+    return None if found is None else asdict(found)
 
 
 def _make_document(league: League, rides: Mapping[str, Mapping[str, LeagueRide]], complete: bool) -> dict[str, Any]:

@@ -31,24 +31,52 @@ def test_on_a_circle_of_the_plane_the_acceleration_is_centripetal(reference: Tra
     np.testing.assert_allclose(found, speed**2 / radius, rtol=1e-9)
 
 
-def test_creep_is_the_mean_slip_over_that_acceleration(reference: Trajectory) -> None:
-    # A faster front wheel slides forward by radius times the added rate.
+def displaced(reference: Trajectory, creep: float, forward: float) -> Trajectory:
+    """The ride with D's rates changed by the slip that creep brings, and the wheels' rates by a slip forward."""
+    own = contact_acceleration(Bicycle(), Plane(), reference.q, reference.qd)
+    assert reference.contact_point is not None
     qd = reference.qd.copy()
-    qd[:, 8] += 0.1
-    found = measure_creep(replace(reference, qd=qd), reference, Bicycle(), Plane())
+    # On a steady circle J' q' of both wheels is one vector, opposite to the acceleration of D.
+    qd[:, :2] += creep * np.linalg.norm(own[:, :1], axis=2) * reference.q[:, :2] / np.hypot(*reference.q[0, :2])
+    qd[:, 7] -= forward / Bicycle().rear_wheel_radius
+    qd[:, 8] -= forward / Bicycle().front_wheel_radius
+    return replace(reference, qd=qd)
+
+
+def test_a_slip_along_that_acceleration_is_creep(reference: Trajectory) -> None:
+    found = measure_creep(displaced(reference, 1e-6, 0.0), Bicycle(), Plane())
     assert found is not None
-    slip = 0.1 * Bicycle().front_wheel_radius / 2  # the mean of both wheels
-    assert found.slip == pytest.approx(slip, rel=1e-9)
-    assert found.time == pytest.approx(slip / found.acceleration)
+    # The slip itself changes J' q' by some of its own relative size, 1e-6 s x 12 m/s^2 in 5 m/s.
+    assert found.time == pytest.approx(1e-6, rel=1e-4)
+    assert found.slip_time == pytest.approx(1e-6, rel=1e-4)
+    assert found.share == pytest.approx(1, abs=1e-8)
+
+
+def test_other_slip_is_not(reference: Trajectory) -> None:
+    found = measure_creep(displaced(reference, 0.0, 1e-5), Bicycle(), Plane())
+    mixed = measure_creep(displaced(reference, 1e-6, 1e-5), Bicycle(), Plane())
+    assert found is not None
+    assert mixed is not None
+    # The share of the direction forward in J' q', which is the same in both.
+    assert found.share < 0.1
+    assert mixed.time == pytest.approx(1e-6 + found.time, rel=1e-4)
+    assert found.share < mixed.share < 1
+
+
+def test_a_ride_that_does_not_slip_does_not_creep(reference: Trajectory) -> None:
+    found = measure_creep(reference, Bicycle(), Plane())
+    assert found is not None
+    assert found.slip_time < 1e-12
+    assert abs(found.time) <= found.slip_time
 
 
 def test_there_is_no_creep_before_contacts_have_settled(reference: Trajectory) -> None:
-    assert measure_creep(reference.until(0.19), reference, Bicycle(), Plane()) is None
-    assert measure_creep(reference.until(0.2), reference, Bicycle(), Plane()) is not None
+    assert measure_creep(reference.until(0.19), Bicycle(), Plane()) is None
+    assert measure_creep(reference.until(0.2), Bicycle(), Plane()) is not None
 
 
 def test_there_is_no_creep_in_a_straight_ride() -> None:
     changes = {"simulation.duration": 0.5, "perturbation.lean_rate": 0.0}
     problem = make_start(load_scenario("iftomm-2", changes)[1]).problem
     straight = ENGINE.simulate(problem, ENGINE.settings(), lambda _: None)
-    assert measure_creep(straight, straight, Bicycle(), Plane()) is None
+    assert measure_creep(straight, Bicycle(), Plane()) is None

@@ -100,21 +100,15 @@ def test_the_order_lies_in_its_range() -> None:
 
 
 def test_soft_contacts_creep_by_their_law_and_a_constraint_does_not() -> None:
-    """1 / b = 0.95 steps for a time constant of two steps; softness at impratio 10 adds up to a tenth of 24 %.
-
-    J' q' is that of the reference's ride; that of the engine's own differs by twice its rates' relative error, which is
-    of first order in the step.
-    """
+    """1 / b = 0.95 steps for a time constant of two steps; softness at impratio 10 adds up to a tenth of 24 %."""
     document = circles()
     creeping = find_creeping(document, "plane-circle")
     assert list(creeping) == ["mujoco-native"]
-    ride = document["engines"]["mujoco-native"]["scenarios"]["plane-circle"]
     for step, time in creeping["mujoco-native"]:
-        own = 2 * ride["rate_error"] * step / ride["step"]
-        assert own < 0.03
-        assert 0.95 * (1 - own) * step < time < 0.95 * (1.024 + own) * step
+        # After 0.2 s, fifty time constants and more, nothing is left of the start without slip.
+        assert 0.95 * step < time < 0.95 * 1.024 * step
     rolling = document["engines"]["exudyn-builtin"]["scenarios"]["plane-circle"]
-    assert rolling["creep_time"] < 1e-3 * rolling["step"]
+    assert rolling["creep"]["slip_time"] < 1e-3 * rolling["step"]
 
 
 def test_an_unsuitable_ground_is_a_row_even_of_an_engine_that_is_named() -> None:
