@@ -89,7 +89,9 @@ def contact_acceleration(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: 
     """Compute the acceleration J' q' of both contact points along a trajectory, along the ground's tangents.
 
     It is the acceleration that a wheel's material has at the contact if all nine coordinates' second derivatives are
-    zero. Engines whose velocities are those of joints and of a free rear frame omit the same term.
+    zero. Engines whose velocities are those of joints and of a free rear frame omit the same term. It is not the
+    ``acceleration`` of `velodrome.engines.rolling.observe_wheel`, which complements the accelerations of the wheel's
+    centre and of its angular velocity and belongs to engines with a free wheel.
 
     Parameters
     ----------

@@ -334,3 +334,20 @@ def test_the_folder_has_the_document_and_the_page(tmp_path: Path) -> None:
     assert document.pop("schema_version") == 1
     assert document == json.loads(json.dumps(circles()))
     assert written[1].read_text().startswith("<!doctype html>")
+
+
+@pytest.mark.slow
+def test_every_installed_engine_rides_the_default_scenarios() -> None:
+    scenarios = [load_scenario(name, {"simulation.duration": 1.0}) for name in LEAGUE_SCENARIOS]
+    document = run(plan_league(scenarios, None, None))
+    assert all_rode(document)
+    for name, entry in document["engines"].items():
+        for scenario, ride in entry["scenarios"].items():
+            if ride["status"] == "rode":
+                assert ride["same_bits_twice"], (name, scenario)
+                assert (ride["position_error"] is None) == (name == REFERENCE)
+            else:
+                assert ride["status"] in ("unsuitable", "fell", "ended"), (name, scenario, ride["reason"])
+    # The one law of creep on the plane: 0.95 steps and up to a tenth of 24 % for soft contacts, see above.
+    for points in find_creeping(document, "plane-circle").values():
+        assert all(0.9 * step < time for step, time in points)
