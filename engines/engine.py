@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import re
 import reprlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points, version
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self, cast
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 ENTRY_POINT_GROUP = "velodrome.engines"
 REFERENCE = "reference"
+DEFAULT_SETTINGS_SOURCE = "the engine's own defaults, as its package declares them"
 
 Progress = Callable[[float], None]
 
@@ -321,6 +322,11 @@ class Engine(Protocol):
     An engine may also have a ``description``, one line of text, which `velodrome show` prints, and ``takes_inputs``. An
     engine that applies the torques and the steer damping in `Problem.inputs` sets it to True; without it the engine is
     never given a problem with inputs.
+
+    Two further attributes serve `velodrome league`. ``settings_source`` is one line of text that says whose choice the
+    defaults of the settings are, such as the page of the library's documentation. ``bit_variants`` maps descriptions to
+    changed settings with which a ride should be the same to the last bit, such as another number of threads or another
+    place in a batch.
     """
 
     @property
@@ -495,6 +501,29 @@ def describe_engine(engine: Engine) -> str:
     if not isinstance(text, str) or not text.strip():
         text = next(iter((type(own).__doc__ or "").strip().splitlines()), "")
     return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+
+
+def describe_settings_source(engine: Engine) -> str:
+    """Return a line that says whose choice an engine's default settings are: its ``settings_source``."""
+    own = engine.inner if isinstance(engine, GuardedEngine) else engine
+    text = getattr(own, "settings_source", None)
+    if not isinstance(text, str) or not text.strip():
+        return DEFAULT_SETTINGS_SOURCE
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+
+
+def list_bit_variants(engine: Engine) -> dict[str, dict[str, Any]]:
+    """Return the changed settings with which an engine's rides should be the same to the last bit, by description."""
+    own = engine.inner if isinstance(engine, GuardedEngine) else engine
+    found: object = getattr(own, "bit_variants", None)
+    if not isinstance(found, Mapping):
+        return {}
+    given = cast("Mapping[object, object]", found)
+    return {
+        str(text): {str(key): value for key, value in cast("Mapping[object, Any]", changes).items()}
+        for text, changes in given.items()
+        if isinstance(changes, Mapping)
+    }
 
 
 def find_ignored_inputs(engine: Engine, problem: Problem) -> str | None:

@@ -48,6 +48,7 @@ class LagrangeEngine:
     gives = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
     settings = LagrangeSettings
     takes_inputs = True
+    settings_source = "the suite's own choice: a tolerance near round-off, since the others are measured by this engine"
 
     @property
     def version(self) -> str:

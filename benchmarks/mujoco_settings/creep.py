@@ -27,44 +27,10 @@ from velodrome.engines.engine import Problem, Trajectory
 from velodrome.engines.mujoco.settings import ContactSettings
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.contact import observe
-from velodrome.reference.dae import contact_parameters
 from velodrome.reference.kernels import contact
 from velodrome.reference.kernels import dynamics as kernel
 from velodrome.reference.kinematics import angular_velocities, constants
-from velodrome.reference.surface import Surface
-
-
-def contact_acceleration(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-    """Compute the acceleration J' q' of both contact points along a trajectory, along the ground's tangents.
-
-    Parameters
-    ----------
-    bicycle : Bicycle
-    surface : Surface
-    q, qd : ndarray, shape (n, 9)
-        Coordinates and rates.
-
-    Returns
-    -------
-    ndarray, shape (n, 2, 2)
-        Lateral and forward part for each wheel [m/s^2].
-
-    Raises
-    ------
-    ValueError
-        If a wheel has no contact point.
-    """
-    c, function, parameters = constants(bicycle), surface.function.real, surface.parameters
-    out = np.empty((len(q), 2, 2))
-    jacobian, gamma, rate = np.empty((6, 9)), np.empty(6), np.empty(6)
-    for n in range(len(q)):
-        p = contact_parameters(bicycle, surface, q[n])
-        kernel.rolling(q[n], qd[n], p, function, parameters, c, jacobian, gamma, rate)
-        for k, (centre, x, axle, z, radius) in enumerate(kernel.wheels(q[n], c)):
-            xi, eta, angle = p[3 * k : 3 * k + 3]
-            here = contact.equations(centre, x, z, radius, xi, eta, angle, function, parameters)
-            out[n, k] = [axis @ gamma[3 * k : 3 * k + 3] for axis in contact.tangents(axle, here.normal)]
-    return out
+from velodrome.reports.measure import contact_acceleration
 
 
 def impedance(depth: np.ndarray, shape: tuple[float, float, float, float, float]) -> np.ndarray:

@@ -17,8 +17,9 @@ from velodrome.engines.mujoco import exact_contact, native
 from velodrome.engines.mujoco.ride import set_start
 from velodrome.engines.mujoco.settings import ExactContactSettings, Integrator, NativeSettings
 from velodrome.reference.kinematics import WHEELS
+from velodrome.reports.measure import contact_acceleration
 
-from .creep import contact_acceleration, settled_slip
+from .creep import settled_slip
 from .study import drift_rate, is_settled, slip_power
 
 INTEGRATORS: tuple[Integrator, ...] = get_args(Integrator)

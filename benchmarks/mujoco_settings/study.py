@@ -29,8 +29,7 @@ from velodrome.reference.contact import observe
 from velodrome.reference.kernels.contact import tangents
 from velodrome.reference.kernels.dynamics import wheels
 from velodrome.reference.kinematics import REAR_ANGLE, constants
-
-from .creep import contact_acceleration
+from velodrome.reports.measure import contact_acceleration
 
 LADDER: tuple[MujocoEngine[Any], ...] = (default.ENGINE, native.ENGINE, exact_contact.ENGINE, multipliers.ENGINE)
 NEEDS = {exact_contact.ENGINE.name: 1, multipliers.ENGINE.name: 2}

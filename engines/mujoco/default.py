@@ -19,4 +19,5 @@ ENGINE = MujocoEngine(
     DefaultSettings,
     "velodrome.engines.mujoco.planes:build_planes",
     description="MuJoCo with the options that it has when nobody sets any: soft contacts on tangent planes",
+    settings_source="MuJoCo's own defaults, as the reference of its model files states them for option and geom",
 )

@@ -54,6 +54,8 @@ class MujocoEngine(Generic[S]):
         something runs, so that listing the engines does not load the library.
     description : str
         The engine in one line.
+    settings_source : str
+        Whose choice the defaults of the settings are.
     gives : tuple of str
     """
 
@@ -61,6 +63,7 @@ class MujocoEngine(Generic[S]):
     settings: type[S]
     builder: str
     description: str
+    settings_source: str
     gives: tuple[str, ...] = GIVES
     takes_inputs = True
 

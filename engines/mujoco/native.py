@@ -22,4 +22,6 @@ ENGINE = MujocoEngine(
     NativeSettings,
     "velodrome.engines.mujoco.planes:build_planes",
     description="MuJoCo as a careful user sets it: stiff contacts on tangent planes, hard friction",
+    settings_source="the suite's own choice within MuJoCo's documented limits: contacts as stiff as two steps allow, "
+    "implicitfast, elliptic cone, impratio 10, and friction 2, which is more than the library's rides need",
 )

@@ -3,6 +3,7 @@
 from .balance import InputWork, conserved_energy, measure_work
 from .consistency import LARGEST_NOISE, TURNING, Mismatch, describe_mismatch, evaluate_ride, find_mismatches
 from .convergence import extrapolate, observed_orders
+from .creep import Creep, contact_acceleration, measure_creep
 from .fall import cut_at_fall, fell_at, until_fall
 from .friction import normal_force, required_friction
 from .identify import DISTURBANCES, IDENTIFY_LEVELS, STENCIL_WEIGHT, Identified, identify, interval_of, jacobian_at
@@ -18,6 +19,7 @@ from .precision import (
     eigenvalue_document,
     eigenvalue_pairs,
     engine_document,
+    measure_order_range,
 )
 from .quantities import QUANTITIES, Quantity
 from .steady import steady_trajectory
@@ -32,6 +34,7 @@ __all__ = [
     "START_ERROR",
     "STENCIL_WEIGHT",
     "TURNING",
+    "Creep",
     "Identified",
     "InputWork",
     "Level",
@@ -44,6 +47,7 @@ __all__ = [
     "comparison_horizon",
     "compute_metrics",
     "conserved_energy",
+    "contact_acceleration",
     "cut_at_fall",
     "describe_mismatch",
     "eigenvalue_document",
@@ -59,6 +63,8 @@ __all__ = [
     "identify",
     "interval_of",
     "jacobian_at",
+    "measure_creep",
+    "measure_order_range",
     "measure_work",
     "noise",
     "normal_force",

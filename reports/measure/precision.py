@@ -80,9 +80,7 @@ def measure_convergence(levels: Sequence[Level], reference: Trajectory, size: fl
     """
     if len(levels) < 2 or step_changes_nothing(levels):
         return None
-    errors = np.array([position_errors(level.trajectory, reference) for level in levels]).max(axis=0)
-    beyond = np.flatnonzero(errors > SMALL * size)
-    samples = int(beyond[0]) if len(beyond) else len(errors)
+    samples = _count_small_errors(levels, reference, size)
     if samples < 2:
         return None
     paths = [level.trajectory.q[:samples, :3] for level in levels]
@@ -90,6 +88,42 @@ def measure_convergence(levels: Sequence[Level], reference: Trajectory, size: fl
     distance = np.linalg.norm(limit.value - reference.q[:samples, :3], axis=1)
     window = float(reference.time[samples - 1])
     return StepConvergence(window, observed_orders(paths), float(distance.max()), limit.uncertainty)
+
+
+def measure_order_range(levels: Sequence[Level], reference: Trajectory, size: float) -> tuple[float, float] | None:
+    """Return the least and the largest order that the three finest levels show over parts of the ride.
+
+    The parts are the first quarter, half and three quarters of the window of `measure_convergence`, and the whole. A
+    method in its asymptotic range shows nearly the same order in all of them; a wide range says that the observed order
+    is not settled.
+
+    Parameters
+    ----------
+    levels, reference, size
+        As in `measure_convergence`.
+
+    Returns
+    -------
+    tuple of float or None
+        None with fewer than three levels, where levels are equal to the last bit, or where errors are not small.
+    """
+    if len(levels) < 3 or step_changes_nothing(levels):
+        return None
+    samples = _count_small_errors(levels, reference, size)
+    found = [
+        order
+        for quarters in range(1, 5)
+        for order in observed_orders([level.trajectory.q[: samples * quarters // 4, :3] for level in levels[-3:]])
+        if samples * quarters // 4 > 1 and np.isfinite(order)
+    ]
+    return (min(found), max(found)) if found else None
+
+
+def _count_small_errors(levels: Sequence[Level], reference: Trajectory, size: float) -> int:
+    """Return the number of first samples in which the error of every level is small."""
+    errors = np.array([position_errors(level.trajectory, reference) for level in levels]).max(axis=0)
+    beyond = np.flatnonzero(errors > SMALL * size)
+    return int(beyond[0]) if len(beyond) else len(errors)
 
 
 def step_changes_nothing(levels: Sequence[Level]) -> bool:

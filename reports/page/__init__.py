@@ -1,5 +1,6 @@
-"""The report of a run as a self-contained HTML page."""
+"""The report of a run and the page of a league, as self-contained HTML."""
 
 from .document import make_page
+from .league import LEAGUE_COLUMNS, find_creeping, make_league_page, rank_rides
 
-__all__ = ["make_page"]
+__all__ = ["LEAGUE_COLUMNS", "find_creeping", "make_league_page", "make_page", "rank_rides"]

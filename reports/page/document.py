@@ -59,7 +59,7 @@ def make_page(
     str
         A self-contained HTML document with style, script and data. All text from the run is escaped.
     """
-    names, script = list(trajectories), _read_part("page.js")
+    names, script = list(trajectories), read_part("page.js")
     inputs = Inputs(**scenario.get("inputs") or {})
     ride = RideData(surface, trajectories, inputs=inputs)
     circular = scenario["motion"].get("kind") != "upright"
@@ -68,12 +68,12 @@ def make_page(
     unsteady = find_unsteadiness(surface, inputs, circular)
     duration, rate = scenario["simulation"]["duration"], manifest["start"]["growth_rate"]
     ends = {name: float(run.time[-1]) for name, run in trajectories.items()}
-    return _load_template().render(
+    return load_template("page.html").render(
         _result_values(measured, rate, duration, ends),
         manifest=manifest,
         facts=words.list_facts(manifest, scenario),
         stability=describe_stability(rate, unsteady),
-        engines=_engine_styles(names),
+        engines=list_engine_styles(names),
         failures={name: entry["failed"] for name, entry in manifest["engines"].items() if "failed" in entry},
         left_out=manifest.get("left_out", {}),
         verdicts=[{"holds": verdict["holds"], "line": format_verdict(verdict)} for verdict in verdicts],
@@ -88,7 +88,7 @@ def make_page(
             "panels": [curves.panel_data(drawn, names, measured) for _, group in groups for drawn in group],
             "plan": trails,
         },
-        style=Markup(_read_part("page.css")),
+        style=Markup(read_part("page.css")),
         script=Markup(script),
         script_hash=_script_hash(script),
     )
@@ -112,21 +112,23 @@ def _result_values(
     }
 
 
-def _load_template() -> Template:
+def load_template(name: str) -> Template:
+    """Load a template of this folder."""
     # Strict: a misspelt name in the template is an error instead of a gap.
     environment = Environment(
         autoescape=True,
-        loader=FunctionLoader(_read_part),
+        loader=FunctionLoader(read_part),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     environment.filters["setting"] = words.describe_setting
-    return environment.get_template("page.html")
+    return environment.get_template(name)
 
 
-def _read_part(name: str) -> str:
+def read_part(name: str) -> str:
+    """Return the text of a file of this folder."""
     return (_PARTS / name).read_text(encoding="utf-8")
 
 
@@ -135,7 +137,7 @@ def _script_hash(script: str) -> str:
     return "sha256-" + base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 
-def _engine_styles(names: list[str]) -> list[dict[str, str]]:
+def list_engine_styles(names: list[str]) -> list[dict[str, str]]:
     """Return the colours and dashes of each engine."""
     paint, dash = assign_colours(names), line_dashes(names)
     return [

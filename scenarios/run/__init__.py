@@ -1,7 +1,7 @@
 """Runs of a scenario in every engine: planning, simulation, measurement and the run folder."""
 
 from ..scenario import configure_engine, installed_engines
-from .folder import RunPlan, library_versions, write_run_recording
+from .folder import RunPlan, describe_run_environment, library_versions, write_run_recording
 from .runner import (
     RunOutcome,
     RunResult,
@@ -34,6 +34,7 @@ __all__ = [
     "check_stored_scenario",
     "claimed_noise",
     "configure_engine",
+    "describe_run_environment",
     "find_part",
     "installed_engines",
     "library_versions",

@@ -112,9 +112,7 @@ def write_manifest(
         "left_out": plan.left_out,
         "warnings": list(plan.start.problem.bicycle.warnings()),
         "verdicts": list(verdicts),
-        "libraries": library_versions(),
-        "suite": find_commit(),
-        "platform": describe_machine(),
+        **describe_run_environment(),
         "inputs": asdict(start.problem.inputs),
         "start": {
             "family": start.family,
@@ -125,6 +123,11 @@ def write_manifest(
     }
     write_sealed(folder / "manifest.json", manifest, RUN_VERSION)
     return manifest
+
+
+def describe_run_environment() -> dict[str, Any]:
+    """Return what results depend on beside their input: ``libraries``, the ``suite``'s commit and the ``platform``."""
+    return {"libraries": library_versions(), "suite": find_commit(), "platform": describe_machine()}
 
 
 def library_versions() -> dict[str, str]:

@@ -90,10 +90,10 @@ def study_precision(
     # Errors are relative to the reference, so its own levels have coarser steps than the reference ride.
     coarser = [2.0 ** (levels - level) for level in range(levels)]
     ladders = {
-        engine: _make_ladder(settings, coarser if engine == REFERENCE else factors)
+        engine: make_ladder(settings, coarser if engine == REFERENCE else factors)
         for engine, (_, settings) in plan.engines.items()
     }
-    problem = _sample_problem(plan, ladders)
+    problem = sample_problem(plan, ladders)
     engine, settings = plan.engines[REFERENCE]
     watch(REFERENCE, 0.0, _duration(problem))
     try:
@@ -107,10 +107,10 @@ def study_precision(
     undisturbed = replace(plan.start.problem, q=q, qd=qd)
     unsteady = find_unsteadiness(undisturbed.surface, undisturbed.inputs, plan.start.motion is not None)
     for engine_name, (engine, settings) in plan.engines.items():
-        runs = list(_run_levels(engine, ladders[engine_name], plan.start, problem, reference, watch, trace))
+        runs = list(run_levels(engine, ladders[engine_name], plan.start, problem, reference, watch, trace))
         found = [run for run in runs if isinstance(run, Level)]
-        failures = [run.as_json() for run in runs if isinstance(run, _Failure)]
-        ran = not runs or not all(isinstance(run, _Failure) and run.broke for run in runs)
+        failures = [run.as_json() for run in runs if isinstance(run, LevelFailure)]
+        ran = not runs or not all(isinstance(run, LevelFailure) and run.broke for run in runs)
         identified = _identify(engine, settings, undisturbed, unsteady, watch, trace) if eigenvalues else None
         studies[engine_name] = Study(found, failures, ran, identified)
     return _make_document(name, plan.start, problem, reference, undisturbed, studies)
@@ -122,14 +122,29 @@ def all_ran(document: Mapping[str, Any]) -> bool:
 
 
 @dataclass(frozen=True)
-class _Failure:
-    """A level without a result: its step, the reason, and whether the engine raised an exception."""
+class LevelFailure:
+    """A level that has no place in a study of convergence.
+
+    Attributes
+    ----------
+    step : float or None
+        Step of its settings [s].
+    reason : str
+    level : Level or None
+        Its ride up to a fall or an early end; None if the engine raised an exception.
+    """
 
     step: float | None
     reason: str
-    broke: bool
+    level: Level | None = None
+
+    @property
+    def broke(self) -> bool:
+        """Whether the engine raised an exception."""
+        return self.level is None
 
     def as_json(self) -> dict[str, Any]:
+        """Return step and reason, as documents list them."""
         return {"step": self.step, "reason": self.reason}
 
 
@@ -137,7 +152,7 @@ def _duration(problem: Problem) -> float:
     return float(problem.times[-1])
 
 
-def _make_ladder(settings: Settings, factors: list[float]) -> list[Settings]:
+def make_ladder(settings: Settings, factors: list[float]) -> list[Settings]:
     """Return the settings of all levels whose steps are in range."""
     found = []
     for factor in factors:
@@ -159,7 +174,7 @@ def _make_refinable(settings: Settings) -> Settings:
     return settings
 
 
-def _sample_problem(plan: RunPlan, ladders: Mapping[str, list[Settings]]) -> Problem:
+def sample_problem(plan: RunPlan, ladders: Mapping[str, list[Settings]]) -> Problem:
     """Return the scenario's problem, sampled at the shortest interval that all steps divide."""
     simulation = plan.scenario.simulation
     samples = round(simulation.duration * simulation.output_rate)
@@ -206,7 +221,7 @@ def _fits(name: str, engine: Engine, ladder: list[Settings], problem: Problem) -
     return True
 
 
-def _run_levels(
+def run_levels(
     engine: Engine,
     ladder: list[Settings],
     start: Start,
@@ -214,23 +229,45 @@ def _run_levels(
     reference: Trajectory,
     watch: RunWatch,
     trace: Trace | None,
-) -> Iterator[Level | _Failure]:
+) -> Iterator[Level | LevelFailure]:
+    """Run an engine with each of the settings of a ladder; a level that fell or ended early is a failure.
+
+    Parameters
+    ----------
+    engine : Engine
+    ladder : list of Settings
+    start : Start
+    problem : Problem
+        That of the start, sampled as `sample_problem` returns it.
+    reference : Trajectory
+        The reference's ride of the problem.
+    watch : callable
+        Called with the engine's name, the simulated time reached and the duration [s].
+    trace : callable or None
+        Called with the engine's name and the exception that it raised.
+
+    Yields
+    ------
+    Level or LevelFailure
+    """
     for settings in ladder:
         step = getattr(settings, "step", None)
         try:
             trajectory = ride_engine(engine, problem, settings, lambda t: watch(engine.name, t, _duration(problem)))
         except Exception as error:  # an engine may raise anything; the other engines still run
-            yield _Failure(step, why_failed(error), broke=True)
+            yield LevelFailure(step, why_failed(error))
             if trace is not None:
                 trace(engine.name, error)
             continue
         measured = measure_one(start, trajectory, reference, step_noise=claimed_noise(engine, settings))
+        simulated = _duration(problem) if trajectory.ended is None else float(trajectory.time[-1])
+        level = Level(simulated / max(trajectory.steps, 1), trajectory, measured)
         if trajectory.ended is not None:
-            yield _Failure(step, f"ended at {trajectory.time[-1]:.6g} s: {trajectory.ended}", broke=False)
+            yield LevelFailure(step, f"ended at {trajectory.time[-1]:.6g} s: {trajectory.ended}", level)
         elif measured["fell_at"] is not None:
-            yield _Failure(step, f"fell at {measured['fell_at']:.6g} s", broke=False)
+            yield LevelFailure(step, f"fell at {measured['fell_at']:.6g} s", level)
         else:
-            yield Level(_duration(problem) / trajectory.steps, trajectory, measured)
+            yield level
 
 
 def _identify(

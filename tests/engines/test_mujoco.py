@@ -14,7 +14,6 @@ from pydantic import ValidationError
 from ripples import Ripples
 from scipy.optimize import root
 
-from benchmarks.mujoco_settings.creep import contact_acceleration
 from benchmarks.mujoco_settings.study import slip_power
 from velodrome.engines.engine import EngineError, Problem, Trajectory
 from velodrome.engines.mujoco.native import ENGINE
@@ -28,6 +27,7 @@ from velodrome.reference.dae import consistent_state, dynamics
 from velodrome.reference.kernels import dynamics as kernel
 from velodrome.reference.kinematics import body_positions, constants, quaternions, rotations
 from velodrome.reference.surface import Paraboloid, Plane, Surface
+from velodrome.reports.measure.creep import contact_acceleration
 
 BOWL = Paraboloid(1 / 200)
 # Q2's spectrum: the fastest mode decays at 12.3 1/s, the weave turns at 6.7 rad/s; the wheels spin at 18 rad/s.

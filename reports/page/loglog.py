@@ -1,0 +1,92 @@
+"""Plots with two logarithmic axes, drawn without a script: lines in an SVG, marks and labels beside it in HTML.
+
+Lines are stretched with the page; marks and labels keep their size at any width.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .curves import round_values
+
+_MOST_LABELS = 8  # on an axis; further powers of ten have lines of the grid without a label
+_DIGITS = 5
+
+Points = Sequence[tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class DecadeAxis:
+    """A logarithmic axis over whole decades, from 10^low to 10^high."""
+
+    low: int
+    high: int
+
+    def place(self, value: float) -> float:
+        """Return the place of a positive value, 0 at the low end and 100 at the high end."""
+        return round_values(100 * (math.log10(value) - self.low) / (self.high - self.low), _DIGITS)
+
+    @property
+    def ticks(self) -> list[dict[str, Any]]:
+        """Powers of ten: ``power``, ``at`` (0 to 100) and whether it is ``labelled``."""
+        span = self.high - self.low
+        every = -(-span // _MOST_LABELS)
+        return [
+            {"power": power, "at": round_values(100 * (power - self.low) / span, _DIGITS), "labelled": k % every == 0}
+            for k, power in enumerate(range(self.low, self.high + 1))
+        ]
+
+
+def fit_axis(values: Sequence[float]) -> DecadeAxis:
+    """Return the shortest axis that holds positive values."""
+    low, high = math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)))
+    return DecadeAxis(low, high if high > low else low + 1)
+
+
+def draw_loglog(series: Mapping[str, Points], names: Sequence[str], guide: Points = ()) -> dict[str, Any] | None:
+    """Place the points of engines on two logarithmic axes.
+
+    Parameters
+    ----------
+    series : mapping of str to sequence of (float, float)
+        Points by engine; those that are not positive are left out, as a logarithm has no place for them.
+    names : sequence of str
+        Engines in the order of the page's colours.
+    guide : sequence of (float, float)
+        A further line, such as a law; its ends are cut to the axes of the points.
+
+    Returns
+    -------
+    dict or None
+        ``x`` and ``y`` ticks; ``lines`` with ``engine`` (index), ``path`` (SVG, y down) and ``marks``; ``guide``, an
+        SVG path or None. None without a point.
+    """
+    kept = {
+        name: [(x, y) for x, y in points if x > 0 and y > 0 and math.isfinite(x) and math.isfinite(y)]
+        for name, points in series.items()
+    }
+    kept = {name: points for name, points in kept.items() if points}
+    if not kept:
+        return None
+    across = fit_axis([x for points in kept.values() for x, _ in points])
+    up = fit_axis([y for points in kept.values() for _, y in points])
+
+    def trace(points: Points) -> list[tuple[float, float]]:
+        return [(across.place(x), round_values(100 - up.place(y), _DIGITS)) for x, y in points]
+
+    return {
+        "x": across.ticks,
+        "y": up.ticks,
+        "lines": [
+            {"engine": names.index(name), "path": _write_path(trace(points)), "marks": trace(points)}
+            for name, points in kept.items()
+        ],
+        "guide": _write_path(trace(guide)) if guide else None,
+    }
+
+
+def _write_path(places: Points) -> str:
+    return "M" + "L".join(f"{x:g} {y:g}" for x, y in places)
