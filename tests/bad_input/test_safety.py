@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from html.parser import HTMLParser
 from importlib.metadata import EntryPoint, PackageNotFoundError, distribution
 from pathlib import Path
+from typing import Any
 
 import pytest
 from complaints import refusing
