@@ -33,6 +33,8 @@ class DrakeEngine(Generic[S]):
         runs, so that listing the engines does not load the library.
     description : str
         The engine in one line.
+    settings_source : str
+        Whose choice its default settings are.
     gives : tuple of str
     """
 
@@ -40,6 +42,7 @@ class DrakeEngine(Generic[S]):
     settings: type[S]
     builder: str
     description: str
+    settings_source: str
     gives: tuple[str, ...] = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
     takes_inputs = True
 
@@ -132,10 +135,14 @@ MULTIPLIERS = DrakeEngine(
     DrakeMultiplierSettings,
     "velodrome.engines.drake.multipliers:build_rolling_plant",
     description="Drake's tree and integrators under the exact forces of rolling, without its contacts",
+    settings_source="the suite's own choice: Drake's default integrator at a fixed step, gaps and slip brought back to "
+    "zero at 1 /s",
 )
 NATIVE = DrakeEngine(
     "drake-native",
     DrakeContactSettings,
     "velodrome.engines.drake.planes:build_contact_plant",
     description="Drake's tree and discrete contact solvers, thin wheels on tangent planes",
+    settings_source="Drake's defaults of MultibodyPlantConfig, but for the suite's own choice of friction 2, which the "
+    "rides need, and of a stiffness of 1e8 N/m, at which wheels hardly sink",
 )
