@@ -29,14 +29,22 @@ class MjxEngine(Generic[S]):
     settings : type
     description : str
         The engine in one line.
+    settings_source : str
+        Whose choice its default settings are.
     gives : tuple of str
     """
 
     name: str
     settings: type[S]
     description: str
+    settings_source: str
     gives: tuple[str, ...] = GIVES
     takes_inputs = True
+
+    @property
+    def bit_variants(self) -> dict[str, dict[str, Any]]:
+        """Places in a batch at which a ride should be the same to the last bit; see `Engine`."""
+        return {"last place of a batch of 4": {"batch_size": 4, "batch_place": 3}}
 
     @property
     def version(self) -> str:
@@ -87,9 +95,11 @@ ENGINE = MjxEngine(
     "mjx",
     MjxSettings,
     description="MJX, MuJoCo's port to JAX, with the model of mujoco-native",
+    settings_source="those of mujoco-native, whose model it rides: the suite's own choice within MuJoCo's documented limits",
 )
 MULTIPLIERS = MjxEngine(
     "mjx-multipliers",
     MjxMultiplierSettings,
     description="MJX's tree under the exact forces of rolling, without its contacts and integrators",
+    settings_source="those of mujoco-multipliers: the suite's own choice",
 )

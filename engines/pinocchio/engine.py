@@ -43,8 +43,8 @@ class PinocchioEngine:
     name = "pinocchio-constraint"
     description = "Pinocchio's tree and constraint solver, with the acceleration of the rolling contacts given to it"
     settings_source = (
-        "those of Pinocchio's example simulation-contact-dynamics.py, but for Runge-Kutta's method instead of its method "
-        "of order 1, and an accuracy of 1e-9 N, above the round-off of the forces"
+        "those of Pinocchio's example simulation-contact-dynamics.py, but for Runge-Kutta's method instead of one of "
+        "order 1, and an accuracy of 1e-9 N, above the round-off of the forces"
     )
     gives = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
     settings = ConstraintSettings

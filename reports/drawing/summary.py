@@ -60,7 +60,8 @@ def make_remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list
             f"{left}; its figures are not those of its equations"
         )
     # Of a whole ride the rate is absent only where the drift is lost in the error of the damping's work.
-    if metrics["energy_drift_rate"] is None and metrics["energy_drift"] is not None and metrics["ended"] is None:
+    lost = metrics.get("energy_drift") is not None and metrics["energy_drift_rate"] is None
+    if lost and metrics["ended"] is None:
         lines.append(
             f"{name}: its energy drift is no more than {metrics['energy_drift']:.2g}, the error of the damping's work "
             "between samples; a higher output rate shows more"
