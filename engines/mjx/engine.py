@@ -95,7 +95,7 @@ ENGINE = MjxEngine(
     "mjx",
     MjxSettings,
     description="MJX, MuJoCo's port to JAX, with the model of mujoco-native",
-    settings_source="those of mujoco-native, whose model it rides: the suite's own choice within MuJoCo's documented limits",
+    settings_source="those of mujoco-native, whose model it rides: the suite's own choice within MuJoCo's limits",
 )
 MULTIPLIERS = MjxEngine(
     "mjx-multipliers",
