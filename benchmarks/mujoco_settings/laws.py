@@ -15,14 +15,14 @@ from velodrome.engines.admission import ride_engine
 from velodrome.engines.engine import EngineError, Problem
 from velodrome.engines.mujoco import exact_contact, native
 from velodrome.engines.mujoco.ride import set_start
-from velodrome.engines.mujoco.settings import ExactContactSettings, Integrator, NativeSettings
+from velodrome.engines.mujoco.settings import ExactContactSettings, NativeSettings, TreeIntegrator
 from velodrome.reference.kinematics import WHEELS
 from velodrome.reports.measure import contact_acceleration
 
 from .creep import settled_slip
 from .study import drift_rate, is_settled, slip_power
 
-INTEGRATORS: tuple[Integrator, ...] = get_args(Integrator)
+INTEGRATORS: tuple[TreeIntegrator, ...] = get_args(Integrator)
 Pair = tuple[float, float]
 
 
@@ -143,7 +143,7 @@ def creep_study(
     return rows
 
 
-def energy_row(problem: Problem, integrator: Integrator, step: float) -> EnergyRow:
+def energy_row(problem: Problem, integrator: TreeIntegrator, step: float) -> EnergyRow:
     """Measure the energy that an integrator adds on a circular motion, with exact contacts."""
     settings = ExactContactSettings(integrator=integrator, step=step)
     trajectory = ride_engine(exact_contact.ENGINE, problem, settings, lambda _: None)
@@ -156,7 +156,7 @@ def energy_row(problem: Problem, integrator: Integrator, step: float) -> EnergyR
 
 
 def energy_study(
-    problem: Problem, steps: Sequence[float], integrators: Sequence[Integrator] = INTEGRATORS
+    problem: Problem, steps: Sequence[float], integrators: Sequence[TreeIntegrator] = INTEGRATORS
 ) -> list[EnergyRow]:
     """Measure the energy that integrators add, over steps that divide the problem's interval."""
     return [energy_row(problem, integrator, step) for integrator in integrators for step in steps]

@@ -196,7 +196,7 @@ def test_a_trajectory_late_by_a_sample_fails(name: str) -> None:
 
 @pytest.mark.usefixtures("rides_only")
 def test_a_flipped_sign_in_one_row_of_a_jacobian_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    original = joint._make_user_functions
+    original = joint.make_constraint_functions
 
     def flipped(*arguments: Any) -> Any:
         constraint, jacobian = original(*arguments)
@@ -208,7 +208,7 @@ def test_a_flipped_sign_in_one_row_of_a_jacobian_fails(monkeypatch: pytest.Monke
 
         return constraint, wrong
 
-    monkeypatch.setattr(joint, "_make_user_functions", flipped)
+    monkeypatch.setattr(joint, "make_constraint_functions", flipped)
     assert failing(verdicts_on("exudyn"))
 
 
