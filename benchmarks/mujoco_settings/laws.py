@@ -22,7 +22,7 @@ from velodrome.reports.measure import contact_acceleration
 from .creep import settled_slip
 from .study import drift_rate, is_settled, slip_power
 
-INTEGRATORS: tuple[TreeIntegrator, ...] = get_args(Integrator)
+INTEGRATORS: tuple[TreeIntegrator, ...] = get_args(TreeIntegrator)
 Pair = tuple[float, float]
 
 

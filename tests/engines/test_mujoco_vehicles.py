@@ -146,7 +146,10 @@ def test_cart_under_contacts_scrubs() -> None:
     assert np.linalg.norm(found.position - free.position, axis=2).max() < 1e-3
 
 
-@pytest.mark.parametrize(("name", "rolling"), [("tandem", "contacts"), ("tandem", "forces"), ("cart", "forces")])
+@pytest.mark.parametrize(
+    ("name", "rolling"),
+    [pytest.param("tandem", "contacts", marks=pytest.mark.slow), ("tandem", "forces"), ("cart", "forces")],
+)
 def test_vehicles_agree_with_exudyn(name, rolling) -> None:
     """At 1 ms within 1e-5 m: what Exudyn's second-order method leaves."""
     other: Any = pytest.importorskip("exudyn_vehicles")

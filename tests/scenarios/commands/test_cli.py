@@ -19,7 +19,15 @@ from altered import Altered, pressing_ctrl_c, raising
 from tests.literature import published, rounds_to
 from tests.sealing import contents
 from velodrome.engines import engine as registry
-from velodrome.engines.engine import Engine, EngineError, Settings, Trajectory, engine_names, load_engine
+from velodrome.engines.engine import (
+    Engine,
+    EngineError,
+    Settings,
+    Trajectory,
+    engine_names,
+    load_engine,
+    uninstalled_engines,
+)
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.families import find_motion
 from velodrome.reference.surface import Paraboloid
@@ -39,8 +47,11 @@ def test_list_names_every_scenario_and_engine(velodrome) -> None:
     found = result.json()
     assert [entry["name"] for entry in found["scenarios"]] == library_names()
     assert all(entry["title"] and entry["tags"] for entry in found["scenarios"])
-    assert [entry["name"] for entry in found["engines"]] == engine_names()
-    for entry in found["engines"]:
+    there = [entry for entry in found["engines"] if "install" not in entry]
+    assert [entry["name"] for entry in there] == engine_names()
+    absent = {entry["name"]: entry["install"] for entry in found["engines"] if "install" in entry}
+    assert absent == uninstalled_engines()
+    for entry in there:
         assert entry["version"] == load_engine(entry["name"]).version
         assert entry["gives"] == list(load_engine(entry["name"]).gives)
     table = velodrome("list")

@@ -53,6 +53,11 @@ from velodrome.scenarios.scenario.schema import LIBRARY, Gate, Perturbation, Sce
 from velodrome.scenarios.scenario.start import make_start
 
 NAMES = engine_names()
+# One of Exudyn's engines stands for the others.
+REPEATED = [
+    pytest.param(name, marks=pytest.mark.slow if name in ("exudyn-plane-normal", "exudyn-builtin") else ())
+    for name in NAMES
+]
 FALLS = "mujoco-default"
 FIXED_STEP = {
     "exudyn": 0.002,
@@ -103,7 +108,7 @@ def disturbed(scenario: Scenario) -> bool:
     return scenario.perturbation != Perturbation()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", REPEATED)
 def test_a_clean_repeat_passes_in_every_quantity(name: str) -> None:
     for scenario, verdicts in verdicts_of(name, scenarios=gated_with(name)).items():
         judged = [verdict for verdict in verdicts if verdict.status != "shown"]
@@ -126,7 +131,7 @@ def test_an_engine_that_no_gated_motion_suits_fails_only_if_it_was_asked_for(mon
 
 
 @pytest.mark.usefixtures("rides_only")
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", REPEATED)
 def test_round_off_of_the_start_stays_far_inside_the_limits(name: str) -> None:
     # What another processor's last digits do: a tenth of the limits where they are what iterations leave, half where
     # they are round-off themselves.

@@ -139,10 +139,6 @@ def test_there_are_ten_measured_bicycles() -> None:
     assert len(FILES) - 1 >= 10
 
 
-def test_a_measured_bicycle_rides_as_the_benchmark_does(folder: Path) -> None:
-    check_rides("Silver", "circle", folder)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("name", sorted(FILES))
