@@ -112,7 +112,7 @@ def build(work: Path) -> Path:
     need(tops == {"velodrome", f"{wheel.name.split('-py3')[0]}.dist-info"}, f"the wheel holds {sorted(tops)}")
     for floor in FLOORS:
         packed = {name.removeprefix("velodrome/") for name in found if name.startswith(f"velodrome/{floor}/")}
-        kinds = ("*.py", "*.toml", "*.json", "page.*")
+        kinds = ("*.py", "*.toml", "*.json", "*.html", "*.css", "*.js")
         there = {str(path.relative_to(tree)) for kind in kinds for path in (tree / floor).rglob(kind)}
         need(packed == there, f"{floor}: packed and in the sources differ by {sorted(packed ^ there)}")
     need("velodrome/py.typed" in found, "py.typed is missing")

@@ -331,7 +331,7 @@ def check(engine: Any, **settings: Any) -> None:
     report = check_engine(engine, settings)
     skipped = {check.name for check in report.checks if check.outcome == "skipped"}
     assert skipped == {"order on waves"}  # no closed form
-    assert len(report.checks) == 27
+    assert len(report.checks) == 29
 
 
 @pytest.mark.parametrize("engine", [ENGINE, MULTIPLIERS], ids=lambda engine: engine.name)
