@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from ...reference.contact import observe
 from ...reference.kinematics import WHEELS
 from ...reference.simulate import steps_per_output
+from ..contact_fields import observe_contact_fields
 from ..coordinates import coordinates_from_bodies, quaternions, start_on_turn
 from ..engine import Problem, Progress, Settings, Trajectory, UnsuitableProblem, package_version
 from .settings import DrakeContactSettings, DrakeMultiplierSettings
@@ -105,7 +105,6 @@ class DrakeEngine(Generic[S]):
             problem.bicycle, recording.time, motion.position[:, 0], motion.velocity[:, 0], motion.rotation, motion.spin
         )
         q = start_on_turn(q, problem.q)
-        observed = observe(problem.bicycle, problem.surface, q, qd)
         return Trajectory(
             engine=self.name,
             version=self.version,
@@ -115,10 +114,8 @@ class DrakeEngine(Generic[S]):
             qd=qd,
             body_position=motion.position,
             body_quaternion=quaternions(motion.rotation),
-            contact_point=observed.point if observed.found else None,
             contact_force=recording.force,
-            gap=observed.gap if observed.found else None,
-            slip=observed.slip if observed.found else None,
+            **observe_contact_fields(problem, q, qd),
             kinetic_energy=recording.kinetic_energy,
             potential_energy=recording.potential_energy,
             steps=ride.steps,

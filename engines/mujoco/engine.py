@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
-from ...reference.contact import observe
+from ..contact_fields import observe_contact_fields
 from ..engine import Problem, Progress, Trajectory, package_version
 from .settings import StepSettings
 from .state import from_mujoco
@@ -132,7 +132,6 @@ def assemble_trajectory(
     """
     recording = ridden.recording
     q, qd = from_mujoco(recording.time, recording.qpos, recording.qvel, problem.q)
-    observed = observe(problem.bicycle, problem.surface, q, qd)
     return Trajectory(
         engine=name,
         version=version,
@@ -142,10 +141,8 @@ def assemble_trajectory(
         qd=qd,
         body_position=recording.position,
         body_quaternion=recording.quaternion,
-        contact_point=observed.point if observed.found else None,
         contact_force=recording.force,
-        gap=observed.gap if observed.found else None,
-        slip=observed.slip if observed.found else None,
+        **observe_contact_fields(problem, q, qd),
         kinetic_energy=recording.energy[:, 1],
         potential_energy=recording.energy[:, 0],
         steps=ridden.steps,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...reference.contact import observe
 from ...reference.dae import mass_matrix
 from ...reference.kinematics import quaternions
 from ...reference.simulate import steps_per_output
+from ..contact_fields import observe_contact_fields
 from ..coordinates import start_on_turn
 from ..engine import Problem, Progress, Trajectory, UnsuitableProblem, package_version
 from .settings import ROUND_OFF, ConstraintSettings
@@ -92,7 +92,6 @@ class PinocchioEngine:
             seen.spin,
         )
         q = start_on_turn(q, problem.q)
-        observed = observe(problem.bicycle, problem.surface, q, qd)
         return Trajectory(
             engine=self.name,
             version=self.version,
@@ -102,10 +101,8 @@ class PinocchioEngine:
             qd=qd,
             body_position=seen.position,
             body_quaternion=quaternions(seen.rotation),
-            contact_point=observed.point if observed.found else None,
             contact_force=seen.force,
-            gap=observed.gap if observed.found else None,
-            slip=observed.slip if observed.found else None,
+            **observe_contact_fields(problem, q, qd),
             kinetic_energy=seen.energy[:, 0],
             potential_energy=seen.energy[:, 1],
             steps=result.steps,
