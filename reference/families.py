@@ -476,6 +476,51 @@ def find_motion(
     """
     Steady(bicycle, surface, inputs)  # refuses inputs with which there is no circular motion
     held = Inputs(steer_torque=inputs.steer_torque)  # damping acts in no circular motion
+    _check_request(rear_rate, family, near, held)
+    numbers = FAMILIES if held == NO_INPUTS else ()
+    found, failures = _search_families(bicycle, surface, rear_rate, numbers if family is None else (family,), near)
+    unsearched = _list_unsearched(bicycle, surface, rear_rate, near)
+    wanted = f"rear rate {rear_rate!r} rad/s on {surface}"
+    if held != NO_INPUTS:
+        wanted += f" under {held.describe()}"
+    if near is None:
+        if found:
+            return found[0]
+        reason = _join_failures(failures) or "its curves, as followed from their anchors, do not reach it"
+        raise _not_found(f"{wanted} in family {family}", [reason, *unsearched], failures, not unsearched)
+
+    def distance(item: tuple[int | None, CircularMotion]) -> float:
+        return float(np.hypot(_turn(item[1].lean - near[0]), _turn(item[1].steer - near[1])))
+
+    if family is None:
+        equations = Steady(bicycle, surface, held)
+        if is_level(surface) and held == NO_INPUTS:
+            found += [(None, motion) for motion in straight_motions(bicycle, surface, rear_rate)]
+        found += _motions_from(equations, rear_rate, near, [motion for _, motion in found])
+        if all(distance(item) > _MEANT for item in found):
+            found += _motions_without_number(equations, rear_rate)
+    least = min(map(distance, found), default=np.inf)
+    # A motion may be on the curves of several families: then it is of the first.
+    nearest = next((item for item in found if distance(item) < least + _SAME_ANGLES), None)
+    if nearest is not None and distance(nearest) <= _NEAR_ENOUGH:
+        return nearest
+    curves = "the curves of the families, and " if numbers else "and "
+    searched = f"Newton's method from there, {curves}{describe_search(held)}"
+    if family is not None:
+        searched = f"the curves of family {family}"
+    reasons = [f"searched were {searched}, on circles of up to {FARTHEST:g} m", *unsearched]
+    if nearest is not None:
+        reasons.insert(0, f"the nearest is at {nearest[1].lean:.6g}, {nearest[1].steer:.6g}")
+    if _is_near_straight(near) and not is_level(surface):
+        reasons.insert(0, "no motion is straight on ground that is not level")
+    if failures:
+        reasons.append(_join_failures(failures))
+    wanted += f" within {_NEAR_ENOUGH} rad of near = {near[0]:g}, {near[1]:g}"
+    raise _not_found(wanted, reasons, failures, not unsearched)
+
+
+def _check_request(rear_rate: float, family: int | None, near: tuple[float, float] | None, held: Inputs) -> None:
+    """Raise a ValueError where what `find_motion` is asked for is no motion; ``held`` are the torques alone."""
     if not (np.isfinite(rear_rate) and rear_rate > 0):
         raise ValueError(f"rear rate is {rear_rate!r}; it must be a positive number of rad/s")
     if family is None and near is None:
@@ -486,64 +531,46 @@ def find_motion(
         raise ValueError(f"near is {near!r}; it must be two finite angles, lean and steer in rad")
     if family is not None and held != NO_INPUTS:
         raise ValueError(f"{_explain_numbers(held)}; give the lean and steer that the motion is near to, and no family")
+
+
+def _search_families(
+    bicycle: Bicycle,
+    surface: SurfaceOfRevolution,
+    rear_rate: float,
+    numbers: Sequence[int],
+    near: tuple[float, float] | None,
+) -> tuple[list[tuple[int | None, CircularMotion]], dict[int, ValueError]]:
+    """Return the hands-free motions of a rear rate in families, by number, and why families could not be followed.
+
+    Without ``near`` they are the first of each family; with it, all of them and their mirror images.
+    """
     found: list[tuple[int | None, CircularMotion]] = []
     failures: dict[int, ValueError] = {}
-    numbers = FAMILIES if held == NO_INPUTS else ()
-    for number in numbers if family is None else (family,):
+    for number in numbers:
         try:
             met = _yield_motions(bicycle, surface, number, rear_rate)
             found += [(number, motion) for motion in (islice(met, 1) if near is None else met)]
         except ValueError as error:
             failures[number] = error
-    if near is not None and held == NO_INPUTS:
+    if near is not None:
         # Left and right are exchanged freely; the families' curves turn to the left.
         found += [(number, mirror_motion(motion)) for number, motion in found]
-    wanted = f"rear rate {rear_rate!r} rad/s on {surface}"
-    if held != NO_INPUTS:
-        wanted += f" under {held.describe()}"
+    return found, failures
+
+
+def _list_unsearched(
+    bicycle: Bicycle, surface: SurfaceOfRevolution, rear_rate: float, near: tuple[float, float] | None
+) -> list[str]:
+    """List the motions that may be those asked for and that no search reaches: nearly straight ones, and fast ones."""
+    unsearched = []
+    bounded = is_level(surface) or surface.extent[1] <= FARTHEST
+    if near is not None and not bounded and _is_near_straight(near):
+        unsearched.append("larger ones, which are nearly straight, were not")
     # The front wheel's rate is about that at which its rim runs as fast as the rear one.
     largest = np.sqrt(SIGMA_UNIT * largest_sigma(bicycle))
-    slow = rear_rate * np.hypot(1.0, bicycle.rear_wheel_radius / bicycle.front_wheel_radius) < largest
-    too_fast = f"motions whose wheels turn faster than {largest:.4g} rad/s together were not searched"
-    if near is None:
-        if not found:
-            reason = _join_failures(failures) or "its curves, as followed from their anchors, do not reach it"
-            if not slow:
-                reason += f"; {too_fast}"
-            raise _not_found(f"{wanted} in family {family}", reason, failures, slow)
-        return found[0]
-
-    def distance(item: tuple[int | None, CircularMotion]) -> float:
-        return float(np.hypot(_turn(item[1].lean - near[0]), _turn(item[1].steer - near[1])))
-
-    if family is None:
-        if is_level(surface) and held == NO_INPUTS:
-            found += [(None, motion) for motion in straight_motions(bicycle, surface, rear_rate)]
-        found += _motions_from(Steady(bicycle, surface, held), rear_rate, near, [motion for _, motion in found])
-        if all(distance(item) > _MEANT for item in found):
-            found += _motions_without_number(Steady(bicycle, surface, held), rear_rate)
-    nearest = min(found, key=distance, default=None)
-    if nearest is not None:
-        # A motion may be on the curves of several families: then it is of the first.
-        nearest = next(item for item in found if distance(item) < distance(nearest) + _SAME_ANGLES)
-    if nearest is None or distance(nearest) > _NEAR_ENOUGH:
-        curves = "the curves of the families, and " if numbers else "and "
-        searched = f"Newton's method from there, {curves}{describe_search(held)}"
-        if family is not None:
-            searched = f"the curves of family {family}"
-        parts = [] if nearest is None else [f"the nearest is at {nearest[1].lean:.6g}, {nearest[1].steer:.6g}"]
-        if _is_near_straight(near) and not is_level(surface):
-            parts.insert(0, "no motion is straight on ground that is not level")
-        parts.append(f"searched were {searched}, on circles of up to {FARTHEST:g} m")
-        wide = is_level(surface) or surface.extent[1] <= FARTHEST or not _is_near_straight(near)
-        if not wide:
-            parts.append("larger ones, which are nearly straight, were not")
-        if not slow:
-            parts.append(too_fast)
-        reason = "; ".join([*parts, *([_join_failures(failures)] if failures else [])])
-        wanted = f"{wanted} within {_NEAR_ENOUGH} rad of near = {near[0]:g}, {near[1]:g}"
-        raise _not_found(wanted, reason, failures, wide and slow)
-    return nearest
+    if not rear_rate * np.hypot(1.0, bicycle.rear_wheel_radius / bicycle.front_wheel_radius) < largest:
+        unsearched.append(f"motions whose wheels turn faster than {largest:.4g} rad/s together were not searched")
+    return unsearched
 
 
 def _is_near_straight(near: tuple[float, float]) -> bool:
@@ -561,17 +588,16 @@ def _join_failures(failures: Mapping[int, ValueError]) -> str:
 
 
 def _not_found(
-    wanted: str, reason: str, failures: Mapping[int, ValueError], complete: bool = True
+    wanted: str, reasons: Sequence[str], failures: Mapping[int, ValueError], complete: bool
 ) -> NoSuchMotion | SearchFailed:
     """Return the error of a search without a result.
 
     Where an anchor was lost, its curve has not been searched. Where it ended in a fold, this bicycle has no such curve.
-    Nor is a search ``complete`` for fast motions, and for nearly straight ones in a bowl, whose circles may be larger
-    than all that are searched.
     """
     if complete and all(isinstance(error, NoSuchMotion) for error in failures.values()):
-        return NoSuchMotion(f"no circular motion found with {wanted}; {reason}")
-    return SearchFailed(f"no circular motion found with {wanted}, but the search is not complete; {reason}")
+        return NoSuchMotion("; ".join([f"no circular motion found with {wanted}", *reasons]))
+    found = f"no circular motion found with {wanted}, but the search is not complete"
+    return SearchFailed("; ".join([found, *reasons]))
 
 
 def _motions_from(
