@@ -77,6 +77,9 @@ _SHORTEST_STEP = 1e-6  # of carrying an anchor
 _LARGEST_MOVE = 0.05  # largest change of an unknown of order one in one step of carrying an anchor
 # Two solutions of one condition are the same below this. Round-off, 1e-14, splits a double root by its square root.
 _SAME = 1e-6
+# Yaw rate relative to the root of the sum of the squared rates. Circles of more than 1e8 m lie below it, which nothing
+# follows, and round-off, 1e-16 times the rolling rows' condition of 1e3 or so, far below.
+_STRAIGHT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -134,7 +137,7 @@ def start_on_plane(bicycle: Bicycle, lean: float, steer: float, inputs: Inputs =
     Raises
     ------
     ValueError
-        If the wheels cannot both touch the plane at these angles.
+        If the wheels cannot both touch the plane at these angles, or roll straight on.
     """
     surface, c = Plane(), constants(bicycle)
     function, parameters = surface.function.real, surface.parameters
@@ -147,6 +150,8 @@ def start_on_plane(bicycle: Bicycle, lean: float, steer: float, inputs: Inputs =
     kernel.rolling(q, np.zeros(9), p, function, parameters, c, rows, np.empty(6), np.empty(6))
     speeds = np.linalg.svd(rows[:, [0, 1, 2, 3, 7, 8]])[2][-1]
     speeds = speeds / np.linalg.norm(speeds[3:])
+    if abs(speeds[3]) < _STRAIGHT:
+        raise ValueError(f"the wheels roll straight on at lean = {lean!r}, steer = {steer!r}")
     centre = np.array([speeds[1], -speeds[0]]) / speeds[3]
     u = np.zeros(UNKNOWNS)
     u[:6] = *centre, q[2], lean, q[5], steer

@@ -150,9 +150,16 @@ class Steady:
         return function.real, function.complex, self.surface.parameters, aligned(constants(self.bicycle, self.inputs))
 
     def expand(self, chosen: np.ndarray) -> Expansion:
-        """Evaluate the eight equations and all 22 unknowns at the nine, shape (9,), with their Jacobians."""
+        """Evaluate the eight equations and all 22 unknowns at the nine, shape (9,), with their Jacobians.
+
+        All is nan where the equations have no value, as where nothing has inertia.
+        """
         out = Expansion(np.empty(8), np.empty((8, 9)), np.empty(kernel.UNKNOWNS), np.empty((kernel.UNKNOWNS, 9)))
-        curve.expanded(chosen, *self.where[1:], *out)
+        try:
+            curve.expanded(chosen, *self.where[1:], *out)
+        except ZeroDivisionError:  # compiled code raises it for complex numbers, where real ones give inf
+            for part in out:
+                part.fill(np.nan)
         return out
 
     def residual(self, unknowns: np.ndarray) -> np.ndarray:

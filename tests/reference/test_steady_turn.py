@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from velodrome.reference.anchors import start_on_plane
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.bowls import Sphere
+from velodrome.reference.circular import Steady, nearest_condition, newton
 from velodrome.reference.families import find_motion
+from velodrome.reference.kernels import curve
 from velodrome.reference.missing_motion import NoSuchMotion, SearchFailed
 from velodrome.reference.special import find_straight_motion
 from velodrome.reference.stability import free_eigenvalues, growth_rate, linearise
@@ -183,3 +186,22 @@ def test_no_motion_is_straight_in_a_bowl() -> None:
         SearchFailed, match=r"no motion is straight on ground that is not level; the nearest is at -0\.3"
     ):
         find_motion(Bicycle(), Paraboloid(0.005), 19.0, near=(0.0, 0.0))
+
+
+def test_wheels_that_roll_straight_on_are_no_guess_of_a_circle() -> None:
+    with pytest.raises(ValueError, match="roll straight on at lean = 0.0, steer = 0.0"):
+        start_on_plane(Bicycle(), 0.0, 0.0)
+
+
+def test_newtons_method_ends_where_the_equations_have_no_value(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiled code divides complex numbers by zero with an exception, as where nothing has inertia."""
+    unknowns = start_on_plane(Bicycle(), -0.3, 0.2)
+
+    def divide_by_zero(*_: object) -> None:
+        raise ZeroDivisionError("complex division by zero")
+
+    monkeypatch.setattr(curve, "expanded", divide_by_zero)
+    equations = Steady(Bicycle(), Plane())
+    assert all(np.isnan(part).all() for part in equations.expand(unknowns[curve.CHOSEN]))
+    with pytest.raises(ValueError, match="Newton's method finds no circular motion there"):
+        newton(equations, unknowns, nearest_condition())
