@@ -189,7 +189,7 @@ def test_no_motion_is_straight_in_a_bowl() -> None:
 
 
 def test_wheels_that_roll_straight_on_are_no_guess_of_a_circle() -> None:
-    with pytest.raises(ValueError, match="roll straight on at lean = 0.0, steer = 0.0"):
+    with pytest.raises(ValueError, match=r"roll straight on at lean = 0\.0, steer = 0\.0"):
         start_on_plane(Bicycle(), 0.0, 0.0)
 
 
