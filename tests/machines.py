@@ -109,7 +109,7 @@ def write_documents(path: Path, seed: int | None, paper: bool) -> None:
     found: dict[str, Any] = {f"families at alpha = {alpha:g}": families_document(alpha) for alpha in ALPHAS}
     if paper:
         told = ("claim", "kind", "verdict", "fault")
-        found["paper"] = [{name: line[name] for name in told} for line in ledger_document(make_ledger())["lines"]]
+        found["paper"] = [{name: line[name] for name in told} for line in ledger_document(make_ledger(), [])["lines"]]
     path.write_text(json.dumps(found))
 
 

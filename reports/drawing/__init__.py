@@ -3,6 +3,7 @@
 from .bicycle_shape import Mesh, ball, body_meshes
 from .ground import LINE_LIFT, STEEPEST, GroundMesh, ground_disc, lift_points, make_ground
 from .markdown import escape_markdown, make_printable
+from .numbers import format_numbers
 from .palette import Colour, assign_colours
 from .plots import (
     CHANGE,
@@ -26,10 +27,11 @@ from .summary import (
     describe_required_friction,
     describe_stability,
     find_unsteadiness,
-    format_cell,
+    format_table,
     format_verdict,
     make_remarks,
     make_summary,
+    rank_engines,
 )
 
 __all__ = [
@@ -59,7 +61,8 @@ __all__ = [
     "drawable_values",
     "escape_markdown",
     "find_unsteadiness",
-    "format_cell",
+    "format_numbers",
+    "format_table",
     "format_verdict",
     "ground_disc",
     "lift_points",
@@ -68,5 +71,6 @@ __all__ = [
     "make_remarks",
     "make_summary",
     "mode_plots",
+    "rank_engines",
     "to_nanoseconds",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ from ...reference.inputs import Inputs
 from ...reference.surface import Surface, SurfaceOfRevolution
 from ..measure import describe_mismatch
 from .markdown import escape_markdown
+from .numbers import format_numbers
 
 # (title, unit, metric, part of a metric that has parts)
 COLUMNS: tuple[tuple[str, str, str, str | None], ...] = (
@@ -24,12 +26,48 @@ COLUMNS: tuple[tuple[str, str, str, str | None], ...] = (
 )
 
 
-def format_cell(metrics: Mapping[str, Any], metric: str, part: str | None) -> str:
-    """Format a metric for a table: two digits, a dash where there is no value."""
-    value = metrics.get(metric)
-    if isinstance(value, Mapping):
-        value = value.get(part)
-    return "–" if value is None else f"{value:.2g}"
+def rank_engines(measured: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """List the engines of a run in the order of its tables.
+
+    The reference comes first, then the others by position error; those that fell or ended early come last, the latest
+    first, since their errors are those up to there only. Engines with equal errors stay in their order.
+
+    Parameters
+    ----------
+    measured : mapping
+        Metrics by engine name.
+
+    Returns
+    -------
+    list of str
+    """
+
+    def rank(name: str) -> tuple[int, float]:
+        values = measured[name]
+        if name == REFERENCE:
+            return 0, 0.0
+        if values["fell_at"] is not None:
+            return 2, -values["fell_at"]
+        error = (values["position_error"] or {}).get("max")
+        return (1 if values["ended"] is None else 2), math.inf if error is None else error
+
+    return sorted(measured, key=rank)
+
+
+def format_table(measured: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
+    """Format the table of a run: the cells of `COLUMNS` by engine, in the order of `rank_engines`.
+
+    Each column has one notation, see `format_numbers`; a dash stands where there is no value.
+    """
+    names = rank_engines(measured)
+    columns = [
+        format_numbers([_pick(measured[name].get(metric), part) for name in names]) for _, _, metric, part in COLUMNS
+    ]
+    return {name: [cells[k] for cells in columns] for k, name in enumerate(names)}
+
+
+def _pick(value: Any, part: str | None) -> Any:
+    return value.get(part) if isinstance(value, Mapping) else value
 
 
 def make_remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]:
@@ -130,10 +168,10 @@ def make_summary(
     """
     lines = [f"# {escape_markdown(title)}", "", describe_stability(growth_rate, unsteady), ""]
     # Engines are columns: there are fewer of them than quantities, and the recording's tab is narrow.
-    lines += ["| | " + " | ".join(escape_markdown(name) for name in measured) + " |", "|---|" + "---:|" * len(measured)]
-    for name, unit, metric, part in COLUMNS:
-        cells = (format_cell(values, metric, part) for values in measured.values())
-        lines.append(f"| {name} [{unit}] | " + " | ".join(cells) + " |")
+    table = format_table(measured)
+    lines += ["| | " + " | ".join(escape_markdown(name) for name in table) + " |", "|---|" + "---:|" * len(table)]
+    for k, (name, unit, _, _) in enumerate(COLUMNS):
+        lines.append(f"| {name} [{unit}] | " + " | ".join(cells[k] for cells in table.values()) + " |")
     lines += [
         "",
         f"Errors are the largest over {duration:g} s, against `{REFERENCE}`; drifts are slopes of a line fit.",
@@ -141,10 +179,10 @@ def make_summary(
     ]
     friction = describe_required_friction(measured)
     lines += [] if friction is None else [friction, ""]
-    for engine, values in measured.items():
-        lines += [f"- {escape_markdown(line)}" for line in make_remarks(engine, values, duration)]
-    lines += [f"- {escape_markdown(f'{engine} did not run: {reason}')}" for engine, reason in failures.items()]
     lines += [f"- {escape_markdown(format_verdict(verdict))}" for verdict in verdicts]
+    lines += [f"- {escape_markdown(f'{engine} did not run: {reason}')}" for engine, reason in failures.items()]
+    for engine in table:
+        lines += [f"- {escape_markdown(line)}" for line in make_remarks(engine, measured[engine], duration)]
     return "\n".join(lines).rstrip() + "\n"
 
 

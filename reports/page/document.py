@@ -20,9 +20,11 @@ from ..drawing import (
     assign_colours,
     describe_stability,
     find_unsteadiness,
-    format_cell,
+    format_numbers,
+    format_table,
     format_verdict,
     make_remarks,
+    rank_engines,
 )
 from . import curves, plan, trust, words
 from .ink import line_dashes, make_css, paper_colour
@@ -102,13 +104,13 @@ def _result_values(
         "columns": COLUMNS,
         "meanings": trust.COLUMN_MEANINGS,
         "horizon_meaning": trust.HORIZON,
-        "rows": {name: _format_row(values) for name, values in measured.items()},
+        "rows": _format_rows(measured),
         "trust": {
             name: trust.explain_columns(name, values, growth_rate, duration, ends.get(name))
             for name, values in measured.items()
         },
         "fallen": [name for name, values in measured.items() if values.get("fell_at") is not None],
-        "remarks": [line for name, values in measured.items() for line in make_remarks(name, values, duration)],
+        "remarks": [line for name in rank_engines(measured) for line in make_remarks(name, measured[name], duration)],
     }
 
 
@@ -151,8 +153,8 @@ def list_engine_styles(names: list[str]) -> list[dict[str, str]]:
     ]
 
 
-def _format_row(values: Mapping[str, Any]) -> list[str]:
-    horizon = values.get("horizon")
-    return [format_cell(values, metric, part) for _, _, metric, part in COLUMNS] + [
-        "–" if horizon is None else f"{horizon:.3g}"
-    ]
+def _format_rows(measured: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
+    """Format the table of a run with the horizon as its last column."""
+    table = format_table(measured)
+    horizons = format_numbers([measured[name].get("horizon") for name in table], 3)
+    return {name: [*cells, horizon] for (name, cells), horizon in zip(table.items(), horizons, strict=True)}

@@ -32,11 +32,11 @@ def bicycle_command(
 ) -> None:
     """A bicycle by itself: canonical matrices, eigenvalues over speed, weave and capsize speeds."""
     import numpy as np
-    from rich.console import Console
 
     from ..scenario import find_bicycle
     from ..studies import study_bicycle, write_bicycle
     from .present_bicycle import show_bicycle
+    from .terminal import make_console
 
     damping = make_inputs(0.0, 0.0, steer_damping).steer_damping
     study = study_bicycle(find_bicycle(source), np.array(parse_speeds(speeds)), damping)
@@ -45,7 +45,7 @@ def bicycle_command(
         if as_json:
             print_json(study.as_json())
         else:
-            show_bicycle(Console(), study)
+            show_bicycle(make_console(), study)
             show_written(written)
 
 

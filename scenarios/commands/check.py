@@ -51,8 +51,6 @@ def check_command(
     as_json: JsonOption = False,
 ) -> None:
     """The drift gate: run the gated scenarios and hold them against the committed baselines."""
-    from rich.console import Console
-
     from ..files import write_text
     from ..gate import (
         UNFINISHED_JUNIT,
@@ -67,6 +65,7 @@ def check_command(
     from ..run import configure_engine, installed_engines
     from .present_gate import show_verdicts
     from .progress import ProgressBars
+    from .terminal import make_console
 
     if reason is not None and not update:
         raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
@@ -104,19 +103,19 @@ def check_command(
             rows = [{"scenario": name} | verdict.as_json() for name, verdict in verdicts]
             print_json({"passes": passes, "updated": written, "warnings": warnings, "verdicts": rows})
         else:
-            console = Console()
+            console = make_console()
             show_verdicts(console, verdicts, renewed=update)
             for name, lines in warnings.items():
                 for line in lines:
                     text = f"warning: {name}: {line}"
-                    console.print(text, style="yellow", markup=False, highlight=False, soft_wrap=True)
+                    console.print(text, style="yellow", markup=False, soft_wrap=True)
             if update and not written and not refused:
                 console.print("no baseline written: nothing moved beyond its limit")
             for name in written:
                 console.print(f"baseline written: {name}", soft_wrap=True)
             for name, verdict in refused:
                 line = f"no baseline written of {verdict.engine} on {name}: {verdict.reason}"
-                console.print(line, style="red", markup=False, highlight=False, soft_wrap=True)
+                console.print(line, style="red", markup=False, soft_wrap=True)
 
 
 @contextmanager

@@ -65,12 +65,11 @@ def league_command(
 
     An engine rides all scenarios with the same settings: its defaults, or those of --settings.
     """
-    from rich.console import Console
-
     from ..scenario import load_scenario
     from ..studies import LEAGUE_SCENARIOS, LeagueFolder, all_rode, plan_league, read_league_settings, run_league
     from .present_league import show_league
     from .progress import ProgressBars, show_working
+    from .terminal import make_console
 
     changes = parse_changes(change, duration)
     chosen = None if settings is None else read_league_settings(settings)
@@ -86,5 +85,5 @@ def league_command(
         if as_json:
             print_json(document)
         else:
-            show_league(Console(), document)
+            show_league(make_console(), document)
             show_written(written)

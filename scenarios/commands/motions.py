@@ -45,12 +45,11 @@ def circular_command(
 
     If there is no such motion, the exit status is 1; --json then gives the reason, no-such-motion or search-failed.
     """
-    from rich.console import Console
-
     from ..motions import solve_circular
     from ..scenario import make_bowl
     from .present_motions import show_circular
     from .progress import show_working
+    from .terminal import make_console
 
     angles, ground, source = parse_angles(near), parse_ground(alpha, surface), load_bicycle(bicycle)
     inputs = make_inputs(steer_torque, rear_wheel_torque, steer_damping)
@@ -61,7 +60,7 @@ def circular_command(
         if as_json:
             print_json(found)
         else:
-            show_circular(Console(), found)
+            show_circular(make_console(), found)
 
 
 def families_command(
@@ -75,12 +74,11 @@ def families_command(
     as_json: JsonOption = False,
 ) -> None:
     """The four solution families by continuation: special points, stable sections."""
-    from rich.console import Console
-
     from ..motions import follow_families, write_families
     from ..scenario import make_bowl
     from .present_motions import show_families
     from .progress import show_working
+    from .terminal import make_console
 
     ground, source = parse_ground(alpha, surface), load_bicycle(bicycle)
     inputs = make_inputs(steer_torque, rear_wheel_torque, steer_damping)
@@ -92,16 +90,15 @@ def families_command(
         if as_json:
             print_json(document)
         else:
-            show_families(Console(), document)
+            show_families(make_console(), document)
 
 
 def critical_command(bicycle: BicycleOption = None, as_json: JsonOption = False) -> None:
     """The critical α: cusps collide, families merge, their last stable sections vanish."""
-    from rich.console import Console
-
     from ..motions import find_critical_shapes
     from .present_motions import show_critical
     from .progress import ProgressBars
+    from .terminal import make_console
 
     source = load_bicycle(bicycle)
     with ProgressBars() as progress:
@@ -110,7 +107,7 @@ def critical_command(bicycle: BicycleOption = None, as_json: JsonOption = False)
         if as_json:
             print_json(document)
         else:
-            show_critical(Console(), document)
+            show_critical(make_console(), document)
 
 
 def atlas_command(
@@ -123,11 +120,10 @@ def atlas_command(
     as_json: JsonOption = False,
 ) -> None:
     """Stability of all circular motions over alpha and rear rate: data, boundaries, figures (half a minute)."""
-    from rich.console import Console
-
     from ..motions import make_atlas
     from .present_motions import show_atlas
     from .progress import ProgressBars
+    from .terminal import make_console
 
     source = load_bicycle(bicycle)
     with answering_missing_motion(as_json), ProgressBars() as progress:
@@ -136,4 +132,4 @@ def atlas_command(
         if as_json:
             print_json(document)
         else:
-            show_atlas(Console(), document, out)
+            show_atlas(make_console(), document, out)

@@ -160,10 +160,10 @@ def make_inputs(steer_torque: float, rear_wheel_torque: float, steer_damping: fl
 
 def show_written(paths: Iterable[Path]) -> None:
     """Print the paths of written files, one per line."""
-    from rich.console import Console
+    from .terminal import make_console
 
     for path in paths:
-        Console().print(f"written: {path}", markup=False, highlight=False, soft_wrap=True)
+        make_console().print(f"written: {path}", markup=False, soft_wrap=True)
 
 
 def print_json(document: Mapping[str, Any]) -> None:

@@ -17,7 +17,7 @@ _SHOWN_SPEEDS = 11
 def show_bicycle(console: Console, study: BicycleStudy) -> None:
     """Print a bicycle's parameters, canonical matrices, eigenvalues over speed and characteristic speeds."""
     source = study.source
-    console.print(f"{source.name} ({source.convention})", style="bold", markup=False, highlight=False)
+    console.print(f"{source.name} ({source.convention})", style="bold", markup=False)
     table = Table(box=None, show_header=False, pad_edge=False)
     for parameter in fields(source.bicycle):
         deviation = source.uncertainties.get(parameter.name)
@@ -39,15 +39,15 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
     print_table(console, _make_eigenvalue_columns(study))
     console.print()
     if study.matrices.steer_damping:
-        console.print(f"steer damping: {study.matrices.steer_damping:g} N m s/rad", highlight=False)
+        console.print(f"steer damping: {study.matrices.steer_damping:g} N m s/rad")
     for mode, speed in (("weave", study.weave_speed), ("capsize", study.capsize_speed)):
         deviation = study.deviations.get(mode)
         spread = f" ± {deviation:.2g}" if deviation else ""
-        console.print(f"{mode} speed: {'none' if speed is None else f'{speed:.12g}{spread} m/s'}", highlight=False)
+        console.print(f"{mode} speed: {'none' if speed is None else f'{speed:.12g}{spread} m/s'}")
     ranges = [
         f"{start:.9g} to {end:.9g}" if end < inf else f"{start:.9g} and above" for start, end in study.stable_speeds
     ]
-    console.print(f"stable speeds: {'; '.join(ranges) + ' m/s' if ranges else 'none'}", highlight=False)
+    console.print(f"stable speeds: {'; '.join(ranges) + ' m/s' if ranges else 'none'}")
 
 
 def _make_eigenvalue_columns(study: BicycleStudy) -> list[Column]:

@@ -35,7 +35,7 @@ def show_diff(console: Console, document: Mapping[str, Any]) -> None:
     columns.append(Column("the same", [_format_verdict(entry) for entry in entries], right=False))
     print_table(console, columns, gap=1)
     for line, style in _list_lines(document):
-        console.print(line, style=style, markup=False, highlight=False, soft_wrap=True)
+        console.print(line, style=style, markup=False, soft_wrap=True)
     if document["same"]:
         console.print("the engines in both runs are the same within round-off", style="bold green")
     else:

@@ -41,7 +41,7 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed
     for name, verdict in verdicts:
         if verdict.told:
             line = f"{name}: {verdict.engine}: {verdict.quantity}: {verdict.status}: {verdict.reason}"
-            console.print(line, style=STATUS_STYLES[verdict.status], markup=False, highlight=False, soft_wrap=True)
+            console.print(line, style=STATUS_STYLES[verdict.status], markup=False, soft_wrap=True)
     if renewed:
         return
     passes = all(verdict.passes for _, verdict in verdicts)

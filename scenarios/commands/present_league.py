@@ -30,19 +30,19 @@ def show_league(console: Console, document: Mapping[str, Any]) -> None:
         for name, points in find_creeping(document, scenario).items():
             step, time = points[0]
             line = f"{name} creeps: slip = J̇q̇ / b with 1 / b = {time:.3g} s, {time / step:.3g} steps"
-            console.print(line, style="dim", markup=False, highlight=False, soft_wrap=True)
+            console.print(line, style="dim", markup=False, soft_wrap=True)
         for name, ride in rides:
             if ride["horizon"] is not None and ride["horizon"] < table["duration"]:
                 line = (
                     f"{name}: beyond {ride['horizon']:.2f} s the motion's own instability makes its error meaningless"
                 )
-                console.print(line, style="yellow", markup=False, highlight=False, soft_wrap=True)
+                console.print(line, style="yellow", markup=False, soft_wrap=True)
             if ride["status"] == "ended":
                 line = f"{name} ended early: {ride['reason']}"
-                console.print(line, style="yellow", markup=False, highlight=False, soft_wrap=True)
+                console.print(line, style="yellow", markup=False, soft_wrap=True)
             if ride["status"] == "unsuitable":
                 line = f"{name} left out: {ride['reason']}"
-                console.print(line, style="dim", markup=False, highlight=False, soft_wrap=True)
+                console.print(line, style="dim", markup=False, soft_wrap=True)
             if ride["status"] == "failed":
                 console.print(f"{name} did not ride: {ride['reason']}", style="red", markup=False, soft_wrap=True)
     if not document["complete"]:

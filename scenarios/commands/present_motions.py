@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
+from ...reference.stability import are_zero
 from ..scenario import BENCHMARK
 from .tables import Column, print_table
 
@@ -17,44 +21,49 @@ def show_bicycle_name(console: Console, document: Mapping[str, Any]) -> None:
     """Print the name of a document's bicycle, unless it is the benchmark, and what is remarkable about it."""
     name = document["bicycle"]["name"]
     if name != BENCHMARK:
-        console.print(f"bicycle: {name or 'not the benchmark'}", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"bicycle: {name or 'not the benchmark'}", markup=False, soft_wrap=True)
     for line in document["warnings"]:
-        console.print(f"warning: {line}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"warning: {line}", style="yellow", markup=False, soft_wrap=True)
 
 
 def show_circular(console: Console, found: dict[str, Any]) -> None:
     """Print a circular motion."""
     show_bicycle_name(console, found)
-    table = Table(box=None, show_header=False, pad_edge=False)
+    rows: list[tuple[str, str, str]] = []  # name, value, unit
     if found["alpha"] is not None:
-        table.add_row("alpha", _format_value(found["alpha"]), "1/m")
+        rows.append(("alpha", _format_value(found["alpha"]), "1/m"))
     else:
-        for name, value in found["surface"].items():
-            table.add_row("surface" if name == "kind" else name, _format_value(value))
+        rows += [("surface" if name == "kind" else name, _format_value(v), "") for name, v in found["surface"].items()]
     # Only a straight motion has a yaw rate of exactly zero.
     unnumbered = "none: straight motion" if found["yaw_rate"] == 0 else "none of the benchmark's"
-    table.add_row("family", unnumbered if found["family"] is None else str(found["family"]))
+    rows.append(("family", unnumbered if found["family"] is None else str(found["family"]), ""))
     for name, unit in (("steer_torque", "N m"), ("steer_damping", "N m s/rad")):
         if found["inputs"][name] != 0:
-            table.add_row(name, _format_value(found["inputs"][name]), unit)
+            rows.append((name, _format_value(found["inputs"][name]), unit))
     for name, unit in (
         *(("rear_rate", "rad/s"), ("front_rate", "rad/s"), ("yaw_rate", "rad/s")),
-        *(("lean", "rad"), ("steer", "rad"), ("pitch", "rad"), ("energy", "J"), ("residual", "")),
+        *(("lean", "rad"), ("steer", "rad"), ("pitch", "rad"), ("energy", "J")),
     ):
-        table.add_row(name, f"{found[name]:.12g}", unit)
-    table.add_row("position", _format_numbers(found["position"]), "m, D in the heading frame")
+        rows.append((name, f"{found[name]:.12g}", unit))
+    rows.append(("residual", f"{found['residual']:.2g}", ""))
     for wheel in ("rear", "front"):
-        table.add_row(f"{wheel} contact", _format_numbers(found["contact_point"][wheel]), "m")
-        table.add_row(f"{wheel} force", _format_numbers(found["contact_force"][wheel]), "N, on the wheel")
-        table.add_row(f"{wheel} normal force", f"{found['normal_force'][wheel]:.9g}", "N")
-    for i, (real, imaginary) in enumerate(found["eigenvalues"]):
-        value = (
-            f"{real:.9g}" if imaginary == 0 else f"{real:.9g} {'+' if imaginary > 0 else '-'} {abs(imaginary):.9g} i"
-        )
-        table.add_row("eigenvalues" if i == 0 else "", value, "1/s" if i == 0 else "")
-    console.print(table)
-    stable = "Lyapunov stable" if found["lyapunov_stable"] else "unstable"
-    console.print(stable)
+        rows.append((f"{wheel} normal force", f"{found['normal_force'][wheel]:.9g}", "N"))
+    rows += [
+        ("eigenvalues" if k == 0 else "", value, "1/s" if k == 0 else "")
+        for k, value in enumerate(_format_eigenvalues(found["eigenvalues"]))
+    ]
+    _print_rows(console, rows)
+    console.print("in the heading frame; forces are those on the wheels", style="dim")
+    vectors = {"D [m]": found["position"]}
+    for wheel in ("rear", "front"):
+        vectors[f"{wheel} contact [m]"] = found["contact_point"][wheel]
+    for wheel in ("rear", "front"):
+        vectors[f"{wheel} force [N]"] = found["contact_force"][wheel]
+    components = [_format_vector(vector) for vector in vectors.values()]
+    columns = [Column("", list(vectors), right=False)]
+    columns += [Column(axis, [cells[k] for cells in components]) for k, axis in enumerate("xyz")]
+    print_table(console, columns)
+    console.print("Lyapunov stable" if found["lyapunov_stable"] else "unstable")
     if found["physical"]:
         friction = f"{found['required_friction']:.6g}"
         console.print(f"it can be ridden: rolling needs a coefficient of friction of {friction}", soft_wrap=True)
@@ -62,12 +71,34 @@ def show_circular(console: Console, found: dict[str, Any]) -> None:
         console.print(f"it cannot be ridden: {reason}", style="yellow", markup=False, soft_wrap=True)
 
 
+def _print_rows(console: Console, rows: Sequence[tuple[str, str, str]]) -> None:
+    """Print names, values and units, each row in one line."""
+    table = Table(box=None, show_header=False, pad_edge=False)
+    for _ in range(3):
+        table.add_column(no_wrap=True)
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    console.print(table)
+
+
+def _format_eigenvalues(values: Sequence[Sequence[float]]) -> list[str]:
+    """Format eigenvalues, each pair in one line; one that is zero but for round-off is 0."""
+    numbers = np.array([complex(*value) for value in values])
+    numbers[are_zero(numbers)] = 0
+    lines = [f"{value.real:z.9g}" for value in numbers if value.imag == 0]
+    lines += [f"{value.real:.9g} ± {value.imag:.9g}i" for value in numbers if value.imag > 0]
+    return lines
+
+
+def _format_vector(values: Sequence[float]) -> list[str]:
+    """Format a vector to nine digits of its largest component, below which digits may be round-off."""
+    largest = max(map(abs, values))
+    decimals = 8 - math.floor(math.log10(largest)) if largest > 0 else 0
+    return [f"{value:z.{max(decimals, 0)}f}" for value in values]
+
+
 def _format_value(value: Any) -> str:
     return f"{value:.12g}" if isinstance(value, float) else str(value)
-
-
-def _format_numbers(values: list[float]) -> str:
-    return ", ".join(f"{value:.9g}" for value in values)
 
 
 def _make_number_columns(points: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> list[Column]:
@@ -98,15 +129,15 @@ def show_families(console: Console, document: Mapping[str, Any]) -> None:
         for section in family["stable_sections"]:
             line = _format_section(section)
             style = "yellow" if section["rideable"] == "not" else "green"
-            console.print(f"Lyapunov stable: rear rate {line}", style=style, markup=False, highlight=False)
+            console.print(f"Lyapunov stable: rear rate {line}", style=style, markup=False)
             if section["rideable"] != "wholly":
                 ridden = [_format_section(part) for part in section["rideable_parts"]]
                 words = f"only {' and '.join(ridden)} of it can be ridden" if ridden else "none of it can be ridden"
-                console.print(f"  {words}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+                console.print(f"  {words}", style="yellow", markup=False, soft_wrap=True)
         if not all(points["physical"]):
             ridden = [_format_section(part) for part in family["rideable_parts"]]
             words = f"can be ridden: rear rate {', '.join(ridden)}" if ridden else "cannot be ridden"
-            console.print(words, style="yellow", markup=False, highlight=False, soft_wrap=True)
+            console.print(words, style="yellow", markup=False, soft_wrap=True)
     for number, reason in document["absent"].items():
         console.print(f"family {number}: no curve: {reason}", style="yellow", markup=False, soft_wrap=True)
 
@@ -149,12 +180,12 @@ def show_critical(console: Console, document: Mapping[str, Any]) -> None:
         for point in points:
             for reason in point["unphysical_because"]:
                 line = f"at alpha {point['alpha']:.11f} the motion cannot be ridden: {reason}"
-                console.print(line, style="yellow", markup=False, highlight=False, soft_wrap=True)
+                console.print(line, style="yellow", markup=False, soft_wrap=True)
     if collision is None:
-        console.print("no cusps of families 2 and 4 meet", markup=False, highlight=False)
+        console.print("no cusps of families 2 and 4 meet", markup=False)
     for number, point in document["last_stable"].items():
         if point is None and number not in document["not_found"]:
-            console.print(f"family {number} has no stable section", markup=False, highlight=False)
+            console.print(f"family {number} has no stable section", markup=False)
     _show_not_found(console, document["not_found"])
     _show_unnumbered_remark(console, document)
 
@@ -162,14 +193,14 @@ def show_critical(console: Console, document: Mapping[str, Any]) -> None:
 def _show_not_found(console: Console, reasons: Mapping[str, str]) -> None:
     for number, reason in reasons.items():
         line = f"family {number}: not followed: {reason}"
-        console.print(line, style="yellow", markup=False, highlight=False, soft_wrap=True)
+        console.print(line, style="yellow", markup=False, soft_wrap=True)
 
 
 def _show_unnumbered_remark(console: Console, document: Mapping[str, Any]) -> None:
     """Say for another bicycle what is not looked at: the families are curves of the benchmark bicycle."""
     if document["bicycle"]["name"] != BENCHMARK:
         line = "curves without a number are not followed over alpha; velodrome families finds them at one alpha"
-        console.print(line, style="yellow", markup=False, highlight=False, soft_wrap=True)
+        console.print(line, style="yellow", markup=False, soft_wrap=True)
 
 
 def show_atlas(console: Console, document: Mapping[str, Any], out: Path) -> None:
@@ -186,10 +217,10 @@ def show_atlas(console: Console, document: Mapping[str, Any], out: Path) -> None
     if regions:
         print_table(console, columns)
     else:
-        console.print("no family has a stable motion", markup=False, highlight=False)
+        console.print("no family has a stable motion", markup=False)
     _show_not_found(console, _sum_up_absences(document))
     _show_unnumbered_remark(console, document)
-    console.print(f"{document['motions']} motions in {out}", markup=False, highlight=False, soft_wrap=True)
+    console.print(f"{document['motions']} motions in {out}", markup=False, soft_wrap=True)
 
 
 def _format_end(region: Mapping[str, Any], largest: float) -> str:

@@ -26,7 +26,7 @@ def show_precision(console: Console, document: Mapping[str, Any]) -> None:
     title = f"{document['scenario']}: errors over {compared_time(document):.4g} s{limit}"
     console.print(title, style="bold", markup=False, soft_wrap=True)
     for line in document["warnings"]:
-        console.print(f"warning: {line}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"warning: {line}", style="yellow", markup=False, soft_wrap=True)
     for name, entry in document["engines"].items():
         console.print()
         console.print(name, style="bold", markup=False)
@@ -39,10 +39,10 @@ def show_precision(console: Console, document: Mapping[str, Any]) -> None:
         columns.append(Column("order", orders[: len(points)]))
         print_table(console, columns)
         for line in _precision_lines(entry):
-            console.print(line, markup=False, highlight=False, soft_wrap=True)
+            console.print(line, markup=False, soft_wrap=True)
         for failure in entry["failures"]:
             what = "" if failure["step"] is None else f"step {failure['step']:g}: "
-            console.print(f"{what}{failure['reason']}", style="yellow", markup=False, highlight=False, soft_wrap=True)
+            console.print(f"{what}{failure['reason']}", style="yellow", markup=False, soft_wrap=True)
 
 
 def _precision_lines(entry: Mapping[str, Any]) -> Iterator[str]:

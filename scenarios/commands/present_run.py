@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from ...reports.drawing import COLUMNS, describe_required_friction, format_cell, format_verdict, make_remarks
+from ...reports.drawing import COLUMNS, describe_required_friction, format_table, format_verdict, make_remarks
 from .tables import Column, print_table
 
 if TYPE_CHECKING:
@@ -20,31 +20,31 @@ def show_outcome(console: Console, plan: RunPlan, outcome: RunOutcome) -> None:
     duration = plan.scenario.simulation.duration
     console.print()
     console.print(f"{plan.name}: {plan.scenario.title}, {duration:g} s", style="bold", markup=False)
-    columns = [Column("engine", list(outcome.metrics), right=False)]
-    for title, unit, metric, part in COLUMNS:
-        cells = [format_cell(values, metric, part) for values in outcome.metrics.values()]
-        columns.append(Column(title.replace(" ", "\n"), cells, unit))
+    table = format_table(outcome.metrics)
+    columns = [Column("engine", list(table), right=False)]
+    for k, (title, unit, _, _) in enumerate(COLUMNS):
+        columns.append(Column(title.replace(" ", "\n"), [cells[k] for cells in table.values()], unit))
     print_table(console, columns)
-    friction = describe_required_friction(outcome.metrics)
-    if friction is not None:
-        console.print(friction, style="dim", markup=False, highlight=False, soft_wrap=True)
-    for name, values in outcome.metrics.items():
-        for line in make_remarks(name, values, duration):
-            console.print(line, style="yellow", markup=False, soft_wrap=True)
-    for name, reason in plan.left_out.items():
-        console.print(f"{name} left out: {reason}", style="dim", markup=False, highlight=False, soft_wrap=True)
-    for name, reason in outcome.failures.items():
-        console.print(f"{name} did not run: {reason}", style="red", markup=False, soft_wrap=True)
     for verdict in outcome.verdicts:
         style = "green" if verdict["holds"] else "red"
         console.print(format_verdict(verdict), style=style, markup=False, soft_wrap=True)
+    for name, reason in outcome.failures.items():
+        console.print(f"{name} did not run: {reason}", style="red", markup=False, soft_wrap=True)
+    for name in table:
+        for line in make_remarks(name, outcome.metrics[name], duration):
+            console.print(line, style="yellow", markup=False, soft_wrap=True)
+    friction = describe_required_friction(outcome.metrics)
+    if friction is not None:
+        console.print(friction, style="dim", markup=False, soft_wrap=True)
+    for name, reason in plan.left_out.items():
+        console.print(f"{name} left out: {reason}", style="dim", markup=False, soft_wrap=True)
     command = Path(sys.executable).with_name("velodrome")
     if command.is_relative_to(Path.cwd()):
         command = command.relative_to(Path.cwd())
-    console.print(f"run folder: {outcome.folder}", markup=False, highlight=False, soft_wrap=True)
-    console.print(f"report:     {outcome.folder / 'report.html'}", markup=False, highlight=False, soft_wrap=True)
+    console.print(f"run folder: {outcome.folder}", markup=False, soft_wrap=True)
+    console.print(f"report:     {outcome.folder / 'report.html'}", markup=False, soft_wrap=True)
     if (outcome.folder / "comparison.rrd").exists():
-        console.print(f"recording:  {command} view {outcome.folder}", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"recording:  {command} view {outcome.folder}", markup=False, soft_wrap=True)
 
 
 def outcome_json(plan: RunPlan, outcome: RunOutcome) -> dict[str, Any]:

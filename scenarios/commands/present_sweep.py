@@ -44,4 +44,4 @@ def _format_number(number: float | None) -> str:
 
 
 def _print_line(console: Console, line: str, style: str | None = None) -> None:
-    console.print(line, style=style, markup=False, highlight=False, soft_wrap=True)
+    console.print(line, style=style, markup=False, soft_wrap=True)

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rich import progress as bars
-from rich.console import Console
+
+from .terminal import make_console
 
 
 class ProgressBars:
@@ -19,7 +20,7 @@ class ProgressBars:
             bars.TextColumn("{task.completed:.1f} of {task.total:g} s"),
             bars.TimeRemainingColumn(),
         )
-        self._console = Console(stderr=True)
+        self._console = make_console(stderr=True)
         self._bars = bars.Progress(*columns, console=self._console, transient=True)
         self._tasks: dict[str, bars.TaskID] = {}
 
@@ -41,13 +42,13 @@ class ProgressBars:
 
     def note(self, line: str) -> None:
         """Print a line above the bars."""
-        self._console.print(line, soft_wrap=True, highlight=False, markup=False)
+        self._console.print(line, soft_wrap=True, markup=False)
 
 
 @contextmanager
 def show_working(line: str) -> Iterator[None]:
     """Show a line on stderr while the body runs, if stderr is a terminal."""
-    console = Console(stderr=True)
+    console = make_console(stderr=True)
     if not console.is_terminal:
         yield
         return

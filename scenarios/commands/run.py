@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 def list_command(as_json: JsonOption = False) -> None:
     """Scenarios of the library, and engines with the commands that install those that are not there."""
-    from ...engines.engine import load_engine, uninstalled_engines
+    from ...engines.engine import describe_engine, load_engine, uninstalled_engines
     from ..run import installed_engines
     from ..scenario import library_names, load_scenario
 
@@ -46,7 +46,8 @@ def list_command(as_json: JsonOption = False) -> None:
         try:
             engine = load_engine(name)
             given = {"gives": list(engine.gives), "takes_inputs": engine.takes_inputs}
-            engines.append({"name": name, "version": engine.version, **given})
+            described = {"version": engine.version, "description": describe_engine(engine)}
+            engines.append({"name": name, **described, **given})
         except ValueError as error:
             engines.append({"name": name, "version": None, "gives": [], "error": " ".join(str(error).split())})
     engines += [
@@ -61,22 +62,30 @@ def list_command(as_json: JsonOption = False) -> None:
 
 
 def _show_list(scenarios: list[dict[str, Any]], engines: list[dict[str, Any]]) -> None:
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    table = Table("scenario", "title", "tags", box=None, pad_edge=False)
+    from .terminal import make_console
+
+    console = make_console()
+    table = Table(box=None, pad_edge=False)
+    for title in ("scenario", "title", "tags"):
+        table.add_column(title, no_wrap=title == "scenario")
     for entry in scenarios:
         table.add_row(entry["name"], entry["title"], ", ".join(entry["tags"]))
-    console = Console()
     console.print(table)
     console.print()
-    table = Table("engine", "version", "gives, beside coordinates and poses", box=None, pad_edge=False)
+    table = Table(box=None, pad_edge=False)
+    for title in ("engine", "version", "what it is"):
+        table.add_column(title, no_wrap=title == "engine")
     for entry in engines:
-        given = Text(entry["error"], "red") if "error" in entry else ", ".join(entry["gives"])
-        if "install" in entry:
-            given = Text(f"not installed: {entry['install']}", "dim")
-        table.add_row(entry["name"], entry["version"] or "–", given)
+        if "error" in entry:
+            words = Text(entry["error"], "red")
+        elif "install" in entry:
+            words = Text(f"not installed: {entry['install']}", "dim")
+        else:
+            words = Text(entry["description"])
+        table.add_row(entry["name"], entry["version"] or "–", words)
     console.print(table)
 
 
@@ -104,11 +113,10 @@ def run_command(
 
     --bicycle replaces a scenario's bicycle; --set bicycle.KEY=VALUE then changes single parameters of it.
     """
-    from rich.console import Console
-
     from ..run import installed_engines, run_plan
     from .present_run import outcome_json, show_outcome
     from .progress import ProgressBars, show_working
+    from .terminal import make_console
 
     sources = [*(scenario or []), *(_find_tagged(tag) if tag is not None else [])]
     if not sources:
@@ -118,7 +126,7 @@ def run_command(
     other = None if bicycle is None else load_bicycle(bicycle).bicycle
     with answering_missing_motion(as_json), showing_traceback(traceback), show_working(STARTING):
         plans = [_plan_source(source, changes, engine, other) for source in dict.fromkeys(sources)]
-    console = Console(stderr=as_json)
+    console = make_console(stderr=as_json)
     outcomes = []
     for plan in plans:
         with ProgressBars() as progress:

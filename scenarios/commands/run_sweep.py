@@ -6,8 +6,6 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich.console import Console
-
 from ...engines.names import suggest_name
 from ..error import ScenarioError
 from ..scenario import show_value
@@ -25,6 +23,7 @@ from ..sweep import (
 from .options import ending_with, print_json
 from .present_sweep import show_summary
 from .progress import show_working
+from .terminal import make_console
 
 FOLDER = Path("sweeps")
 
@@ -85,7 +84,7 @@ def run_sweep_command(
         outcome = run_sweep(plan, FOLDER / plan.name if out is None else out, work, resume, view.watch, retry)
     document = summarise_sweep(plan, outcome)
     with ending_with(0):
-        show_summary(Console(stderr=as_json), document, resume_command(plan, outcome, retry))
+        show_summary(make_console(stderr=as_json), document, resume_command(plan, outcome, retry))
         if as_json:
             print_json(document)
     return status_of(outcome)

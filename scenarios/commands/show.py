@@ -24,15 +24,14 @@ def show_command(
     ] = False,
 ) -> None:
     """A scenario as resolved, an engine's settings, the bicycle's parameters, or what a file may hold."""
-    from rich.console import Console
-
     from ..show import kind_of, make_document, make_schema
     from ..sweep import SweepFile
     from .present_show import show_document
+    from .terminal import make_console
 
     document = make_schema(kind_of(name), name, SweepFile) if schema else make_document(name, SweepFile)
     with ending_with(0):
         if as_json or schema:
             print_json(document)
         else:
-            show_document(Console(), document)
+            show_document(make_console(), document)

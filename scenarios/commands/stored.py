@@ -30,11 +30,10 @@ def diff_command(
     as_json: JsonOption = False,
 ) -> None:
     """Two stored runs of one scenario against each other: what moved by more than round-off."""
-    from rich.console import Console
-
     from ..compare import diff_runs, read_pair, write_diff
     from ..run import installed_engines
     from .present_diff import show_diff
+    from .terminal import make_console
 
     installed_engines()  # raises here if two packages announce one engine, which is not a fault of the runs
     pair = read_pair(before, after, engine)
@@ -44,7 +43,7 @@ def diff_command(
         if as_json:
             print_json(found)
         else:
-            show_diff(Console(), found)
+            show_diff(make_console(), found)
             show_written(written)
 
 

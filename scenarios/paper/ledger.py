@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Any
@@ -381,15 +381,45 @@ def counts(lines: Sequence[LedgerLine]) -> dict[str, int]:
     return {verdict: sum(line.verdict == verdict for line in lines) for verdict in VERDICTS}
 
 
-def ledger_document(lines: Sequence[LedgerLine]) -> dict[str, Any]:
+def list_surprises(lines: Sequence[LedgerLine], known: Collection[str]) -> list[str]:
+    """List what differs from the known result: every line but those of the known discrepancies holds.
+
+    Parameters
+    ----------
+    lines : sequence of LedgerLine
+    known : collection of str
+        Claims that are known not to hold by the paper's own fault.
+
+    Returns
+    -------
+    list of str
+        A line of text for each difference.
+    """
+    found = [
+        f"{line.section}: {line.claim}: does not hold, and is no known discrepancy of the paper's"
+        for line in lines
+        if line.fault == "paper" and line.claim not in known
+    ]
+    found += [
+        f"{line.section}: {line.claim}: the measurement does not pass its own tests"
+        for line in lines
+        if line.fault == "ours"
+    ]
+    failing = {line.claim for line in lines if not line.holds}
+    return found + [f"{claim}: holds, though known not to" for claim in known if claim not in failing]
+
+
+def ledger_document(lines: Sequence[LedgerLine], known: Collection[str]) -> dict[str, Any]:
     """Return the ledger as a JSON document.
 
-    ``holds``: whether every line holds; ``faults``: numbers of lines that do not, by whose fault they are.
+    ``holds``: whether every line holds; ``faults``: numbers of lines that do not, by whose fault they are;
+    ``surprises``: see `list_surprises`.
     """
     faults = {whose: sum(line.fault == whose for line in lines) for whose in ("paper", "ours")}
     return {
         "lines": [line.as_json() for line in lines],
         "counts": counts(lines),
         "faults": faults,
+        "surprises": list_surprises(lines, known),
         "holds": all(line.holds for line in lines),
     }

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from ...engines.frames import import_pandas
-from ...reports.drawing import COLUMNS, format_cell, make_remarks
+from ...reports.drawing import COLUMNS, format_table, make_remarks, rank_engines
 from ...reports.measure import flatten_metrics
 
 if TYPE_CHECKING:
@@ -83,7 +83,8 @@ class MetricsTable(Mapping[str, Mapping[str, Any]]):
     @property
     def remarks(self) -> tuple[str, ...]:
         """Warnings about rows: falls, early ends, and reports that contradict the coordinates."""
-        return tuple(line for name, row in self._rows.items() for line in make_remarks(name, row, self._duration))
+        names = rank_engines(self._rows)
+        return tuple(line for name in names for line in make_remarks(name, self._rows[name], self._duration))
 
     def to_pandas(self) -> pd.DataFrame:
         """Return all columns as a data frame with the engines as index.
@@ -106,7 +107,7 @@ class MetricsTable(Mapping[str, Mapping[str, Any]]):
 
     def __repr__(self) -> str:
         heads = [["engine", "", ""], *([*title.split(), f"[{unit}]"] for title, unit, _, _ in COLUMNS)]
-        body = [[name, *self._cells(name)] for name in self._rows]
+        body = [[name, *cells] for name, cells in format_table(self._rows).items()]
         lines = [[head[k] for head in heads] for k in range(3)] + body
         widths = [max(len(line[k]) for line in lines) for k in range(len(heads))]
         texts = [
@@ -121,8 +122,8 @@ class MetricsTable(Mapping[str, Mapping[str, Any]]):
         """Return the table with its remarks as HTML for notebooks."""
         heads = "".join(f"<th>{escape(title)}<br>[{escape(unit)}]</th>" for title, unit, _, _ in COLUMNS)
         rows = "".join(
-            f"<tr><th>{escape(name)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in self._cells(name))}</tr>"
-            for name in self._rows
+            f"<tr><th>{escape(name)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
+            for name, cells in format_table(self._rows).items()
         )
         remarks = "".join(f"<li>{escape(line)}</li>" for line in self.remarks)
         table = f"<table><thead><tr><th>engine</th>{heads}</tr></thead><tbody>{rows}</tbody></table>"
@@ -130,6 +131,3 @@ class MetricsTable(Mapping[str, Mapping[str, Any]]):
 
     def _repr_html_(self) -> str:
         return self.to_html()
-
-    def _cells(self, engine: str) -> list[str]:
-        return [format_cell(self._rows[engine], metric, part) for _, _, metric, part in COLUMNS]

@@ -20,8 +20,8 @@ from ...files import make_folder, write_json, write_text
 from ...motions import families_document
 from ...scenario import Start, load_scenario, make_start
 from ..energy import motion_of_energy
-from ..ledger import LedgerLine
-from ..ledger import ledger_document as ledger_document
+from ..ledger import LedgerLine, ledger_document
+from ..printed import known_discrepancies
 from ..table import ledger_markdown
 from .captions import captions_text, configurations_caption, departure_caption, disturbed_caption, families_caption
 from .configurations import Configuration, configurations_figure
@@ -84,7 +84,7 @@ def write_paper(out: Path, lines: Sequence[LedgerLine], progress: FigureWatch) -
         If the folder cannot be made.
     """
     make_folder(out)
-    write_json(out / "ledger.json", ledger_document(lines))
+    write_json(out / "ledger.json", ledger_document(lines, known_discrepancies()))
     write_text(out / "ledger.md", ledger_markdown(lines))
     return [out / "ledger.json", out / "ledger.md", *write_figures(out, progress)]
 

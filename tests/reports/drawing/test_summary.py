@@ -6,7 +6,14 @@ from typing import Any
 
 import pytest
 
-from velodrome.reports.drawing.summary import COLUMNS, format_cell, format_verdict, make_remarks, make_summary
+from velodrome.reports.drawing.summary import (
+    COLUMNS,
+    format_table,
+    format_verdict,
+    make_remarks,
+    make_summary,
+    rank_engines,
+)
 
 MEASURED: dict[str, Any] = {
     "position_error": {"max": 9.397e-6, "end": 8.83e-6},
@@ -49,13 +56,33 @@ def test_the_table_has_every_quantity_of_every_engine() -> None:
     found = {row[0]: row[1:] for row in rows}
     assert len(found) == len(COLUMNS)
     assert found["position error [m]"] == ["–", "9.4e-06"]
-    assert found["energy drift [1]"] == ["8e-14", "6.2e-08"]
+    assert found["energy drift [1]"] == ["8.0e-14", "6.2e-08"]
     assert found["radius drift [m/s]"] == ["–", "-1.2e-05"]
 
 
-@pytest.mark.parametrize(("value", "shown"), [(None, "–"), ({"max": None}, "–"), ({"max": 0.5}, "0.5"), (0.0, "0")])
-def test_a_cell_shows_a_dash_for_nothing_and_nought_for_nought(value: Any, shown: str) -> None:
-    assert format_cell({"x": value}, "x", "max") == shown
+def test_a_column_has_one_notation() -> None:
+    small = MEASURED | {"position_error": {"max": 9.397e-6, "end": 1e-6}, "cpu_time": 0.00224}
+    large = MEASURED | {"position_error": {"max": 1.25, "end": 1.0}, "cpu_time": 0.5412}
+    none = MEASURED | {"position_error": {"max": None}, "max_slip": 0.0, "fell_at": 3.0}
+    table = format_table({"large": large, "none": none, "small": small})
+    titles = [title for title, *_ in COLUMNS]
+    position, slip, cpu = (titles.index(title) for title in ("position error", "largest slip", "CPU time"))
+    assert [cells[position] for cells in table.values()] == ["9.4e-06", "1.2e+00", "–"]
+    assert [cells[slip] for cells in table.values()] == ["3.1e-12", "3.1e-12", "0"]
+    assert [cells[cpu] for cells in table.values()] == ["0.0022", "0.5412", "0.2400"]
+
+
+def test_the_best_engine_comes_first_and_the_fallen_last() -> None:
+    measured = {
+        "fell soon": MEASURED | {"fell_at": 0.5, "position_error": {"max": 1e-9, "end": 1e-9}},
+        "ended": MEASURED | {"ended": "Newton failed", "position_error": {"max": 1e-9, "end": 1e-9}},
+        "fell late": MEASURED | {"fell_at": 5.0},
+        "far": MEASURED | {"position_error": {"max": 1.0, "end": 1.0}},
+        "near": MEASURED,
+        "as near": MEASURED,
+        "reference": ALONE,
+    }
+    assert rank_engines(measured) == ["reference", "near", "as near", "far", "fell late", "fell soon", "ended"]
 
 
 def test_no_news_is_no_remark() -> None:

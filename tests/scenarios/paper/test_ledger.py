@@ -23,6 +23,7 @@ from velodrome.scenarios.paper.ledger import (
     equals,
     figure_line,
     ledger_document,
+    list_surprises,
     source,
     untestable_line,
 )
@@ -114,31 +115,53 @@ def test_the_document_and_the_tables_hold_every_line() -> None:
         claim_line("4", "a claim that does not", [FALLS], "not seen", SEEN, [GOOD]),
         untestable_line("5", "a claim on a picture", "no picture"),
     ]
-    found = json.loads(json.dumps(ledger_document(lines), allow_nan=False))
+    known = ["a claim that does not"]
+    found = json.loads(json.dumps(ledger_document(lines, known), allow_nan=False))
     assert [line["verdict"] for line in found["lines"]] == ["reproduced", "does not hold", "not testable"]
     assert found["faults"] == {"paper": 1, "ours": 0}
     assert not found["holds"]
-    assert ledger_document(lines[::2])["holds"]
+    assert found["surprises"] == []
+    assert ledger_document(lines[::2], [])["holds"]
     lost = ledger_document(
-        [claim_line("3", "a claim", [below("?", float("nan"), 1)], "", SEEN, [SelfCheck("?", float("nan"), 1)])]
+        [claim_line("3", "a claim", [below("?", float("nan"), 1)], "", SEEN, [SelfCheck("?", float("nan"), 1)])], []
     )
     (line,) = json.loads(json.dumps(lost, allow_nan=False))["lines"]
     assert line["checks"][0]["value"] is None
     assert line["thresholds"][0]["value"] is None
     text = StringIO()
-    show_ledger(Console(file=text, width=120), lines)
+    show_ledger(Console(file=text, width=120), lines, [], whole=True)
     for part in (
         "a claim that holds",
         "(the paper's)",
         "wanted: a length < 2 m; it is 3",
         "residual: 1.00e-14, limit 1.00e-12: passes",
         "3 lines: 1 repro",
+        "the 1 that do not hold are the paper's and known",
     ):
         assert part in text.getvalue()
+    text = StringIO()
+    show_ledger(Console(file=text, width=120), lines, ["a surprise"])
+    assert "a claim that does not" in text.getvalue()
+    assert "a surprise" in text.getvalue()
+    assert "a claim that holds" not in text.getvalue()
+    assert "known" not in text.getvalue()
     page = ledger_markdown(lines)
     assert "**does not hold**: the paper's" in page
     for part in ("a length < 2 m", "something. from here and there", "`velodrome critical`, `json.dumps`"):
         assert part in page
+
+
+def test_a_surprise_is_whatever_is_not_as_known() -> None:
+    holding = claim_line("3", "a claim that holds", [HOLDS], "seen", SEEN, [GOOD])
+    failing = claim_line("4", "a claim that does not", [FALLS], "not seen", SEEN, [GOOD])
+    untested = claim_line("4", "a claim that does not", [FALLS], "not seen", SEEN, [BAD])
+    assert list_surprises([holding, failing], [failing.claim]) == []
+    (line,) = list_surprises([holding, failing], [])
+    assert line.startswith("4: a claim that does not: does not hold")
+    (line,) = list_surprises([holding, untested], [failing.claim])
+    assert "its own tests" in line
+    (line,) = list_surprises([holding], [holding.claim])
+    assert line == "a claim that holds: holds, though known not to"
 
 
 def test_a_line_in_json_names_its_threshold_and_where_it_comes_from() -> None:
