@@ -127,7 +127,9 @@ def atlas_command(
 
     source = load_bicycle(bicycle)
     with answering_missing_motion(as_json), ProgressBars() as progress:
-        document = make_atlas(source, out, size, largest, lambda done: progress.watch("atlas", done, 1.0))
+        document = make_atlas(
+            source, out, size, largest, lambda done: progress.watch("atlas", done * size, size, "motions")
+        )
     with ending_with(0):
         if as_json:
             print_json(document)

@@ -17,7 +17,7 @@ class ProgressBars:
         columns = (
             bars.TextColumn("{task.description:<16}"),
             bars.BarColumn(),
-            bars.TextColumn("{task.completed:.1f} of {task.total:g} s"),
+            bars.TextColumn("{task.fields[done]} of {task.total:g} {task.fields[unit]}"),
             bars.TimeRemainingColumn(),
         )
         self._console = make_console(stderr=True)
@@ -34,11 +34,13 @@ class ProgressBars:
         if self._console.is_terminal:
             self._bars.stop()
 
-    def watch(self, engine: str, time: float, duration: float) -> None:
-        """Show the simulated time that an engine has reached."""
-        if engine not in self._tasks:
-            self._tasks[engine] = self._bars.add_task(engine, total=duration)
-        self._bars.update(self._tasks[engine], completed=time, total=duration)
+    def watch(self, name: str, done: float, total: float, unit: str = "s", /) -> None:
+        """Show how far an engine or another part of the work is, by default in simulated time."""
+        # Parts of a second, or of another number with decimals; pieces are counted as a whole.
+        shown = f"{done:.1f}" if unit in ("s", "1/m") else f"{done:.0f}"
+        if name not in self._tasks:
+            self._tasks[name] = self._bars.add_task(name, total=total, done=shown, unit=unit)
+        self._bars.update(self._tasks[name], completed=done, total=total, done=shown, unit=unit)
 
     def note(self, line: str) -> None:
         """Print a line above the bars."""

@@ -42,8 +42,10 @@ def paper_command(
     if out is not None:
         make_folder(out)  # first, so that half a minute of work is not lost if it fails
     with ProgressBars() as progress:
-        lines = make_ledger(lambda part, done, parts: progress.watch(part, done, parts))
-        written = [] if out is None else write_paper(out, lines, progress.watch)
+        lines = make_ledger(lambda part, done, parts: progress.watch(part, done, parts, "parts of the paper"))
+        written = []
+        if out is not None:
+            written = write_paper(out, lines, lambda name, done, total: progress.watch(name, done, total, "figures"))
     found = ledger_document(lines, known_discrepancies())
     with ending_with(1 if found["surprises"] else 0):
         if as_json:

@@ -295,25 +295,27 @@ def families_document(ground: Surface | float, inputs: Inputs = NO_INPUTS) -> di
     return follow_families(Bicycle(), make_bowl(ground), inputs).as_json()
 
 
-def find_critical_shapes(bicycle: Bicycle, watch: Callable[[str, float, float], None]) -> CriticalShapes:
+def find_critical_shapes(bicycle: Bicycle, watch: Callable[[str, float, float, str], None]) -> CriticalShapes:
     """Compute the critical values of alpha for a bicycle.
 
     Parameters
     ----------
     bicycle : Bicycle
     watch : callable
-        Called with the name of the stage, the value reached and the largest value.
+        Called with the name of the stage, the value reached, the largest value and its unit.
 
     Returns
     -------
     CriticalShapes
     """
     check_inertia(bicycle)
-    merging = reconnections(bicycle, lambda alpha: watch("merging", alpha, 1.0))
+    largest = 1.0
+    watch("merging", 0.0, largest, "1/m")
+    merging = reconnections(bicycle, lambda alpha: watch("merging", alpha, largest, "1/m"), largest)
     stable: dict[int, CriticalPoint | None] = {}
     not_found: dict[int, str] = {}
     for number in FAMILIES:
-        watch("last stable", float(number), float(len(FAMILIES)))
+        watch("last stable", float(number - 1), float(len(FAMILIES)), "families")
         reasons = []
         try:
             stable[number] = last_stable(bicycle, number)

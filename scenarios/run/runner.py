@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import tomli_w
@@ -39,8 +39,14 @@ from .folder import (
     write_run_recording,
 )
 
-# (engine, simulated time reached, duration)
-RunWatch = Callable[[str, float, float], None]
+
+class RunWatch(Protocol):
+    """Function that is told how far an engine's ride, or another part of the work, is."""
+
+    def __call__(self, name: str, done: float, total: float, unit: str = "s", /) -> None:
+        """Take the amount that is done and the total amount, by default in simulated time [s]."""
+
+
 # (engine, what it raised)
 Trace = Callable[[str, Exception], None]
 

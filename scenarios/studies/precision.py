@@ -280,7 +280,7 @@ def _identify(
     label = f"{engine.name} modes"
     try:
         return call_engine(
-            identify, engine, _make_refinable(settings), undisturbed, lambda done: watch(label, done, 1.0)
+            identify, engine, _make_refinable(settings), undisturbed, lambda done: watch(label, 100 * done, 100.0, "%")
         )
     except (ArithmeticError, ValueError) as error:  # includes numpy's LinAlgError: the system may not exist
         return " ".join(str(error).split())
