@@ -8,6 +8,7 @@ from math import inf
 from rich.console import Console
 from rich.table import Table
 
+from ..scenario import PARAMETERS
 from ..studies import BicycleStudy
 from .tables import Column, print_table
 
@@ -23,7 +24,8 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
         deviation = source.uncertainties.get(parameter.name)
         value = f"{getattr(source.bicycle, parameter.name):.9g}"
         # A file that states no deviation of a number has 0.
-        table.add_row(parameter.name, value, f"± {deviation:.2g}" if deviation else "")
+        unit = PARAMETERS[parameter.name].unit
+        table.add_row(parameter.name, value, f"± {deviation:.2g}" if deviation else "", unit)
     console.print(table)
     for line in source.bicycle.warnings():
         console.print(line, style="yellow", markup=False, soft_wrap=True)
@@ -54,7 +56,7 @@ def _make_eigenvalue_columns(study: BicycleStudy) -> list[Column]:
     """Make a column of some of the speeds and one column per mode, with its eigenvalues there [1/s]."""
     last = len(study.speeds) - 1
     places = sorted({round(k * last / (_SHOWN_SPEEDS - 1)) for k in range(_SHOWN_SPEEDS)})
-    columns = [Column("speed", [f"{study.speeds[k]:g}" for k in places])]
+    columns = [Column("speed", [f"{study.speeds[k]:g}" for k in places], "m/s")]
     for mode in dict.fromkeys(study.modes):
         cells = []
         for k in places:
@@ -64,7 +66,7 @@ def _make_eigenvalue_columns(study: BicycleStudy) -> list[Column]:
             else:
                 # Capsize and castering may be a pair as well: each then shows its half.
                 cells.append(", ".join(_format_eigenvalue(value) for value in values))
-        columns.append(Column(mode, cells))
+        columns.append(Column(mode, cells, "1/s"))
     return columns
 
 
@@ -76,4 +78,4 @@ def _format_eigenvalue(value: complex, sign: str | None = None) -> str:
     """Format an eigenvalue [1/s]; with a sign of its imaginary part if another than its own is to be shown."""
     if not _is_complex(value):
         return f"{value.real:.4f}"
-    return f"{value.real:.4f} {sign or ('+' if value.imag > 0 else '-')} {abs(value.imag):.4f} i"
+    return f"{value.real:.4f} {sign or ('+' if value.imag > 0 else '-')} {abs(value.imag):.4f}i"

@@ -7,17 +7,19 @@ from typing import Any
 
 from rich.console import Console
 
+from ...reports.drawing import format_numbers
 from ...reports.measure import compared_time
 from .tables import Column, print_table
 
-# (title, key of a point)
+# (title, unit, key of a point)
 _COLUMNS = (
-    ("step", "step"),
-    ("position error", "position_error"),
-    ("energy drift", "energy_drift"),
-    ("largest slip", "max_slip"),
-    ("CPU time", "cpu_time"),
+    ("step", "s", "step"),
+    ("position error", "m", "position_error"),
+    ("energy drift", "1", "energy_drift"),
+    ("largest slip", "m/s", "max_slip"),
+    ("CPU time", "s", "cpu_time"),
 )
+_DIGITS = 3
 
 
 def show_precision(console: Console, document: Mapping[str, Any]) -> None:
@@ -32,11 +34,11 @@ def show_precision(console: Console, document: Mapping[str, Any]) -> None:
         console.print(name, style="bold", markup=False)
         points = entry["points"]
         columns = [
-            Column(title, ["–" if point[key] is None else f"{point[key]:.4g}" for point in points])
-            for title, key in _COLUMNS
+            Column(title, format_numbers([point[key] for point in points], _DIGITS), unit)
+            for title, unit, key in _COLUMNS
         ]
         orders = ["", "", *("–" if order is None else f"{order:.3f}" for order in entry["orders"])]
-        columns.append(Column("order", orders[: len(points)]))
+        columns.append(Column("order", orders[: len(points)], "1"))
         print_table(console, columns)
         for line in _precision_lines(entry):
             console.print(line, markup=False, soft_wrap=True)

@@ -8,8 +8,11 @@ from typing import Any
 from rich.console import Console
 from rich.text import Text
 
+from ...reports.drawing import format_numbers
 from ..sweep import RESULTS, ROW_STYLES
 from .tables import Column, print_table
+
+_DIGITS = 3
 
 
 def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> None:
@@ -23,9 +26,13 @@ def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> 
             )
     errors = [entry.get("position_error") or {} for entry in entries.values()]
     columns += [
-        Column("error,\nmedian, m", [_format_number(error.get("median")) for error in errors]),
-        Column("error,\nworst, m", [_format_number(error.get("worst")) for error in errors]),
-        Column("rows/s of\na worker", [_format_number(entry.get("rows_per_second")) for entry in entries.values()]),
+        Column("median\nerror", format_numbers([error.get("median") for error in errors], _DIGITS), "m"),
+        Column("worst\nerror", format_numbers([error.get("worst") for error in errors], _DIGITS), "m"),
+        Column(
+            "rows of\na worker",
+            format_numbers([entry.get("rows_per_second") for entry in entries.values()], _DIGITS),
+            "1/s",
+        ),
     ]
     print_table(console, columns)
     for name, entry in entries.items():
@@ -37,10 +44,6 @@ def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> 
     missing = f"{document['missing']} of {document['tasks']} runs are missing, finished runs are kept"
     _print_line(console, f"{document['stopped']}: {missing}", "yellow")
     _print_line(console, f"continue with: {resume}")
-
-
-def _format_number(number: float | None) -> str:
-    return "–" if number is None else f"{number:.3g}"
 
 
 def _print_line(console: Console, line: str, style: str | None = None) -> None:

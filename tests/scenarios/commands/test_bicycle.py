@@ -76,7 +76,7 @@ def test_the_table_shows_a_pair_of_two_modes_as_complex(velodrome, tmp_path: Pat
     assert abs(imaginary) > 0.1
     assert other == [real, -imaginary]
     table = velodrome("bicycle", str(path), "--speeds", "1").stdout
-    assert f"{real:.4f} {'+' if imaginary > 0 else '-'} {abs(imaginary):.4f} i" in table
+    assert f"{real:.4f} {'+' if imaginary > 0 else '-'} {abs(imaginary):.4f}i" in table
 
 
 @pytest.mark.parametrize(
