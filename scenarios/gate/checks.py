@@ -11,9 +11,10 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ...engines.engine import REFERENCE, Engine, Settings, UnsuitableProblem, uninstalled_engines, why_failed
+from ...engines.engine import REFERENCE, Engine, Settings, UnsuitableProblem, why_failed
 from ...engines.format_version import VERSION_KEY, read_version
 from ...engines.guard import call_engine
+from ...engines.registry import uninstalled_engines
 from ...reference.inputs import NO_INPUTS
 from ..error import ScenarioError
 from ..files import make_folder, write_json
