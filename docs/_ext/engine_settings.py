@@ -6,7 +6,8 @@ from inspect import getdoc
 
 from fields import list_fields, make_sentence
 
-from velodrome.engines.engine import ENTRY_POINT_GROUP, describe_engine, engine_names, load_engine
+from velodrome.engines.engine import describe_engine
+from velodrome.engines.registry import ENTRY_POINT_GROUP, engine_names, load_engine
 
 
 def own_engines() -> list[str]:

@@ -9,8 +9,9 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from ...engines.engine import REQUIRED, SHAPES, Engine, load_engine, why_failed
+from ...engines.engine import REQUIRED, SHAPES, Engine, why_failed
 from ...engines.guard import GuardedEngine, call_engine
+from ...engines.registry import load_engine
 from ..measure import LARGEST_NOISE, ROUND_OFF
 from .report import ConformanceCheck, make_check
 

@@ -58,6 +58,7 @@ def check_command(
         check_gate,
         junit_xml,
         list_bicycle_warnings,
+        list_left_out,
         markdown_page,
         refused_verdicts,
         update_baselines,
@@ -97,14 +98,27 @@ def check_command(
         written = [str(path) for path in update_baselines(fresh, verdicts, reason, baselines)]
     refused = refused_verdicts(verdicts) if update else []
     warnings = list_bicycle_warnings(scenario)
+    left_out = {} if engine else list_left_out(baselines, scenario)
     passes = not refused if update else all(verdict.passes for _, verdict in verdicts)
     with ending_with(0 if passes else 1):
         if as_json:
             rows = [{"scenario": name} | verdict.as_json() for name, verdict in verdicts]
-            print_json({"passes": passes, "updated": written, "warnings": warnings, "verdicts": rows})
+            print_json(
+                {
+                    "passes": passes,
+                    "updated": written,
+                    "warnings": warnings,
+                    "left_out": left_out,
+                    "verdicts": rows,
+                }
+            )
         else:
             console = make_console()
             show_verdicts(console, verdicts, renewed=update)
+            if left_out:
+                install = "; ".join(dict.fromkeys(left_out.values()))
+                line = f"not judged, their libraries are not installed: {', '.join(left_out)}; install: {install}"
+                console.print(line, markup=False, highlight=False, soft_wrap=True)
             for name, lines in warnings.items():
                 for line in lines:
                     text = f"warning: {name}: {line}"

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 
 def list_command(as_json: JsonOption = False) -> None:
     """Scenarios of the library, and engines with the commands that install those that are not there."""
-    from ...engines.engine import describe_engine, load_engine, uninstalled_engines
+    from ...engines.engine import describe_engine
+    from ...engines.registry import load_engine, uninstalled_engines
     from ..run import installed_engines
     from ..scenario import library_names, load_scenario
 

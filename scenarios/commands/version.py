@@ -17,7 +17,7 @@ def print_versions() -> None:
     ScenarioError
         If two packages announce engines with the same name.
     """
-    from ...engines.engine import packages
+    from ...engines.registry import packages
     from ..run import installed_engines, library_versions
 
     names = installed_engines()

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ...engines.engine import REFERENCE, Trajectory, load_engine, why_failed
+from ...engines.engine import REFERENCE, Trajectory, why_failed
 from ...engines.names import suggest_name
+from ...engines.registry import load_engine
 from ...reports.drawing import assign_colours, find_unsteadiness
 from ...reports.measure import ROUND_OFF, START_ERROR, Scale, cut_at_fall, evaluate_ride
 from ..error import ScenarioError

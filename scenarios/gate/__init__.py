@@ -1,6 +1,6 @@
 """The drift gate: compare gated scenarios in every engine with committed baselines."""
 
-from .checks import check_gate, list_bicycle_warnings, refused_verdicts, update_baselines
+from .checks import check_gate, list_bicycle_warnings, list_left_out, refused_verdicts, update_baselines
 from .ci_files import UNFINISHED_JUNIT, UNFINISHED_MARKDOWN, junit_xml, markdown_page
 from .verdict import SHOWN, Verdict
 
@@ -12,6 +12,7 @@ __all__ = [
     "check_gate",
     "junit_xml",
     "list_bicycle_warnings",
+    "list_left_out",
     "markdown_page",
     "refused_verdicts",
     "update_baselines",

@@ -11,9 +11,10 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ...engines.engine import REFERENCE, Engine, Settings, UnsuitableProblem, uninstalled_engines, why_failed
+from ...engines.engine import REFERENCE, Engine, Settings, UnsuitableProblem, why_failed
 from ...engines.format_version import VERSION_KEY, read_version
 from ...engines.guard import call_engine
+from ...engines.registry import uninstalled_engines
 from ...reference.inputs import NO_INPUTS
 from ..error import ScenarioError
 from ..files import make_folder, write_json
@@ -80,7 +81,36 @@ def gated_names() -> list[str]:
 @cache
 def gate_settings() -> dict[str, dict[str, Any]]:
     """Return the engines' settings on gated rides, by engine, used where a scenario sets no others."""
-    return read_toml(_SETTINGS.read_text(encoding="utf-8"))["engines"]
+    return _read_gate_file()["engines"]
+
+
+@cache
+def gate_scenarios() -> dict[str, list[str]]:
+    """Return the scenarios that engines with long rides ride where none is named, by engine; others ride all."""
+    return _read_gate_file()["scenarios"]
+
+
+def _read_gate_file() -> dict[str, Any]:
+    return read_toml(_SETTINGS.read_text(encoding="utf-8"))
+
+
+def list_left_out(baselines: Path | None = None, sources: Sequence[str] | None = None) -> dict[str, str]:
+    """Return the engines that have a baseline and are not judged because their library is not installed.
+
+    Parameters
+    ----------
+    baselines, sources
+        As `check_gate` takes them.
+
+    Returns
+    -------
+    dict of str to str
+        The command that installs the library, by engine.
+    """
+    folder = BASELINES if baselines is None else baselines
+    names = [load_gated(source)[0] for source in sources or gated_names()]
+    stored = {engine for name in names for engine in read_baseline(name, folder)}
+    return {engine: command for engine, command in uninstalled_engines().items() if engine in stored}
 
 
 def check_gate(
@@ -95,7 +125,8 @@ def check_gate(
     """Run the gate.
 
     Every engine gets a verdict on every scenario, except engines that were not asked for, have no baseline and do not
-    suit the motion. An engine that exits, breaks or is not judged for any other reason counts as not run, and fails.
+    suit the motion, and those whose rides are long: without named scenarios they ride those of `gate_scenarios` and
+    those of which they have a baseline. An engine that exits, breaks or is not judged for any other reason counts as not run, and fails.
 
     Parameters
     ----------
@@ -133,8 +164,9 @@ def check_gate(
     verdicts: list[tuple[str, Verdict]] = []
     fresh: dict[str, dict[str, Any]] = {}
     for name, scenario in scenarios:
-        results = _judge_scenario(name, scenario, choice, known[name], watch, chosen, trace, hold_cpu)
-        verdicts += [(name, verdict) for verdict in [*results.verdicts, *_missing_verdicts(choice.names, results)]]
+        riding = choice if sources else _choose_for_scenario(choice, name, known[name])
+        results = _judge_scenario(name, scenario, riding, known[name], watch, chosen, trace, hold_cpu)
+        verdicts += [(name, verdict) for verdict in [*results.verdicts, *_missing_verdicts(riding.names, results)]]
         fresh[name] = {
             VERSION_KEY: BASELINE_VERSION,
             "scenario": name,
@@ -202,6 +234,14 @@ def _engines_to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[
     # The reference is judged only where it is chosen.
     chosen = [name for name in choice.names if name != REFERENCE or any(fits_engine(entry, name) for entry in wanted)]
     return EngineChoice((*chosen, *gone), choice.named | {*gone})
+
+
+def _choose_for_scenario(choice: EngineChoice, scenario: str, baseline: Mapping[str, Any]) -> EngineChoice:
+    """Return the chosen engines without those that have long rides and do not ride this scenario."""
+    riding = [
+        name for name in choice.names if scenario in gate_scenarios().get(name, [scenario]) or name in baseline
+    ]
+    return EngineChoice(tuple(riding), choice.named)
 
 
 @dataclass(frozen=True)

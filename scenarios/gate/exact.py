@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...engines.admission import ride_engine
-from ...engines.engine import REFERENCE, Problem, Settings, Trajectory, load_engine
+from ...engines.engine import REFERENCE, Problem, Settings, Trajectory
+from ...engines.registry import load_engine
 from ...reference.height_field import HeightField
 from ...reference.profile import SplineProfile
 from ...reference.surface import Surface

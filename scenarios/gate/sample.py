@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from ...engines.admission import ride_engine
-from ...engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory, load_engine, why_failed
+from ...engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory, why_failed
+from ...engines.registry import load_engine
 from ...reference.kinematics import YAW
 from ...reference.stability import growth_rate, linearise, sorted_eigenvalues
 from ...reference.surface import Surface

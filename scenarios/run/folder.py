@@ -9,7 +9,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from ...engines.engine import Engine, Settings, Trajectory, packages
+from ...engines.engine import Engine, Settings, Trajectory
+from ...engines.registry import packages
 from ...reports.drawing import find_unsteadiness, make_summary
 from ..error import ScenarioError
 from ..files import write_sealed, write_text

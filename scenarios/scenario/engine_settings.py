@@ -10,18 +10,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ...engines.engine import (
-    REFERENCE,
-    Engine,
-    Settings,
-    default_engines,
-    engine_names,
-    load_engine,
-    uninstalled_engines,
-    why_failed,
-)
+from ...engines.engine import REFERENCE, Engine, Settings, why_failed
 from ...engines.guard import call_engine
 from ...engines.names import suggest_name
+from ...engines.registry import default_engines, engine_names, load_engine, uninstalled_engines
 from ..error import ScenarioError
 from .table import UnknownName, join_complaints, list_complaints, list_unknown, show_value
 

@@ -9,8 +9,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from ...engines.engine import describe_engine, load_engine, package_of
+from ...engines.engine import describe_engine
 from ...engines.names import suggest_name
+from ...engines.registry import load_engine, package_of
 from ...reference.bicycle import Bicycle
 from ..error import ScenarioError
 from ..scenario import (

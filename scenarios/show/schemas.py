@@ -7,8 +7,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from ...engines.engine import load_engine, why_failed
+from ...engines.engine import why_failed
 from ...engines.guard import call_engine
+from ...engines.registry import load_engine
 from ..error import ScenarioError
 from ..scenario import Scenario, installed_engines
 

@@ -28,9 +28,9 @@ from ...engines.engine import (
     describe_engine,
     describe_settings_source,
     list_bit_variants,
-    load_engine,
     why_failed,
 )
+from ...engines.registry import load_engine
 from ...reports.drawing import make_remarks
 from ...reports.measure import Level, engine_document, measure_creep, measure_order_range
 from ..error import MissingMotionError, ScenarioError

@@ -11,8 +11,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ...engines.engine import REFERENCE, UnsuitableProblem, load_engine
+from ...engines.engine import REFERENCE, UnsuitableProblem
 from ...engines.names import suggest_name
+from ...engines.registry import load_engine
 from ..error import ScenarioError
 from ..run import configure_engine, library_versions
 from ..scenario import (

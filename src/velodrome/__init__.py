@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from .engines.engine import Settings as Settings
     from .engines.engine import Trajectory as Trajectory
     from .engines.engine import UnsuitableProblem as UnsuitableProblem
-    from .engines.engine import engine_names as engine_names
-    from .engines.engine import load_engine as load_engine
     from .engines.guard import EngineError as EngineError
+    from .engines.registry import engine_names as engine_names
+    from .engines.registry import load_engine as load_engine
     from .reference.bicycle import Bicycle as Bicycle
     from .reference.bowls import Cone as Cone
     from .reference.bowls import Sphere as Sphere
@@ -100,16 +100,9 @@ __all__ = [
 
 # Modules of the public names.
 _HOMES = {
-    ".engines.engine": (
-        "Engine",
-        "Problem",
-        "Settings",
-        "Trajectory",
-        "UnsuitableProblem",
-        "engine_names",
-        "load_engine",
-    ),
+    ".engines.engine": ("Engine", "Problem", "Settings", "Trajectory", "UnsuitableProblem"),
     ".engines.guard": ("EngineError",),
+    ".engines.registry": ("engine_names", "load_engine"),
     ".reference.bicycle": ("Bicycle",),
     ".reference.bowls": ("Cone", "Sphere", "Torus"),
     ".reference.height_field": ("HeightField",),

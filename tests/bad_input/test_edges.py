@@ -11,7 +11,7 @@ from complaints import refusing
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from velodrome.engines.engine import engine_names, load_engine
+from velodrome.engines.registry import engine_names, load_engine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.bowls import Cone, Sphere, Torus
 from velodrome.reference.circular import LARGEST_RESIDUAL, CircularMotion

@@ -20,7 +20,7 @@ from packaging.utils import canonicalize_name
 from packaging.version import Version
 
 from tests.sealing import sealed
-from velodrome.engines import engine as registry
+from velodrome.engines import registry
 from velodrome.reports.drawing.summary import make_summary
 from velodrome.reports.figures.precision import precision_figure
 from velodrome.scenarios.gate.ci_files import junit_xml, markdown_page

@@ -20,7 +20,7 @@ from pages import source_pages
 from scenario_files import describe_scenario_file, describe_sweep_file, scenario_tables
 
 import velodrome
-from velodrome.engines.engine import load_engine
+from velodrome.engines.registry import load_engine
 from velodrome.engines.storage import trajectory_columns
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reports.measure import QUANTITIES

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from velodrome.engines import engine as registry
+from velodrome.engines import registry
 from velodrome.engines.admission import ride_engine
-from velodrome.engines.engine import SHAPES, EngineError, Problem, Settings, Trajectory, load_engine
+from velodrome.engines.engine import SHAPES, EngineError, Problem, Settings, Trajectory
 from velodrome.engines.lagrange import ENGINE, LagrangeEngine
+from velodrome.engines.registry import load_engine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.dae import consistent_state
 from velodrome.reference.families import find_motion

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from velodrome.engines.engine import REFERENCE, engine_names, load_engine
+from velodrome.engines.engine import REFERENCE
+from velodrome.engines.registry import engine_names, load_engine
 from velodrome.testing import check_engine
 
 # Engines that refuse every ground but the plane.

@@ -9,8 +9,9 @@ import pytest
 
 from tests.wrapped import WrappedEngine
 from velodrome.engines.admission import ride_engine
-from velodrome.engines.engine import EngineError, Problem, Progress, Trajectory, UnsuitableProblem, load_engine
+from velodrome.engines.engine import EngineError, Problem, Progress, Trajectory, UnsuitableProblem
 from velodrome.engines.guard import GuardedEngine
+from velodrome.engines.registry import load_engine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.dae import consistent_state
 from velodrome.reference.inputs import NO_INPUTS, Inputs

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from velodrome.engines import engine as registry
-from velodrome.engines import lagrange
-from velodrome.engines.engine import REFERENCE, Problem, Trajectory, UnsuitableProblem, engine_names, load_engine
+from velodrome.engines import lagrange, registry
+from velodrome.engines.engine import REFERENCE, Problem, Trajectory, UnsuitableProblem
+from velodrome.engines.registry import engine_names, load_engine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.families import find_motion
 from velodrome.reference.surface import Paraboloid, Plane, SurfaceOfRevolution

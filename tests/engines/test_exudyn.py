@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from velodrome.engines.engine import EngineError, Problem, Trajectory, load_engine
+from velodrome.engines.engine import EngineError, Problem, Trajectory
+from velodrome.engines.registry import load_engine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.bowls import Sphere
 from velodrome.reference.dae import consistent_state
@@ -300,6 +301,6 @@ def test_interrupt_gets_out() -> None:
 
 
 def test_library_is_imported_only_to_run() -> None:
-    load = "import sys; from velodrome.engines.engine import load_engine; load_engine('exudyn').version"
+    load = "import sys; from velodrome.engines.registry import load_engine; load_engine('exudyn').version"
     check = f"{load}; assert 'exudyn' not in sys.modules"
     subprocess.run([sys.executable, "-c", check], check=True)

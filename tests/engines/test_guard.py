@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 from velodrome.engines import guard
-from velodrome.engines.engine import EngineError, Problem, load_engine, why_failed
+from velodrome.engines.engine import EngineError, Problem, why_failed
 from velodrome.engines.guard import GuardedEngine, call_engine, where_raised
+from velodrome.engines.registry import load_engine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.surface import Plane
 

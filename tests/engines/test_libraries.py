@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from velodrome.engines import engine as registry
-from velodrome.engines.engine import default_engines, engine_names, load_engine, uninstalled_engines
+from velodrome.engines import registry
+from velodrome.engines.registry import default_engines, engine_names, load_engine, uninstalled_engines
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run import plan_run
 from velodrome.scenarios.scenario import choose_engines, list_engine_faults, load_scenario

@@ -17,8 +17,8 @@ from typing import Any
 import pytest
 import typer
 
-from velodrome.engines import engine as registry
-from velodrome.engines.engine import engine_names, load_engine
+from velodrome.engines import registry
+from velodrome.engines.registry import engine_names, load_engine
 from velodrome.reference.surface import is_level
 from velodrome.scenarios.cli import app
 from velodrome.scenarios.gate import checks as gate

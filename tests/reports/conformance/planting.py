@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from tests.wrapped import WrappedEngine
-from velodrome.engines.engine import Problem, Progress, Trajectory, load_engine
+from velodrome.engines.engine import Problem, Progress, Trajectory
+from velodrome.engines.registry import load_engine
 from velodrome.reference.kinematics import COORDINATES
 from velodrome.reports.measure import evaluate_ride
 

@@ -15,7 +15,8 @@ import pytest
 from planting import changed, plant, reported
 from pydantic import BaseModel, Field
 
-from velodrome.engines.engine import REFERENCE, Problem, Settings, Trajectory, UnsuitableProblem, load_engine
+from velodrome.engines.engine import REFERENCE, Problem, Settings, Trajectory, UnsuitableProblem
+from velodrome.engines.registry import load_engine
 from velodrome.testing import ConformanceReport, check_engine, examine_engine
 
 MEMBERS = ("name", "version", "gives", "settings", "check", "step_noise", "simulate")

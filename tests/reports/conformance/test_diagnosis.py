@@ -22,7 +22,8 @@ from planting import (
 )
 from scipy.interpolate import CubicSpline
 
-from velodrome.engines.engine import REFERENCE, Problem, Trajectory, load_engine
+from velodrome.engines.engine import REFERENCE, Problem, Trajectory
+from velodrome.engines.registry import load_engine
 from velodrome.reference.dae import dynamics
 from velodrome.reference.kinematics import COORDINATES
 from velodrome.reference.surface import Plane

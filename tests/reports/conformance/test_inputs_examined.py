@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import pytest
 from planting import Planted, same
 
-from velodrome.engines.engine import Problem, UnsuitableProblem, load_engine
+from velodrome.engines.engine import Problem, UnsuitableProblem
+from velodrome.engines.registry import load_engine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.inputs import NO_INPUTS, Inputs
 from velodrome.reference.surface import is_level

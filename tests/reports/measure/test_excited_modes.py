@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from velodrome.engines.engine import Problem, Trajectory, load_engine
+from velodrome.engines.engine import Problem, Trajectory
+from velodrome.engines.registry import load_engine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.dae import consistent_state
 from velodrome.reference.families import find_motion

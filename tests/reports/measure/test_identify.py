@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from velodrome.engines.engine import Problem, Settings, load_engine
+from velodrome.engines.engine import Problem, Settings
 from velodrome.engines.lagrange import LagrangeSettings
+from velodrome.engines.registry import load_engine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.dae import consistent_state
 from velodrome.reference.families import find_motion

@@ -12,7 +12,8 @@ import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
-from velodrome.engines.engine import REFERENCE, Problem, Trajectory, engine_names, load_engine
+from velodrome.engines.engine import REFERENCE, Problem, Trajectory
+from velodrome.engines.registry import engine_names, load_engine
 from velodrome.reference.bicycle import BODIES, Bicycle
 from velodrome.reference.contact import observe
 from velodrome.reference.dae import consistent_state, dynamics

@@ -18,16 +18,9 @@ from altered import Altered, pressing_ctrl_c, raising
 
 from tests.literature import published, rounds_to
 from tests.sealing import contents
-from velodrome.engines import engine as registry
-from velodrome.engines.engine import (
-    Engine,
-    EngineError,
-    Settings,
-    Trajectory,
-    engine_names,
-    load_engine,
-    uninstalled_engines,
-)
+from velodrome.engines import registry
+from velodrome.engines.engine import Engine, EngineError, Settings, Trajectory
+from velodrome.engines.registry import engine_names, load_engine, uninstalled_engines
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.families import find_motion
 from velodrome.reference.surface import Paraboloid

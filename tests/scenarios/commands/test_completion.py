@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from velodrome.engines.engine import ENTRY_POINT_GROUP, engine_names
+from velodrome.engines.registry import ENTRY_POINT_GROUP, engine_names
 from velodrome.scenarios import names
 from velodrome.scenarios.scenario.schema import library_names
 

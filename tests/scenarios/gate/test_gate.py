@@ -27,19 +27,11 @@ from gating import (
 from numba import cfunc
 
 from velodrome.engines.admission import ride_engine
-from velodrome.engines.engine import (
-    REFERENCE,
-    Engine,
-    EngineError,
-    Problem,
-    Settings,
-    Trajectory,
-    engine_names,
-    load_engine,
-)
+from velodrome.engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory
 from velodrome.engines.exudyn import joint
 from velodrome.engines.lagrange import LagrangeSettings
 from velodrome.engines.mujoco import compiled
+from velodrome.engines.registry import engine_names, load_engine
 from velodrome.reference.kinematics import LEAN, PITCH, STEER
 from velodrome.reports.measure.inspection import relative_differences
 from velodrome.scenarios.error import ScenarioError

@@ -25,7 +25,8 @@ from gating import (
 )
 from plain import PlainEngine, PlainSettings, without_gyroscopic_moment
 
-from velodrome.engines.engine import REFERENCE, SHAPES, Engine, Problem, Progress, Settings, Trajectory, load_engine
+from velodrome.engines.engine import REFERENCE, SHAPES, Engine, Problem, Progress, Settings, Trajectory
+from velodrome.engines.registry import load_engine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.kinematics import LEAN, STEER, YAW
 from velodrome.reference.surface import Paraboloid, Plane

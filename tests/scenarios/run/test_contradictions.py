@@ -14,8 +14,9 @@ from altered import CONTRADICTIONS, Altered, raising
 from typer.testing import CliRunner
 
 from tests.sealing import contents
-from velodrome.engines import engine as registry
-from velodrome.engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory, engine_names
+from velodrome.engines import registry
+from velodrome.engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory
+from velodrome.engines.registry import engine_names
 from velodrome.reports.drawing.summary import make_remarks
 from velodrome.reports.measure import flatten_metrics
 from velodrome.reports.measure.consistency import describe_mismatch

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from velodrome.engines.admission import ride_engine
-from velodrome.engines.engine import REFERENCE, Trajectory, UnsuitableProblem, engine_names, load_engine
+from velodrome.engines.engine import REFERENCE, Trajectory, UnsuitableProblem
+from velodrome.engines.registry import engine_names, load_engine
 from velodrome.reference.simulate import simulate
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.scenario.schema import library_names, load_scenario

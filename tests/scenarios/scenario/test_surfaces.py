@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import tomli_w
 
-from velodrome.engines.engine import REFERENCE, load_engine
+from velodrome.engines.engine import REFERENCE
+from velodrome.engines.registry import load_engine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.bowls import Cone, Sphere, Torus
 from velodrome.reference.circular import SIGMA, Steady

@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 from pydantic import Field
 
-from velodrome.engines.engine import Settings, engine_names, load_engine
+from velodrome.engines.engine import Settings
+from velodrome.engines.registry import engine_names, load_engine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.scenario.engine_settings import configure_engine

@@ -14,18 +14,10 @@ import numpy as np
 import pytest
 
 from velodrome.engines.admission import ride_engine
-from velodrome.engines.engine import (
-    DEFAULT_SETTINGS_SOURCE,
-    REFERENCE,
-    EngineError,
-    Problem,
-    default_engines,
-    describe_settings_source,
-    engine_names,
-    load_engine,
-)
+from velodrome.engines.engine import DEFAULT_SETTINGS_SOURCE, REFERENCE, EngineError, Problem, describe_settings_source
 from velodrome.engines.mujoco.native import ENGINE as NATIVE
 from velodrome.engines.mujoco.settings import NativeSettings
+from velodrome.engines.registry import default_engines, engine_names, load_engine
 from velodrome.reports.page import find_creeping, rank_rides
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run.runner import measure_one

@@ -12,7 +12,8 @@ import pytest
 
 from tests.sealing import contents
 from velodrome.engines.admission import ride_engine
-from velodrome.engines.engine import REFERENCE, load_engine
+from velodrome.engines.engine import REFERENCE
+from velodrome.engines.registry import load_engine
 from velodrome.reports.measure.metrics import position_errors
 from velodrome.reports.measure.precision import SAME_BITS, Level, engine_document
 from velodrome.scenarios.error import ScenarioError
