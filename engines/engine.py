@@ -18,6 +18,7 @@ from importlib.metadata import EntryPoint, entry_points, version
 from typing import TYPE_CHECKING, Any, Protocol, Self, cast
 
 import numpy as np
+from packaging.utils import canonicalize_name
 from pydantic import BaseModel, ConfigDict
 
 from ..reference.bicycle import Bicycle
@@ -27,7 +28,7 @@ from ..reference.surface import Surface
 from .format_version import VERSION_KEY
 from .guard import EngineError as EngineError
 from .guard import GuardedEngine, call_engine, where_raised
-from .libraries import install_command, list_missing
+from .libraries import install_command, list_extra_packages, list_missing
 from .names import suggest_name
 
 if TYPE_CHECKING:
@@ -327,6 +328,9 @@ class Engine(Protocol):
     defaults of the settings are, such as the page of the library's documentation. ``bit_variants`` maps descriptions to
     changed settings with which a ride should be the same to the last bit, such as another number of threads or another
     place in a batch.
+
+    The tuple ``packages`` serves `velodrome history`: it names the packages of the library behind the engine, whose
+    releases can be compared, where they are neither the engine's own package nor those of its extra.
     """
 
     @property
@@ -555,6 +559,25 @@ def package_of(name: str) -> str | None:
     """
     distribution = _find_entry_points()[name].dist
     return None if distribution is None else distribution.name
+
+
+def list_library_packages(name: str) -> tuple[str, ...]:
+    """Return the packages whose releases an installed engine rides in, by their canonical names.
+
+    They are its ``packages``; without that attribute, what the extra of its entry point needs, or the package that
+    announces it.
+
+    Raises
+    ------
+    ValueError
+        If the engine cannot be loaded.
+    """
+    engine = load_engine(name)
+    own: object = getattr(engine.inner, "packages", None)
+    if isinstance(own, tuple):
+        return tuple(canonicalize_name(str(package)) for package in cast("tuple[object, ...]", own))
+    point = _find_entry_points()[name]
+    return tuple(list_extra_packages(point)) if point.extras else (_distribution(point),)
 
 
 @cache
