@@ -71,7 +71,7 @@ def _describe_row(
     return {
         "version": ride.release.version,
         "release": ride.release.label,
-        "wheel": None if ride.release.wheel is None else ride.release.wheel.name,
+        "wheel": None if ride.release.wheel is None else str(ride.release.wheel),
         "engine": ride.engine,
         "scenario": ride.scenario,
         "status": row["status"],
