@@ -322,6 +322,9 @@ class Engine(Protocol):
     defaults of the settings are, such as the page of the library's documentation. ``bit_variants`` maps descriptions to
     changed settings with which a ride should be the same to the last bit, such as another number of threads or another
     place in a batch.
+
+    The tuple ``packages`` serves `velodrome history`: it names the packages of the library behind the engine, whose
+    releases can be compared, where they are neither the engine's own package nor those of its extra.
     """
 
     @property

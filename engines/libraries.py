@@ -10,6 +10,7 @@ from __future__ import annotations
 from importlib.metadata import EntryPoint, PackageNotFoundError, version
 
 from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 
 def list_missing(point: EntryPoint) -> list[str]:
@@ -26,16 +27,25 @@ def list_missing(point: EntryPoint) -> list[str]:
     """
     if not point.extras or point.dist is None:
         return []
-    missing = []
-    for line in point.dist.requires or []:
+    needed = _list_extra_requirements(point)
+    return [f"{found.name}{found.specifier}" for found in needed if not _is_installed(found)]
+
+
+def list_extra_packages(point: EntryPoint) -> list[str]:
+    """Return the canonical names of the packages that an engine's extras need."""
+    return [canonicalize_name(found.name) for found in _list_extra_requirements(point)]
+
+
+def _list_extra_requirements(point: EntryPoint) -> list[Requirement]:
+    found = []
+    for line in (point.dist.requires if point.dist is not None else None) or []:
         requirement = Requirement(line)
         # Without an extra its marker is false; requirements without a marker are the package's own.
         if requirement.marker is None or requirement.marker.evaluate({"extra": ""}):
             continue
-        needed = any(requirement.marker.evaluate({"extra": extra}) for extra in point.extras)
-        if needed and not _is_installed(requirement):
-            missing.append(f"{requirement.name}{requirement.specifier}")
-    return missing
+        if any(requirement.marker.evaluate({"extra": extra}) for extra in point.extras):
+            found.append(requirement)
+    return found
 
 
 def install_command(point: EntryPoint) -> str:

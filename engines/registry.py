@@ -8,11 +8,14 @@ from __future__ import annotations
 import re
 import reprlib
 from importlib.metadata import EntryPoint, entry_points
+from typing import cast
+
+from packaging.utils import canonicalize_name
 
 from .engine import REFERENCE, why_failed
 from .format_version import VERSION_KEY
 from .guard import GuardedEngine, call_engine, where_raised
-from .libraries import install_command, list_missing
+from .libraries import install_command, list_extra_packages, list_missing
 from .names import suggest_name
 
 ENTRY_POINT_GROUP = "velodrome.engines"
@@ -132,3 +135,22 @@ def packages() -> dict[str, str]:
     """Return the versions of the packages that announce engines, by name of the package."""
     found = (point.dist for point in _find_entry_points().values())
     return {dist.name: dist.version for dist in found if dist is not None}
+
+
+def list_library_packages(name: str) -> tuple[str, ...]:
+    """Return the packages whose releases an installed engine rides in, by their canonical names.
+
+    They are its ``packages``; without that attribute, what the extra of its entry point needs, or the package that
+    announces it.
+
+    Raises
+    ------
+    ValueError
+        If the engine cannot be loaded.
+    """
+    engine = load_engine(name)
+    own: object = getattr(engine.inner, "packages", None)
+    if isinstance(own, tuple):
+        return tuple(canonicalize_name(str(package)) for package in cast("tuple[object, ...]", own))
+    point = _find_entry_points()[name]
+    return tuple(list_extra_packages(point)) if point.extras else (_distribution(point),)

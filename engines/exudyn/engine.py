@@ -47,6 +47,7 @@ class ExudynEngine:
     put_on_ground: Callable[[], PutOnGround]
     level_only: bool = False
     takes_inputs = True
+    packages = ("exudyn",)
     settings_source = (
         "the suite's own choice: Exudyn's generalized alpha at 1 ms with a spectral radius of 0.8, and tolerances of "
         "Newton's method that leave no visible error; the settings' descriptions give the reasons"

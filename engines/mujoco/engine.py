@@ -66,6 +66,7 @@ class MujocoEngine(Generic[S]):
     settings_source: str
     gives: tuple[str, ...] = GIVES
     takes_inputs = True
+    packages = ("mujoco",)
 
     @property
     def version(self) -> str:

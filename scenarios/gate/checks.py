@@ -238,9 +238,7 @@ def _engines_to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[
 
 def _choose_for_scenario(choice: EngineChoice, scenario: str, baseline: Mapping[str, Any]) -> EngineChoice:
     """Return the chosen engines without those that have long rides and do not ride this scenario."""
-    riding = [
-        name for name in choice.names if scenario in gate_scenarios().get(name, [scenario]) or name in baseline
-    ]
+    riding = [name for name in choice.names if scenario in gate_scenarios().get(name, [scenario]) or name in baseline]
     return EngineChoice(tuple(riding), choice.named)
 
 

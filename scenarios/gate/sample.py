@@ -79,6 +79,8 @@ class Sample:
     version : str
     settings : dict
         JSON values.
+    trajectory : Trajectory
+        The ride, as the engine gave it.
     """
 
     values: dict[str, float | None]
@@ -88,6 +90,7 @@ class Sample:
     step_noise: float
     version: str
     settings: dict[str, Any]
+    trajectory: Trajectory
 
 
 def take_sample(
@@ -193,6 +196,7 @@ def take_sample(
         step_noise=own_noise,
         version=engine.version,
         settings=settings.model_dump(mode="json"),
+        trajectory=trajectory,
     )
 
 

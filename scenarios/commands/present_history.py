@@ -1,0 +1,165 @@
+"""Progress and terminal output of `velodrome history`."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from rich import progress as bars
+from rich.console import Console
+
+from ..history import HistoryPlan, PlannedRide
+from .tables import Column, print_table
+
+_MOST_QUANTITIES = 4  # of a turning point, in the table; the document has all of them
+_STYLES = {"worse": "red", "changed": "yellow", "better": "cyan"}
+
+
+class HistoryProgress:
+    """Finished rides, remaining time and failures on stderr; a context. Bars are shown on a terminal only.
+
+    Parameters
+    ----------
+    plan : HistoryPlan
+    bisect : bool
+        Whether only some of the rides are needed, so that their number is not known.
+    """
+
+    def __init__(self, plan: HistoryPlan, bisect: bool) -> None:
+        columns = (
+            bars.TextColumn("{task.description}"),
+            bars.BarColumn(),
+            bars.MofNCompleteColumn(),
+            bars.TimeElapsedColumn(),
+            bars.TimeRemainingColumn(),
+        )
+        self._console = Console(stderr=True)
+        self._bars = bars.Progress(*columns, console=self._console, transient=True)
+        self._told: set[str] = set()
+        self._task = self._bars.add_task(plan.package, total=None if bisect else len(plan.rides))
+
+    def __enter__(self) -> HistoryProgress:
+        if self._console.is_terminal:
+            self._bars.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._console.is_terminal:
+            self._bars.stop()
+
+    def watch(self, ride: PlannedRide, row: Mapping[str, Any], fresh: bool) -> None:
+        """Count a row; a row of an earlier session is not told again."""
+        self._bars.update(self._task, advance=1, description=f"{ride.release.package} {ride.release.label}")
+        line = f"{ride.release.label} {ride.engine}: {row['status']}: {row['reason']}"
+        # The same reason on every scenario is told once.
+        if fresh and row["reason"] is not None and line not in self._told:
+            self._told.add(line)
+            self.note(line)
+
+    def note(self, line: str) -> None:
+        """Print a line above the bar."""
+        self._console.print(line, soft_wrap=True, highlight=False, markup=False)
+
+
+def show_history(console: Console, document: Mapping[str, Any]) -> None:
+    """Print a table per scenario and engine, one line for each group of releases that ride alike, then what changed."""
+    by_pair: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for row in document["releases"]:
+        by_pair.setdefault((row["scenario"], row["engine"]), []).append(row)
+    for (scenario, engine), rows in by_pair.items():
+        console.print()
+        console.print(f"{scenario}: {engine}", style="bold", markup=False, soft_wrap=True)
+        groups = [list(group) for _, group in groupby(_number_groups(rows), key=lambda item: item[0])]
+        found = [[row for _, row in group] for group in groups]
+        columns = [
+            Column("releases", [_name_releases(group) for group in found], right=False),
+            Column("number", [str(len(group)) for group in found]),
+            Column("among them", [_describe_inside(group) for group in found], right=False),
+            Column("since the release before", [_describe_step(group[0]) for group in found], right=False),
+        ]
+        print_table(console, columns)
+    console.print()
+    for release, wheel in {row["release"]: row["wheel"] for row in document["releases"] if row["wheel"]}.items():
+        console.print(f"{release}: {wheel}", style="dim", markup=False, highlight=False, soft_wrap=True)
+    _show_turning_points(console, document["turning_points"])
+    for line in document["remarks"]:
+        console.print(line, style="yellow", markup=False, highlight=False, soft_wrap=True)
+
+
+def _number_groups(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, Mapping[str, Any]]]:
+    """Return rows with the number of their group: a group ends where something moved or a row has another status."""
+    found: list[tuple[int, Mapping[str, Any]]] = []
+    number, before = 0, None
+    for row in rows:
+        if before is not None and (row["changed"] or (row["status"], row["reason"]) != before):
+            number += 1
+        before = (row["status"], row["reason"])
+        found.append((number, row))
+    return found
+
+
+def _name_releases(group: Sequence[Mapping[str, Any]]) -> str:
+    first, last = group[0]["release"], group[-1]["release"]
+    return first if len(group) == 1 else f"{first} to {last}"
+
+
+def _describe_inside(group: Sequence[Mapping[str, Any]]) -> str:
+    if group[0]["status"] != "rode":
+        return group[0]["status"]
+    inside = {row["since_previous"] for row in group[1:]}
+    if not inside:
+        return "rode"
+    return "same to the bit" if inside == {"same-bits"} else "same within round-off"
+
+
+def _describe_step(row: Mapping[str, Any]) -> str:
+    since = row["since_previous"]
+    if since is None:
+        return "–"
+    if not row["changed"]:
+        return {"same-bits": "same to the bit", "round-off": "same within round-off"}[since]
+    return f"{since}: {len(row['changed'])} quantities" if len(row["changed"]) > 1 else f"{since}: {row['changed'][0]}"
+
+
+def _show_turning_points(console: Console, points: Sequence[Mapping[str, Any]]) -> None:
+    if not points:
+        console.print("no release moved a quantity beyond its limit", style="bold green")
+        return
+    console.print("turning points", style="bold")
+    for point in points:
+        line = f"{point['release']}, since {point['since']}: {point['scenario']}: {point['engine']}: {point['verdict']}"
+        console.print(line, style=_STYLES[point["verdict"]], markup=False, highlight=False, soft_wrap=True)
+        moved = sorted(point["quantities"], key=_rank_move)
+        for move in moved[:_MOST_QUANTITIES]:
+            console.print(f"  {_describe_move(move)}", markup=False, highlight=False, soft_wrap=True)
+        if len(moved) > _MOST_QUANTITIES:
+            more = ", ".join(move["quantity"] for move in moved[_MOST_QUANTITIES:])
+            console.print(f"  and {more}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _rank_move(move: Mapping[str, Any]) -> float:
+    """Return a number by which the observed order comes first, and then what moved most against its limit."""
+    if move["quantity"] == "observed_order":
+        return -float("inf")
+    if move["before"] is None or move["after"] is None or not move["limit"]:
+        return 0.0
+    return -abs(move["after"] - move["before"]) / move["limit"]
+
+
+def _describe_move(move: Mapping[str, Any]) -> str:
+    if move["quantity"] == "run":
+        return {"better": "it rides, and the one before did not", "worse": "it does not ride any more"}[move["status"]]
+    before, after = ("none" if move[part] is None else f"{move[part]:.6g}" for part in ("before", "after"))
+    limit = "" if move["limit"] is None else f", limit {move['limit']:.2g}"
+    return f"{move['quantity']}: {move['status']}: {before} -> {after}{limit}"
+
+
+def resume_history_command(out: Path) -> str:
+    """Return the command that continues an interrupted history, for the shell."""
+    arguments = [argument for argument in sys.argv[1:] if argument != "--resume"]
+    where = [] if any(argument.startswith("--out") for argument in arguments) else ["--out", str(out)]
+    return shlex.join(["velodrome", *arguments, *where, "--resume"])

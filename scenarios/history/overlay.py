@@ -1,0 +1,147 @@
+"""A release's environment laid over this process's, and the check that nothing else of its packages was loaded."""
+
+from __future__ import annotations
+
+import importlib
+import site
+import sys
+from collections.abc import Sequence
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+from types import ModuleType
+
+from packaging.version import Version
+
+from .requirements import list_top_modules
+
+_MAPS = Path("/proc/self/maps")
+
+
+class WrongRelease(RuntimeError):
+    """Raised if the package that was loaded is not the release that was asked for."""
+
+
+def lay_over(folder: Path) -> list[Path]:
+    """Put a release's environment first on Python's path, with the folders that its path files add.
+
+    Returns
+    -------
+    list of Path
+        The folders of the environment that are on the path, itself first.
+    """
+    known = [entry for entry in sys.path if entry != str(folder)]
+    sys.path[:] = known
+    site.addsitedir(str(folder))  # a folder of PYTHONPATH alone would not have its path files read
+    own = [str(folder), *(entry for entry in sys.path if entry not in known and entry != str(folder))]
+    sys.path[:] = [*own, *known]
+    importlib.invalidate_caches()
+    folders = [Path(entry) for entry in own]
+    sys.meta_path.insert(0, _OwnModulesOnly(folders))
+    return folders
+
+
+class _OwnModulesOnly(MetaPathFinder):
+    """Find the modules of a release's packages in its environment alone.
+
+    A package may extend its path to others of its name, and would then load modules of the suite's installed release.
+
+    Parameters
+    ----------
+    own : list of Path
+        Folders of the environment on the path.
+    """
+
+    def __init__(self, own: list[Path]) -> None:
+        self._own = own
+        self._tops = {top for folder in own if folder.is_dir() for top in _list_regular_modules(folder)}
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return the specification of a module of the environment; None for all other modules.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            If the environment does not have the module, but it has the package.
+        """
+        if fullname.partition(".")[0] not in self._tops:
+            return None
+        places = (
+            [str(folder) for folder in self._own]
+            if path is None
+            else [entry for entry in path if any(Path(entry).is_relative_to(folder) for folder in self._own)]
+        )
+        found = PathFinder.find_spec(fullname, places, target)
+        if found is None:
+            raise ModuleNotFoundError(f"No module named {fullname!r} in the release", name=fullname)
+        return found
+
+
+def _list_regular_modules(folder: Path) -> set[str]:
+    """Return the modules in a folder without namespace packages, which several packages may share."""
+    tops = list_top_modules(folder)
+    return {top for top in tops if not (folder / top).is_dir() or (folder / top / "__init__.py").exists()}
+
+
+def require_release(folder: Path, package: str, version: str) -> None:
+    """Make sure that a package's metadata are those of the release in the folder.
+
+    Raises
+    ------
+    WrongRelease
+        If they are not.
+    """
+    try:
+        found = distribution(package)
+    except PackageNotFoundError as error:
+        raise WrongRelease(f"{package} is not in its environment") from error
+    where = Path(str(found.locate_file(""))).resolve()
+    if where != folder.resolve() or Version(found.version) != Version(version):
+        raise WrongRelease(f"{package} {version} was asked for, and {found.version} in {where} is found")
+
+
+def require_loaded_from(own: list[Path]) -> None:
+    """Make sure that modules of the laid-over packages come from their environment, compiled libraries too.
+
+    Parameters
+    ----------
+    own : list of Path
+        The folders of the environment on the path, as `lay_over` returns them.
+
+    Raises
+    ------
+    WrongRelease
+        If a module or a compiled library of the same name comes from elsewhere, or nothing of them is loaded.
+    """
+    tops = {top for folder in own if folder.is_dir() for top in list_top_modules(folder)}
+    loaded = 0
+    for name, module in list(sys.modules.items()):
+        if name.partition(".")[0] not in tops:
+            continue
+        places = _find_places(module)
+        if places and not any(place.is_relative_to(folder.resolve()) for place in places for folder in own):
+            raise WrongRelease(f"module {name} was loaded from {places[0]}, not from the release's environment")
+        loaded += bool(places)
+    if not loaded:
+        raise WrongRelease("the engine loaded nothing of the release, so that the ride says nothing about it")
+    others = [Path(entry).resolve() / top for entry in sys.path if Path(entry) not in own for top in tops]
+    for path in _list_mapped_files():
+        if any(path.is_relative_to(other) for other in others):
+            raise WrongRelease(f"{path} was loaded, which is not of the release's environment")
+
+
+def _find_places(module: ModuleType) -> list[Path]:
+    file = getattr(module, "__file__", None)
+    places = [file] if isinstance(file, str) else list(getattr(module, "__path__", None) or [])
+    return [Path(place).resolve() for place in places]
+
+
+def _list_mapped_files() -> set[Path]:
+    """Return the files that are mapped into this process, compiled libraries among them; none on other systems."""
+    if not _MAPS.exists():
+        return set()
+    fields = (line.split(maxsplit=5) for line in _MAPS.read_text(errors="replace").splitlines())
+    return {Path(field[5]) for field in fields if len(field) == 6 and field[5].startswith("/")}

@@ -1,0 +1,121 @@
+"""What the packages of a release's environment need, and which of it the suite's environment has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from importlib.metadata import Distribution, PackageNotFoundError, distribution, distributions
+from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+_SUITE = "velodrome"
+
+
+class RequirementConflict(RuntimeError):
+    """Raised for a release that needs a version of a package that the rest of the suite cannot have."""
+
+
+def find_suite_packages(package: str) -> set[str]:
+    """Return the canonical names of all packages that the suite needs even without a package."""
+    found: set[str] = set()
+    left = [_SUITE]
+    while left:
+        name = left.pop()
+        if name in found or name == package:
+            continue
+        found.add(name)
+        try:
+            needed = _list_needs(distribution(name), ())
+        except PackageNotFoundError:
+            continue
+        left += [canonicalize_name(requirement.name) for requirement in needed]
+    return found
+
+
+def list_unmet(folder: Path, package: str) -> list[str]:
+    """Return requirements of the packages in a folder that have to be installed into it as well.
+
+    A requirement is met by a package in the folder, or by the suite's environment. The latter does not help where both
+    would share a module: Python takes a whole module from the folder that comes first, so that a release's companion
+    package must lie beside it.
+
+    Parameters
+    ----------
+    folder : Path
+    package : str
+        Canonical name of the package whose release the folder holds.
+
+    Raises
+    ------
+    RequirementConflict
+        If a package that the suite itself needs would have to be another version. It is never replaced, since the
+        reference and the comparison would be replaced with it.
+    """
+    here = {canonicalize_name(found.name): found for found in distributions(path=[str(folder)])}
+    own_modules = list_top_modules(folder)
+    suite = find_suite_packages(package)
+    unmet: dict[str, str] = {}
+    extras: dict[str, set[str]] = {name: set() for name in here}
+    left = list(here)
+    while left:
+        name = left.pop()
+        for requirement in _list_needs(here[name], extras[name]):
+            needed = canonicalize_name(requirement.name)
+            if needed in here:
+                new = requirement.extras - extras[needed]
+                if new:
+                    extras[needed] |= new
+                    left.append(needed)
+                if not _fits(requirement, here[needed]):
+                    raise RequirementConflict(f"{name} needs {requirement}, but {here[needed].version} is beside it")
+                continue
+            installed = _find_installed(needed)
+            fits = installed is not None and _fits(requirement, installed)
+            if needed in suite:
+                if not fits:
+                    has = "not installed" if installed is None else f"{installed.version} in the suite's environment"
+                    raise RequirementConflict(f"{name} needs {requirement}, and {needed} is {has}")
+            elif not fits or (installed is not None and _share_modules(installed, own_modules)):
+                extra = f"[{','.join(sorted(requirement.extras))}]" if requirement.extras else ""
+                unmet[needed] = f"{requirement.name}{extra}{requirement.specifier}"
+    return [unmet[name] for name in sorted(unmet)]
+
+
+def list_top_modules(folder: Path) -> set[str]:
+    """Return the names of the modules and packages that lie directly in a folder."""
+    found = set()
+    for entry in folder.iterdir():
+        if entry.name.endswith(".dist-info") or entry.name in ("__pycache__", "bin") or entry.name.startswith("."):
+            continue
+        if entry.is_dir():
+            found.add(entry.name)
+        elif entry.suffix in (".py", ".so", ".pyd"):
+            found.add(entry.name.partition(".")[0])
+    return found
+
+
+def _list_needs(found: Distribution, extras: Iterable[str]) -> Iterator[Requirement]:
+    """Yield what a package needs on this platform, with what these of its extras need."""
+    for line in found.requires or []:
+        requirement = Requirement(line)
+        marker = requirement.marker
+        if marker is None or any(marker.evaluate({"extra": extra}) for extra in ("", *extras)):
+            yield requirement
+
+
+def _find_installed(name: str) -> Distribution | None:
+    try:
+        return distribution(name)
+    except PackageNotFoundError:
+        return None
+
+
+def _fits(requirement: Requirement, found: Distribution) -> bool:
+    return requirement.specifier.contains(found.version, prereleases=True)
+
+
+def _share_modules(found: Distribution, modules: set[str]) -> bool:
+    files = found.files or []
+    tops = {path.parts[0].partition(".")[0] if len(path.parts) == 1 else path.parts[0] for path in files}
+    return bool(tops & modules)

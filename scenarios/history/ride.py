@@ -1,0 +1,195 @@
+"""The process that rides one release: ``python -m velodrome.scenarios.history.ride``, in lines of JSON.
+
+Standard input: first the `RideSetup`, then one task per line. Standard output: one line per task. The process lays the
+release's environment over its own and loads the reference. Every ride is done by a fork of it, in which the engine's
+library is loaded: no ride can change another one, and a crash ends one ride only. A result is held back unless all
+that was loaded of the release's packages comes from its environment.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import math
+import os
+import signal
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...engines.engine import REFERENCE, Trajectory, UnsuitableProblem, why_failed
+from ...engines.guard import call_engine
+from ...engines.registry import load_engine
+from ...engines.storage import digest, trajectory_table
+from ..error import ScenarioError
+from ..gate import SHOWN, take_sample
+from ..run import configure_engine
+from .overlay import WrongRelease, lay_over, require_loaded_from, require_release
+from .problems import MeasuredRide, digest_suite, read_rides
+
+_DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux's prctl
+_MOST_SAMPLES = 41  # of a stored ride; the digest covers all of it
+_LONGEST_REASON = 500  # characters
+_TIMING = "cpu_ratio"  # it differs from run to run
+RODE, REFUSED, FAILED, NOT_INSTALLABLE = "rode", "refused", "failed", "not-installable"
+
+
+@dataclass(frozen=True)
+class RideSetup:
+    """What a ride process needs to know before its first task.
+
+    Attributes
+    ----------
+    parent : int
+        Process with which it ends.
+    folder : str
+        The release's environment.
+    package, version : str
+        The release.
+    rides, rides_sha256 : str
+        File of the rides, by `velodrome.scenarios.history.problems.store_rides`, and its digest.
+    suite_sha256 : str
+        Digest of the suite's code, with which this process must ride too.
+    """
+
+    parent: int
+    folder: str
+    package: str
+    version: str
+    rides: str
+    rides_sha256: str
+    suite_sha256: str
+
+    def line(self) -> str:
+        """Return the setup as one line of JSON."""
+        return json.dumps(asdict(self))
+
+
+def main() -> None:
+    """Do tasks until the input ends."""
+    tasks, results = os.fdopen(os.dup(0), encoding="utf-8"), os.dup(1)
+    # Engines may print and read: this must not interfere with the protocol.
+    with open(os.devnull, "r+b") as nothing:
+        for standard in (0, 1, 2):
+            os.dup2(nothing.fileno(), standard)
+    try:
+        setup = RideSetup(**json.loads(tasks.readline()))
+        _die_with(setup.parent)
+        folder = Path(setup.folder)
+        own = lay_over(folder)
+        require_release(folder, setup.package, setup.version)
+        if digest_suite() != setup.suite_sha256:
+            raise WrongRelease("the suite's own code has changed since the history was started")
+        rides = read_rides(Path(setup.rides), setup.rides_sha256)
+        _warm_up(next(iter(rides.values())))
+    except Exception as error:  # reported to the parent, since there is no other output
+        _send(results, {"broken": reason_of_failure(error)})
+        sys.exit(1)
+    for line in tasks:
+        task = json.loads(line)
+        _send(results, _ride_in_fork(rides[task["scenario"]], task["engine"], own))
+
+
+def _ride_in_fork(ride: MeasuredRide, engine: str, own: list[Path]) -> dict[str, Any]:
+    """Ride in a fork of this process, and return the row."""
+    ours, theirs = os.pipe()
+    parent = os.getpid()
+    child = os.fork()
+    if child == 0:
+        status = 1
+        try:
+            _die_with(parent)
+            _send(theirs, ride_release(ride, engine, own))
+            status = 0
+        finally:
+            os._exit(status)
+    os.close(theirs)
+    with os.fdopen(ours, "rb") as answer:
+        line = answer.readline()  # up to its end, or to the end of the process
+    _, ended = os.waitpid(child, 0)
+    try:
+        return json.loads(line)
+    except ValueError:
+        return {"status": FAILED, "reason": f"its process ended by {describe_exit(os.waitstatus_to_exitcode(ended))}"}
+
+
+def describe_exit(status: int) -> str:
+    """Return words for the exit status of a process, negative for a signal."""
+    return signal.Signals(-status).name if status < 0 else f"exit status {status}"
+
+
+def _warm_up(ride: MeasuredRide) -> None:
+    """Load what every ride needs, so that its fork has it."""
+    reference = load_engine(REFERENCE)
+    take_sample(ride.start, ride.exact, ride.gate, reference, reference.settings(), lambda _: None)
+
+
+def ride_release(ride: MeasuredRide, name: str, own: list[Path]) -> dict[str, Any]:
+    """Ride an engine with the laid-over release, and return the row of its result."""
+    try:
+        engine, settings = configure_engine(name, ride.settings_of(name))
+        sample = call_engine(take_sample, ride.start, ride.exact, ride.gate, engine, settings, watch=lambda _: None)
+        require_loaded_from(own)
+    except (UnsuitableProblem, ScenarioError) as error:
+        return {"status": REFUSED, "reason": reason_of_failure(error)}
+    except Exception as error:  # an engine may raise anything; the row says what
+        return {"status": FAILED, "reason": reason_of_failure(error)}
+    quantities = {quantity: value for quantity, value in sample.values.items() if quantity != _TIMING}
+    return {
+        "status": RODE,
+        "reason": None,
+        "version": sample.version,
+        "settings": sample.settings,
+        "bits": digest_ride(sample.trajectory),
+        "quantities": _to_finite(quantities),
+        "limits": _to_finite({name: limit for name, limit in sample.limits.items() if name not in SHOWN}),
+        "reasons": sample.reasons,
+        "samples": thin_ride(sample.trajectory),
+    }
+
+
+def digest_ride(trajectory: Trajectory) -> str:
+    """Return the SHA-256 of all that an engine computed: samples, steps and its end, but neither version nor clock."""
+    return digest(trajectory_table(replace(trajectory, version="", cpu_time=0.0))).decode()
+
+
+def thin_ride(trajectory: Trajectory) -> dict[str, Any]:
+    """Return at most some forty samples of a ride, its first and last among them, as JSON values."""
+    count = len(trajectory.time)
+    chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_SAMPLES)).round().astype(int))
+    return {"time": trajectory.time[chosen].tolist(), "q": trajectory.q[chosen].tolist()}
+
+
+def reason_of_failure(error: Exception) -> str:
+    """Return one line, of limited length, that says why there is no ride."""
+    own_words = isinstance(error, ScenarioError | UnsuitableProblem | WrongRelease)
+    text = str(error) if own_words else why_failed(error)
+    return " ".join(text.encode(errors="replace").decode().split())[:_LONGEST_REASON]
+
+
+def _to_finite(values: Mapping[str, float | None]) -> dict[str, float | None]:
+    plain = {name: None if value is None else float(value) for name, value in values.items()}
+    return {name: value if value is None or math.isfinite(value) else None for name, value in plain.items()}
+
+
+def _die_with(parent: int) -> None:
+    """Let this process be killed when its parent ends, if the system supports that."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def _send(results: int, message: dict[str, Any]) -> None:
+    data = json.dumps(message, allow_nan=False).encode() + b"\n"
+    while data:
+        data = data[os.write(results, data) :]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,132 @@
+"""The folder of a history: a file for each finished row, and the table and the document that are made of them.
+
+A row is written under a temporary name and renamed, with a digest of its contents, before it is reported: whatever ends
+the process, a row is there whole or not at all.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from ...engines.files import write_whole
+from ...engines.storage import versioned_metadata
+from ..error import ScenarioError
+from ..files import content_digest, make_folder, write_json, write_sealed
+from ..run import read_json
+from .plan import PlannedRide
+from .ride import NOT_INSTALLABLE
+
+HISTORY_DOCUMENT, HISTORY_TABLE = "history.json", "rides.parquet"
+_ROWS = "rows"
+_ROW_VERSION = 1
+
+
+class HistoryFolder:
+    """The rows of a history in a folder.
+
+    Parameters
+    ----------
+    out : Path
+    resume : bool
+        Whether the folder already has a history.
+
+    Raises
+    ------
+    ScenarioError
+        If there is a history already, or none to resume, or the folder cannot be made.
+    """
+
+    def __init__(self, out: Path, resume: bool) -> None:
+        self._out, self._rows = out, out / _ROWS
+        if resume and not self._rows.is_dir():
+            raise ScenarioError(f"--out {out}: there is no history to resume")
+        if not resume and self._rows.exists():
+            raise ScenarioError(
+                f"--out {out}: holds a history already: continue it with --resume, or name another folder by --out"
+            )
+        make_folder(self._rows)
+
+    @contextmanager
+    def lock(self) -> Iterator[None]:
+        """Let no other process write to the folder.
+
+        Raises
+        ------
+        ScenarioError
+            If another one does.
+        """
+        file = os.open(self._out / ".lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            os.close(file)
+            raise ScenarioError(f"--out {self._out}: another history is being written there") from error
+        try:
+            yield
+        finally:
+            os.close(file)
+
+    def read(self, ride: PlannedRide) -> dict[str, Any] | None:
+        """Return the row of a ride, None if it is missing, damaged or of a release that was not installable."""
+        try:
+            found = read_json(self._path(ride))
+            whole = found["sha256"] == content_digest(found) and found["key"] == ride.key
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        row = found.get("row")
+        return row if whole and isinstance(row, dict) and row["status"] != NOT_INSTALLABLE else None
+
+    def write(self, ride: PlannedRide, row: Mapping[str, Any]) -> None:
+        """Store the row of a ride."""
+        who = {"release": ride.release.label, "engine": ride.engine, "scenario": ride.scenario, "key": ride.key}
+        write_sealed(self._path(ride), who | {"row": dict(row)}, _ROW_VERSION)
+
+    def finish(self, document: Mapping[str, Any], rows: Mapping[PlannedRide, Mapping[str, Any]]) -> list[Path]:
+        """Write the document and the table, and return their paths."""
+        paths = [self._out / HISTORY_DOCUMENT, self._out / HISTORY_TABLE]
+        write_json(paths[0], document)
+        _write_table(paths[1], rows)
+        return paths
+
+    def _path(self, ride: PlannedRide) -> Path:
+        return self._rows / f"{ride.key[:32]}.json"
+
+
+def _write_table(path: Path, rows: Mapping[PlannedRide, Mapping[str, Any]]) -> None:
+    """Write one row per release, engine and scenario as Parquet, whole or not at all."""
+    quantities = sorted({name for row in rows.values() for name in row.get("quantities", {})})
+    facts = ("release", "engine", "scenario", "status", "reason", "bits")
+    columns = pa.schema(
+        [
+            *(pa.field(name, pa.string()) for name in facts),
+            *(pa.field(name, pa.float64()) for name in quantities),
+            pa.field("sample_time", pa.list_(pa.float64()), metadata={b"unit": b"s"}),
+            # The nine coordinates, in the order of a trajectory's columns.
+            pa.field("sample_coordinates", pa.list_(pa.list_(pa.float64()))),
+        ],
+        metadata=versioned_metadata({}),
+    )
+    records = [
+        {
+            "release": ride.release.label,
+            "engine": ride.engine,
+            "scenario": ride.scenario,
+            "status": row["status"],
+            "reason": row["reason"],
+            "bits": row.get("bits"),
+            **row.get("quantities", {}),
+            "sample_time": row.get("samples", {}).get("time"),
+            "sample_coordinates": row.get("samples", {}).get("q"),
+        }
+        for ride, row in rows.items()
+    ]
+    with write_whole(path) as partial:
+        pq.write_table(pa.Table.from_pylist(records, schema=columns), partial, compression="zstd")
