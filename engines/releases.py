@@ -7,7 +7,7 @@ with one line, or it is left out or replaced, which is recorded in the settings 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from packaging.version import InvalidVersion, Version
@@ -79,10 +79,10 @@ class LibraryReach:
             Values of settings that the release lacks are refused too.
         """
         if not self.has(self.oldest):
-            return f"{engine} needs {self._name_release(self.oldest)} ({self.needs}), this is {self.version}"
+            return self.name_need(engine, self.oldest, self.needs)
         for (name, value), since in self.values.items():
             if getattr(settings, name, None) == value and not self.has(since):
-                return f"{name} {value!r} needs {self._name_release(since)}, this is {self.version}"
+                return self.name_need(f"{name} {value!r}", since, "which older releases do not know")
         return None
 
     def list_adaptations(self) -> dict[str, dict[str, str]]:
@@ -95,6 +95,19 @@ class LibraryReach:
             if self.has(each.first) and not self.has(each.since):
                 found.setdefault(each.how, {})[each.name] = each.text
         return found
+
+    def as_json(self, engine: str) -> dict[str, Any]:
+        """Return the releases with which an engine rides as a JSON object."""
+        return {
+            "package": self.package,
+            "oldest": self.oldest,
+            "needs": self.needs,
+            "installed": self.version,
+            "refusal": self.find_refusal(engine),
+            "adaptations": [asdict(each) for each in self.adaptations],
+            **{key: {} for key in ADAPTATION_KEYS},
+            **self.list_adaptations(),
+        }
 
     def has(self, since: str) -> bool:
         """Return whether the installed release is ``since`` or newer; previews count as the release that they precede.
@@ -113,8 +126,9 @@ class LibraryReach:
 
         return package_version(self.package)
 
-    def _name_release(self, since: str) -> str:
-        return f"{self.library} {since} or newer"
+    def name_need(self, subject: str, since: str, needs: str) -> str:
+        """Return one line that says which release something needs and for what, and which one is installed."""
+        return f"{subject} needs {self.library} {since} or newer ({needs}), this is {self.version}"
 
 
 def split_adaptations(stated: Mapping[str, Any], own: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

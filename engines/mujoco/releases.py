@@ -1,8 +1,8 @@
 """What releases of MuJoCo lack, and what the models do there instead.
 
-The flag ``autoreset`` came with MuJoCo 3.2.1, `mj_jacDot` with 3.2.3, the description of its own structures in the Python
-package and energies without a flag with 3.3.0, the rows of the inertia matrix in the model with 3.3.6. The meaning of a
-pair's margin and gap changed with 3.9.0, and so did the structure that collision functions fill.
+The flag ``autoreset`` came with MuJoCo 3.2.1, `mj_jacDot` with 3.2.3, the description of its own structures in the
+Python package and energies without a flag with 3.3.0, the rows of the inertia matrix in the model with 3.3.6. The
+meaning of a pair's margin and gap changed with 3.9.0, and so did the structure that collision functions fill.
 """
 
 from __future__ import annotations

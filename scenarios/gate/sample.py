@@ -191,7 +191,7 @@ def take_sample(
         steps=trajectory.steps,
         step_noise=own_noise,
         version=engine.version,
-        settings=settings.model_dump(mode="json"),
+        settings=trajectory.settings,
     )
 
 
