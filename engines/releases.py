@@ -115,7 +115,7 @@ class LibraryReach:
         A build whose version cannot be read counts as newer than all releases.
         """
         try:
-            return Version(self.version).release >= Version(since).release
+            return Version(Version(self.version).base_version) >= Version(since)
         except InvalidVersion:
             return True
 
