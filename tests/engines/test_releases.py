@@ -3,6 +3,10 @@
 # MuJoCo's compiled bindings carry no types.
 # pyright: reportAttributeAccessIssue=false
 
+import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -113,6 +117,8 @@ def test_a_ride_without_what_a_release_lacks_is_the_same_and_says_so(installed: 
     engine = load_engine("mujoco-native")
     older = ride_engine(engine, problem, engine.settings(), lambda _: None)
     assert np.array_equal(older.q, newest.q)
+    assert older.kinetic_energy is not None
+    assert newest.kinetic_energy is not None
     assert np.array_equal(older.kinetic_energy, newest.kinetic_energy)
     assert newest.unconverged_steps == 0
     assert (older.unconverged_steps, older.largest_residual) == (None, None)
@@ -272,3 +278,128 @@ def test_printing_of_older_exudyn(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(exudyn_library, "_library", SimpleNamespace(SetWriteToConsole=said.append))
     assert exudyn_library.set_printing(False)
     assert said == [False]
+
+
+def read_table(heading: str) -> list[list[str]]:
+    """Return the rows of the table below a heading of the page on older releases."""
+    page = (Path(__file__).parents[2] / "docs/guides/releases.md").read_text(encoding="utf-8")
+    lines = page.split(heading)[1].splitlines()
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
+    after = next(i for i, row in enumerate(rows) if set(row[0]) <= set("- "))
+    return rows[after + 1 :]
+
+
+def test_the_page_on_releases_says_what_is_declared() -> None:
+    own = {name: reach for name, reach in DECLARED.items() if name.startswith(("mujoco", "exudyn"))}
+    first, changes = "# Older releases\n", "## What is done otherwise\n"
+    rows = read_table(first)[: len(own)]
+    assert rows == [
+        [f"`{name}`", f"{reach.library} {reach.oldest}", reach.needs] for name, reach in sorted(own.items())
+    ]
+    declared = {(reach.library, each) for reach in own.values() for each in reach.adaptations}
+    told = set()
+    for library, each in declared:
+        releases = f"{library} {'' if each.first == '0' else f'from {each.first}, '}before {each.since}"
+        told.add((f"`{each.name}`", releases, each.how.replace("_", " "), each.text))
+    assert {tuple(row) for row in read_table(changes)} == told
+
+
+RIDE = """
+import json, sys
+import numpy as np
+import velodrome
+scenario, engine, step = sys.argv[1], sys.argv[2], float(sys.argv[3])
+run = velodrome.run(scenario, engines=[engine], duration=0.5, settings={engine: {"step": step}})
+ride, right = run.trajectories[engine], run.trajectories["reference"]
+energy = ride.kinetic_energy + ride.potential_energy
+print(json.dumps({
+    "version": ride.version,
+    "error": float(np.linalg.norm(ride.q[-1, :3] - right.q[-1, :3])),
+    "energy": float(energy[-1] - energy[0]),
+    "force": float(np.abs(ride.contact_force[0]).max()),
+    "left_out": sorted(ride.settings.get("left_out", {})),
+    "replaced": sorted(ride.settings.get("replaced", {})),
+}))
+"""
+
+
+def ride_in_process(folder: Path | None, scenario: str, engine: str, step: float) -> dict[str, Any]:
+    """Ride in a process of its own, with the packages of a folder before all others."""
+    path = [*([] if folder is None else [str(folder)]), *(each for each in sys.path if each)]
+    done = subprocess.run(
+        [sys.executable, "-c", RIDE, scenario, engine, repr(step)],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def releases(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Return a function that gives the folder of a release, from the package registry."""
+
+    def fetch(package: str, version: str) -> Path:
+        folder = tmp_path_factory.getbasetemp() / f"{package}-{version}"
+        if not folder.exists():
+            options = ("--quiet", "--no-deps", "--only-binary", ":all:", "--target", str(folder))
+            command = [sys.executable, "-m", "pip", "install", *options, f"{package}=={version}"]
+            # Constraints pin the newest releases.
+            environment = os.environ | {"PIP_CONSTRAINT": ""}
+            done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+            if done.returncode != 0:
+                pytest.skip(f"{package} {version} cannot be had here: {done.stderr.strip().splitlines()[-1]}")
+        return folder
+
+    return fetch
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("version", "left_out", "replaced"),
+    [
+        ("3.0.0", ["autoreset", "solver_residual"], ["energy"]),
+        ("3.2.2", ["solver_residual"], ["energy"]),
+        ("3.2.3", [], ["energy", "inertia"]),
+        ("3.3.5", [], ["inertia"]),
+        ("3.3.6", [], []),
+    ],
+)
+def test_native_model_rides_with_old_releases_of_mujoco(
+    releases: Any, version: str, left_out: list[str], replaced: list[str]
+) -> None:
+    old = ride_in_process(releases("mujoco", version), "q2-plus", "mujoco-native", 0.002)
+    new = ride_in_process(None, "q2-plus", "mujoco-native", 0.002)
+    assert (old["version"], old["left_out"], old["replaced"]) == (version, left_out, replaced)
+    # Each of 250 steps may leave 1e-8 of the forces unconverged.
+    assert old["error"] == pytest.approx(new["error"], rel=250 * 1e-8)
+    assert old["energy"] == pytest.approx(new["energy"], rel=250 * 1e-8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", ["3.3.0", "3.8.1"])
+@pytest.mark.parametrize("engine", ["mujoco-exact-contact", "mujoco-multipliers"])
+def test_exact_models_ride_with_old_releases_of_mujoco(releases: Any, version: str, engine: str) -> None:
+    folder = releases("mujoco", version)
+    coarse, fine = (ride_in_process(folder, "q2-plus", engine, step) for step in (0.002, 0.001))
+    assert coarse["version"] == version
+    # RK4 with a free joint has order 2 before MuJoCo 4.0; the next order of the error is h times its rates of some 10/s.
+    assert coarse["error"] / fine["error"] == pytest.approx(4, rel=10 * 0.002 * 2)
+    # Its error there is a thousand times that of order 4, which says that the model itself is right.
+    assert fine["error"] < 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("version", "replaced", "left_out"),
+    [("1.9.0", ["coordinates"], ["first_force"]), ("1.10.0", [], ["first_force"]), ("1.11.0", [], [])],
+)
+def test_exudyn_rides_with_old_releases(releases: Any, version: str, replaced: list[str], left_out: list[str]) -> None:
+    old = ride_in_process(releases("exudyn", version), "q2-plus", "exudyn", 0.001)
+    new = ride_in_process(None, "q2-plus", "exudyn", 0.001)
+    assert (old["version"], old["left_out"], old["replaced"]) == (version, left_out, replaced)
+    # Newton's method may leave 1e-11 m in each of 500 steps.
+    assert old["error"] == pytest.approx(new["error"], abs=500 * 1e-11)
+    assert (old["force"] == 0) == bool(left_out)
