@@ -23,6 +23,7 @@ from .engine import (
     find_ignored_inputs,
 )
 from .guard import simulate_guarded
+from .releases import split_adaptations
 
 # Largest relative error of a sample's time, the same as `velodrome.reference.simulate.steps_per_output` allows for a
 # step. An engine that sums up its steps errs by at most half a unit of round-off per addition: less than this limit in
@@ -110,6 +111,11 @@ def _flatten_samples(values: np.ndarray) -> np.ndarray:
     return values.reshape(len(values), -1)
 
 
+def _is_line(text: object) -> bool:
+    """Return whether something is one line of text that is not empty."""
+    return isinstance(text, str) and bool(text.strip()) and text.isprintable()
+
+
 def _list_time_faults(asked: np.ndarray, own: np.ndarray) -> Iterator[str]:
     """List the faults of an engine's sample times."""
     if len(own) > len(asked):
@@ -127,13 +133,18 @@ def _list_time_faults(asked: np.ndarray, own: np.ndarray) -> Iterator[str]:
 
 def _list_faults(engine: Engine, problem: Problem, settings: Settings, trajectory: Trajectory) -> Iterator[str]:
     """List the faults that make a result no valid trajectory of the problem."""
+    given = settings.model_dump(mode="json")
+    chosen, adapted = split_adaptations(trajectory.settings, given)
     for name, stated, own in (
         ("engine", trajectory.engine, engine.name),
         ("version", trajectory.version, engine.version),
-        ("settings", trajectory.settings, settings.model_dump(mode="json")),
+        ("settings", chosen, given),
     ):
         if stated != own:
             yield f"its trajectory is of {name} {stated!r}, not {own!r}"
+    for key, lines in adapted.items():
+        if not (isinstance(lines, dict) and lines and all(_is_line(text) for pair in lines.items() for text in pair)):
+            yield f"its settings say {key} {lines!r}; it must be lines of text by name"
     samples = np.size(trajectory.time)
     for name, shape in SHAPES.items():
         value = getattr(trajectory, name)
@@ -159,7 +170,7 @@ def _list_faults(engine: Engine, problem: Problem, settings: Settings, trajector
         if not isinstance(value, kind) or isinstance(value, bool) or not 0 <= float(value) < np.inf:
             yield f"its {name} is {value!r}; it must be {what}, not negative"
     ended = trajectory.ended
-    if ended is not None and not (isinstance(ended, str) and ended.strip() and ended.isprintable()):
+    if ended is not None and not _is_line(ended):
         yield f"its ended is {ended!r}; it must be one line of text, or None"
     count, residual = trajectory.unconverged_steps, trajectory.largest_residual
     if count is not None and not (isinstance(count, int) and 0 <= count <= trajectory.steps):

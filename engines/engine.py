@@ -131,7 +131,8 @@ class Trajectory:
     engine, version : str
         Name and version of the engine.
     settings : dict
-        JSON values of the settings that it ran with.
+        JSON values of the settings that it ran with. With a release of its library that lacks something an engine adds
+        ``left_out`` and ``replaced``: lines that say what it did otherwise, by name.
     time : ndarray, shape (n,)
         Times of the samples by the engine's own clock [s], one for each output time of the problem, or fewer if the run
         ended early. `velodrome.engines.admission.ride_engine` compares them with the problem's.
@@ -317,6 +318,9 @@ class Engine(Protocol):
     An engine may also have a ``description``, one line of text, which `velodrome show` prints, and ``takes_inputs``. An
     engine that applies the torques and the steer damping in `Problem.inputs` sets it to True; without it the engine is
     never given a problem with inputs.
+
+    An engine that rides with older releases of its library may say so by ``reach``, a
+    `velodrome.engines.releases.LibraryReach`, and refuses the others in ``check``.
 
     Two further attributes serve `velodrome league`. ``settings_source`` is one line of text that says whose choice the
     defaults of the settings are, such as the page of the library's documentation. ``bit_variants`` maps descriptions to

@@ -122,7 +122,10 @@ def set_plant_state(tree: DrakeTree, context: Any, bicycle: Bicycle, q: np.ndarr
     pose = RigidTransform(RotationMatrix.ProjectToRotationMatrix(rotations(bicycle, q)[0]), q[:3])
     tree.plant.SetFreeBodyPose(context, frame, pose)
     twist = SpatialVelocity(angular_velocities(bicycle, q, qd)[0], qd[:3])
-    tree.plant.SetFreeBodySpatialVelocity(context=context, body=frame, V_JpJc=twist)
+    set_velocity = tree.plant.SetFreeBodySpatialVelocity
+    # Renamed; the docstring of the bindings holds the signatures with the names of their arguments.
+    name = "V_JpJc" if "V_JpJc" in str(set_velocity.__doc__) else "V_PB"
+    set_velocity(context=context, body=frame, **{name: twist})
     for index, joint in tree.hinges.items():
         joint.set_angle(context, q[index])
         joint.set_angular_rate(context, qd[index])

@@ -10,7 +10,9 @@ import exudyn as exu
 import numpy as np
 
 from . import pose
+from .library import read_total_coordinates
 
+_RATES: Any = exu.OutputVariableType.Coordinates_t
 _indices: Any = exu  # the library's type stubs lack the types of its indices
 
 # Kinds of nodes by the engine's names, with the numbers of their coordinates.
@@ -180,10 +182,15 @@ def reference_coordinates(mbs: exu.MainSystem, nodes: Sequence[Any]) -> np.ndarr
     return np.concatenate([np.atleast_1d(mbs.GetNode(node)["referenceCoordinates"]) for node in nodes])
 
 
-def read_node_coordinates(mbs: Any, nodes: Sequence[Any], quantity: Any, configuration: Any) -> np.ndarray:
-    """Return coordinates, or their rates, of nodes in a configuration, one node after the other, shape (n,)."""
+def read_node_coordinates(mbs: Any, nodes: Sequence[Any], configuration: Any) -> np.ndarray:
+    """Return the coordinates of nodes in a configuration, one node after the other, shape (n,)."""
     # The engine returns a number for a node with one coordinate.
-    return np.concatenate([np.atleast_1d(mbs.GetNodeOutput(node, quantity, configuration)) for node in nodes])
+    return np.concatenate([np.atleast_1d(read_total_coordinates(mbs, node, configuration)) for node in nodes])
+
+
+def read_node_rates(mbs: Any, nodes: Sequence[Any], configuration: Any) -> np.ndarray:
+    """Return the rates of the nodes' coordinates in a configuration, one node after the other, shape (n,)."""
+    return np.concatenate([np.atleast_1d(mbs.GetNodeOutput(node, _RATES, configuration)) for node in nodes])
 
 
 def stack_frames(attachments: Sequence[Attachment]) -> pose.Frames:

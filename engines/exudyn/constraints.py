@@ -31,7 +31,6 @@ DIFFERENCE = 1e-5  # of a rotation vector [rad]: more than the engine's differen
 
 _INITIAL: Any = exu.ConfigurationType.Initial
 _START_OF_STEP: Any = exu.ConfigurationType.StartOfStep
-_COORDINATES: Any = exu.OutputVariableType.CoordinatesTotal
 
 
 def make_constraint_functions(mbs: exu.MainSystem, joint: RollingJoint, ratio: float, labels: Sequence[str]) -> Any:
@@ -70,7 +69,7 @@ def make_constraint_functions(mbs: exu.MainSystem, joint: RollingJoint, ratio: f
     evaluated_at: tuple[Any, Any, Any] = (None, None, None)
 
     def start_coordinates(mbs):
-        return read_node_coordinates(mbs, joint.nodeNumbers, _COORDINATES, _START_OF_STEP)
+        return read_node_coordinates(mbs, joint.nodeNumbers, _START_OF_STEP)
 
     def begin_time(mbs, time):
         begun = mbs.systemData.GetTime(_START_OF_STEP)

@@ -12,10 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...reference.inputs import NO_INPUTS
 from ...reference.kinematics import quaternions
 from ...reference.simulate import steps_per_output
 from ...reference.surface import is_level
-from ..engine import EngineError, Problem, Progress, Trajectory, UnsuitableProblem, package_version
+from ..engine import EngineError, Problem, Progress, Trajectory, UnsuitableProblem
+from ..releases import LibraryReach
+from .releases import DISCS, INPUTS, JOINT
 from .settings import ExudynSettings, SolverSettings
 
 if TYPE_CHECKING:
@@ -37,6 +40,8 @@ class ExudynEngine:
         The engine in one line.
     put_on_ground : callable
         Imports and returns the function that puts the wheels on the ground.
+    reach : LibraryReach
+        The releases of Exudyn with which it rides.
     level_only : bool
         Whether it rolls on the level plane only.
     """
@@ -45,6 +50,7 @@ class ExudynEngine:
     settings: type[SolverSettings]
     description: str
     put_on_ground: Callable[[], PutOnGround]
+    reach: LibraryReach
     level_only: bool = False
     takes_inputs = True
     packages = ("exudyn",)
@@ -57,10 +63,18 @@ class ExudynEngine:
     @property
     def version(self) -> str:
         """Version of the library."""
-        return package_version("exudyn")
+        return self.reach.version
 
     def check(self, problem: Problem, settings: SolverSettings) -> None:
-        """Refuse ground that is unsuitable and output times that the step does not divide; see `Engine.check`."""
+        """Refuse releases of Exudyn without what is needed, unsuitable ground and output times; see `Engine.check`.
+
+        The step must divide the interval of the output times.
+        """
+        refusal = self.reach.find_refusal(self.name, settings)
+        if refusal is None and problem.inputs != NO_INPUTS and not self.reach.has(INPUTS):
+            refusal = self.reach.name_need("a ride with inputs", INPUTS, "CreateTorsionalSpringDamper")
+        if refusal is not None:
+            raise UnsuitableProblem(refusal)
         if self.level_only and not is_level(problem.surface):
             raise UnsuitableProblem("it rolls on the level plane only; exudyn rides on any surface")
         steps_per_output(problem.times, settings.step)
@@ -111,7 +125,7 @@ class ExudynEngine:
         return Trajectory(
             engine=self.name,
             version=self.version,
-            settings=settings.model_dump(mode="json"),
+            settings=settings.model_dump(mode="json") | self.reach.list_adaptations(),
             time=motion.time,
             q=q,
             qd=qd,
@@ -168,18 +182,20 @@ def _import_roll_discs() -> PutOnGround:
 
 
 ENGINE = ExudynEngine(
-    "exudyn", ExudynSettings, "Exudyn with true knife-edge rolling joints on any surface", _import_constrain
+    "exudyn", ExudynSettings, "Exudyn with true knife-edge rolling joints on any surface", _import_constrain, JOINT
 )
 PLANE_NORMAL = ExudynEngine(
     "exudyn-plane-normal",
     SolverSettings,
     "Exudyn with its own rolling discs on moving tangent planes",
     _import_roll_discs_on_tangents,
+    DISCS,
 )
 BUILTIN = ExudynEngine(
     "exudyn-builtin",
     SolverSettings,
     "Exudyn with its own rolling discs on the level plane, as it is",
     _import_roll_discs,
+    DISCS,
     level_only=True,
 )

@@ -45,6 +45,7 @@ from numpy.typing import ArrayLike
 from ...reference.surface import Surface, SurfaceFunction
 from .attachment import INERTIAL_FRAME, Attachment, find_attachment, list_nodes, stack_frames
 from .constraints import make_constraint_functions
+from .library import hide_connector
 from .pose import Frames
 
 SLIP_ROWS = (0, 1)  # of a wheel's three
@@ -182,7 +183,7 @@ def CreateRollingJointOnSurface(
         constraintUserFunction=constraint,
         jacobianUserFunction=jacobian,
         activeConnector=activeConnector,
-        visualization={"show": False},
+        visualization=hide_connector(),
     )
     return replace(joint, objectNumber=mbs.AddObject(item))
 

@@ -15,6 +15,7 @@ from ...reference.bicycle import BODIES, Bicycle
 from ...reference.kinematics import angular_velocities, body_positions, body_velocities, rotations
 from ...reference.rim import Ending, RimWatch
 from ..engine import EngineError, Problem
+from .library import connect
 from .settings import SolverSettings
 from .wheels import LEFT_AXIS, MASS_UNIT, PutOnGround, WheelRolling
 
@@ -92,7 +93,7 @@ def _connect_bodies(system: exu.MainSystem, bicycle: Bicycle, q: np.ndarray, bod
         ([front_wheel, front_frame], position[3], rotation[1] @ LEFT_AXIS),
         ([rear_frame, front_frame], q[:3], rotation[0] @ bicycle.steer_axis),
     ):
-        system.CreateRevoluteJoint(itemNumbers=pair, position=point, axis=axis, show=False)
+        connect(system.CreateRevoluteJoint, pair, position=point, axis=axis, show=False)
 
 
 def _apply_inputs(system: exu.MainSystem, problem: Problem, bodies: list[Any]) -> None:
@@ -112,8 +113,9 @@ def _apply_inputs(system: exu.MainSystem, problem: Problem, bodies: list[Any]) -
     ):
         if torque == damping == 0:
             continue
-        system.CreateTorsionalSpringDamper(
-            itemNumbers=pair,
+        connect(
+            system.CreateTorsionalSpringDamper,
+            pair,
             position=point,
             axis=axis,
             damping=damping / MASS_UNIT,

@@ -10,7 +10,7 @@ from exudyn.itemInterface import SensorUserFunction
 
 from ...reference.rim import rim_search
 from . import general
-from .attachment import read_node_coordinates, reference_coordinates
+from .attachment import read_node_coordinates, read_node_rates, reference_coordinates
 from .joint import RollingJoint
 
 Quantity = Literal["ContactPoint", "Gap", "Slip", "ContactForce"]
@@ -81,8 +81,8 @@ def _make_user_function(mbs: exu.MainSystem, joint: RollingJoint, quantity: Quan
 
     # The generator does not keep the surface's compiled function alive, but the default argument does.
     def value(mbs, _time, _sensors, _factors, configuration, _function=function):
-        for k, output in enumerate((kind.CoordinatesTotal, kind.Coordinates_t)):
-            state[k] = read_node_coordinates(mbs, nodes, output, configuration)
+        state[0] = read_node_coordinates(mbs, nodes, configuration)
+        state[1] = read_node_rates(mbs, nodes, configuration)
         measure()
         if quantity == "ContactForce":
             multipliers = np.atleast_1d(mbs.GetObjectOutput(joint.objectNumber, kind.Force, configuration))

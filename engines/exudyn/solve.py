@@ -15,6 +15,7 @@ import exudyn as exu
 
 from ...reference.rim import Ending
 from ..engine import EngineError, Progress
+from .library import SOLVER_ERROR, choose_dense_solver, set_printing, write_no_files
 from .settings import SolverSettings
 from .start import GeneralizedAlphaStart, begin, correct_start, second_order_start
 
@@ -154,7 +155,7 @@ def integrate(
         settings = simulation_settings(integration)
         cpu_time = -time.process_time()
         success = False
-        with suppress(exu.SolverError):  # raised where the Jacobian is singular
+        with suppress(SOLVER_ERROR):  # raised where the Jacobian is singular
             if integration.slip_equations is None:
                 success = solver.SolveSystem(system, settings)
             else:
@@ -183,11 +184,10 @@ def simulation_settings(integration: Integration) -> exu.SimulationSettings:
     """Return the library's settings."""
     chosen = integration.settings
     settings = exu.SimulationSettings()
-    settings.solution.file.write = False
     # Beyond the end: after the start, samples are only at the ends of the steps that `_Steps` chooses, and at the last.
-    settings.solution.sensors.writePeriod = 2 * integration.end
+    write_no_files(settings, period=2 * integration.end)
     # The default inverts a matrix of about fifty unknowns, which takes nearly as long as the rest of the step.
-    settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
+    choose_dense_solver(settings)
     method: Any = settings.timeIntegration
     method.verboseMode = 0
     method.numberOfSteps = integration.steps
@@ -209,12 +209,11 @@ def simulation_settings(integration: Integration) -> exu.SimulationSettings:
 @contextmanager
 def no_progress() -> Iterator[None]:
     """Suppress the engine's messages on the standard output."""
-    before = exu.config.printToConsole
-    exu.config.printToConsole = False
+    before = set_printing(False)
     try:
         yield
     finally:
-        exu.config.printToConsole = before
+        set_printing(before)
 
 
 @contextmanager

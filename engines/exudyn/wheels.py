@@ -14,6 +14,7 @@ from ...reference.rim import rim_search
 from ..engine import Problem
 from . import kernel
 from .joint import CreateRollingJointOnSurface, RollingJoint, slip_equations
+from .library import read_total_coordinates
 from .method import generalized_alpha
 from .settings import SolverSettings
 
@@ -110,12 +111,11 @@ def roll_discs_on_tangents(
     find = kernel.normals(coordinates, *shape, looking, function, problem.surface.parameters, out).__next__
     find()
     discs, objects = _add_discs(system, wheels, problem, out)
-    kind = exu.OutputVariableType
 
     # The generator does not keep the surface's compiled function alive, but the default argument does.
     def follow(mbs, _time, _iteration, _discontinuous, _function=function):
         for wheel in range(2):
-            coordinates[wheel] = mbs.GetNodeOutput(nodes[wheel], kind.CoordinatesTotal)
+            coordinates[wheel] = read_total_coordinates(mbs, nodes[wheel])
         find()
         for wheel in range(2):
             mbs.SetObjectParameter(objects[wheel], "planeNormal", out[wheel].tolist())

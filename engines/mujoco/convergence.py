@@ -24,8 +24,8 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
-from . import compiled, layout
-from .callbacks import claim_board
+from . import layout
+from .inertia import find_inertia
 from .settings import WRONG
 
 _TIMER = mujoco.mjtTimer
@@ -40,7 +40,6 @@ STATE = (
     "qfrc_passive",
     "qfrc_smooth",
     "qfrc_constraint",
-    "M",
 )
 
 
@@ -68,6 +67,8 @@ class SolverConvergence:
 
     def look(self) -> None:
         """Assess the last evaluation too, which otherwise happens only in the next one."""
+        from . import compiled  # needs functions that not all releases have whose contacts are MuJoCo's own
+
         compiled.judge(self._board)
 
     def detach(self) -> None:
@@ -107,17 +108,22 @@ def watch_state(
     converged_below : float
         Relative residual up to which an evaluation counts as converged.
     """
-    entry, inertia, smooth, forces = board[0], np.zeros(len(data.M)), np.zeros(model.nv), np.zeros((3, model.nv))
+    from . import compiled
+
+    matrix = find_inertia(model, data)
+    entry, inertia, smooth, forces = board[0], np.zeros(len(matrix.M)), np.zeros(model.nv), np.zeros((3, model.nv))
     for name in STATE:
         entry[name] = getattr(data, name).ctypes.data
-    for name in ("M_rownnz", "M_rowadr", "M_colind"):
-        entry[name] = getattr(model, name).ctypes.data
+    for name, array in matrix._asdict().items():
+        entry[name] = array.ctypes.data
     entry["kept_M"], entry["M_entries"], entry["speeds"] = inertia.ctypes.data, len(inertia), model.nv
     entry["kept_smooth"] = smooth.ctypes.data
     for name, array in zip(("passive_before", "passive_after", "smooth_after"), forces, strict=True):
         entry[name] = array.ctypes.data
-    offsets = layout.find_layout()
-    entry["solutions_at"], entry["inverses_at"] = offsets.solutions, offsets.inverses
+    # Nobody counts the solutions where MuJoCo's own contacts are watched only.
+    if entry["kind"] != compiled.WATCHING:
+        offsets = layout.find_layout()
+        entry["solutions_at"], entry["inverses_at"] = offsets.solutions, offsets.inverses
     timers = [data.timer[int(timer)].number for timer in (_TIMER.mjTIMER_CONSTRAINT, _TIMER.mjTIMER_INVERSE)]
     # As if the callback had been called before the last solution.
     entry["solved"] = timers[0] - timers[1] - 1
@@ -131,6 +137,26 @@ def watch_state(
         entry["model"] = entry["data"] = 0
 
 
+class UnknownConvergence:
+    """Convergence of a solver that nobody watches, with the members of `SolverConvergence`."""
+
+    unconverged = 0
+    largest = None
+    wrong = None
+
+    def begin(self, steps: int) -> None:
+        """Do nothing."""
+
+    def look(self) -> None:
+        """Do nothing."""
+
+
+@contextmanager
+def leave_unwatched() -> Iterator[UnknownConvergence]:
+    """Yield the convergence of a solver that nobody watches."""
+    yield UnknownConvergence()
+
+
 @contextmanager
 def watch_solver(model: mujoco.MjModel, data: mujoco.MjData, converged_below: float) -> Iterator[SolverConvergence]:
     """Record the convergence of the solver for a model with MuJoCo's own contacts; parameters as in `watch_state`.
@@ -140,6 +166,9 @@ def watch_solver(model: mujoco.MjModel, data: mujoco.MjData, converged_below: fl
     EngineError
         If the state has a block already.
     """
+    from . import compiled
+    from .callbacks import claim_board
+
     with claim_board(data, compiled.WATCHING) as board, watch_state(board, model, data, converged_below):
         convergence = SolverConvergence(board)
         try:

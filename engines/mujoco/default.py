@@ -12,6 +12,7 @@ The model is that of `native`. It falls on circles that a bicycle can ride, for 
 from __future__ import annotations
 
 from .engine import MujocoEngine
+from .releases import PLANES
 from .settings import DefaultSettings
 
 ENGINE = MujocoEngine(
@@ -20,4 +21,5 @@ ENGINE = MujocoEngine(
     "velodrome.engines.mujoco.planes:build_planes",
     description="MuJoCo with the options that it has when nobody sets any: soft contacts on tangent planes",
     settings_source="MuJoCo's own defaults, as the reference of its model files states them for option and geom",
+    reach=PLANES,
 )

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
 from ..contact_fields import observe_contact_fields
-from ..engine import Problem, Progress, Trajectory, package_version
+from ..engine import Problem, Progress, Trajectory, UnsuitableProblem
+from ..releases import LibraryReach
 from .settings import StepSettings
 from .state import from_mujoco
 
@@ -56,6 +58,8 @@ class MujocoEngine(Generic[S]):
         The engine in one line.
     settings_source : str
         Whose choice the defaults of the settings are.
+    reach : LibraryReach
+        The releases of MuJoCo with which it rides.
     gives : tuple of str
     """
 
@@ -64,6 +68,7 @@ class MujocoEngine(Generic[S]):
     builder: str
     description: str
     settings_source: str
+    reach: LibraryReach
     gives: tuple[str, ...] = GIVES
     takes_inputs = True
     packages = ("mujoco",)
@@ -71,10 +76,16 @@ class MujocoEngine(Generic[S]):
     @property
     def version(self) -> str:
         """Version of MuJoCo."""
-        return package_version("mujoco")
+        return self.reach.version
 
     def check(self, problem: Problem, settings: Any) -> None:
-        """Refuse output times that are not multiples of the step; see `velodrome.engines.engine.Engine`."""
+        """Refuse releases of MuJoCo without what the model needs, and output times that are not multiples of the step.
+
+        See `velodrome.engines.engine.Engine`.
+        """
+        refusal = self.reach.find_refusal(self.name, settings)
+        if refusal is not None:
+            raise UnsuitableProblem(refusal)
         step_counts(problem.times, settings.step)
 
     def step_noise(self, settings: Any) -> float:
@@ -99,22 +110,30 @@ class MujocoEngine(Generic[S]):
 
         Raises
         ------
+        UnsuitableProblem
+            If this release of MuJoCo lacks what the model needs.
         ValueError
             If an output time lies between two steps.
         EngineError
             If MuJoCo refuses the model, or a wheel has no contact point at the start.
         """
+        self.check(problem, settings)
         counts = step_counts(problem.times, settings.step)
         from .ride import ride_rig
 
         module, name = self.builder.split(":")
         build: Callable[[Problem, Any], Rig] = getattr(import_module(module), name)
         ridden = ride_rig(build(problem, settings), settings.step, counts, progress)
-        return assemble_trajectory(self.name, self.version, problem, settings, ridden)
+        return assemble_trajectory(self.name, self.version, problem, settings, ridden, self.reach.list_adaptations())
 
 
 def assemble_trajectory(
-    name: str, version: str, problem: Problem, settings: StepSettings, ridden: RideState
+    name: str,
+    version: str,
+    problem: Problem,
+    settings: StepSettings,
+    ridden: RideState,
+    adaptations: Mapping[str, Any] = MappingProxyType({}),
 ) -> Trajectory:
     """Return the trajectory of a ride in MuJoCo's coordinates.
 
@@ -125,6 +144,8 @@ def assemble_trajectory(
     problem : Problem
     settings : StepSettings
     ridden : RideState
+    adaptations : mapping
+        What was done otherwise for an older release, from `LibraryReach.list_adaptations`.
 
     Returns
     -------
@@ -136,7 +157,7 @@ def assemble_trajectory(
     return Trajectory(
         engine=name,
         version=version,
-        settings=settings.model_dump(mode="json"),
+        settings=settings.model_dump(mode="json") | dict(adaptations),
         time=recording.time,
         q=q,
         qd=qd,

@@ -10,6 +10,7 @@ a slip of R F / b.
 from __future__ import annotations
 
 from .engine import MujocoEngine
+from .releases import EDGES
 from .settings import ExactContactSettings
 
 ENGINE = MujocoEngine(
@@ -18,4 +19,5 @@ ENGINE = MujocoEngine(
     "velodrome.engines.mujoco.edges:build_contacts",
     description="MuJoCo's contact solver on exact knife-edge contacts, with nearly rigid rows",
     settings_source="the suite's own choice: RK4 at MuJoCo's default step, contact rows as hard as round-off allows",
+    reach=EDGES,
 )

@@ -14,14 +14,16 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
-from mujoco.introspect import ast_nodes, enums, functions, structs
 
 from ..engine import EngineError
 from .library import callbacks_set_aside
+from .releases import CONTACT_FORM, is_present
 
 _SIZES = {
     "mjtNum": 8,
@@ -44,7 +46,9 @@ _CALLED = {
     "mj_fwdAcceleration": "const mjModel * | mjData *",
 }
 _OPTIONS = ("disableflags", "enableflags", "solver", "noslip_iterations")
+# Fields of the structure that collision functions fill. Normal and tangent are the first rows of mjContact's frame.
 _PRE_CONTACT = {"dist": 0, "pos": 8, "normal": 32, "tangent": 56}
+_CONTACT_START = {"dist": 0, "pos": 8, "frame": 32}
 # Two spheres sunk into a plane; raised by 1 m they have no contacts.
 _PROBE = """<mujoco><option cone="elliptic"/><worldbody><geom type="plane" size="0 0 1"/>
 <body pos="0 0 .09"><freejoint/><geom size=".1"/></body><body pos="1 0 .09"><freejoint/><geom size=".1"/></body>
@@ -79,8 +83,30 @@ def _layout_error(what: str) -> EngineError:
     )
 
 
+@cache
+def _describe(part: str) -> Any:
+    """Return a module of MuJoCo's description of its own structures.
+
+    Raises
+    ------
+    EngineError
+        If this release has none. That of another release which is installed beside it describes other structures.
+    """
+    try:
+        module = import_module(f"mujoco.introspect.{part}")
+    except ImportError:
+        module = None
+    own = Path(mujoco.__file__).parent
+    if module is None or Path(str(module.__file__)).parent.parent != own:
+        raise EngineError(
+            f"MuJoCo {mujoco.__version__} has no description of its structures, mujoco.introspect; MuJoCo 3.3 has"
+        )
+    return module
+
+
 def _type_size(kind: Any) -> tuple[int, int]:
     """Return size and alignment of a type [bytes]."""
+    ast_nodes = _describe("ast_nodes")
     if isinstance(kind, ast_nodes.PointerType):
         size = ctypes.sizeof(ctypes.c_void_p)
         return size, size
@@ -90,9 +116,9 @@ def _type_size(kind: Any) -> tuple[int, int]:
     if isinstance(kind, ast_nodes.ValueType):
         if kind.name in _SIZES:
             return _SIZES[kind.name], _SIZES[kind.name]
-        if kind.name in enums.ENUMS:
+        if kind.name in _describe("enums").ENUMS:
             return 4, 4
-        if kind.name in structs.STRUCTS:
+        if kind.name in _describe("structs").STRUCTS:
             return _structure_layout(kind.name)[1:]
     raise EngineError(f"MuJoCo {mujoco.__version__} has a field of the unknown type {kind}")
 
@@ -101,7 +127,7 @@ def _type_size(kind: Any) -> tuple[int, int]:
 def _structure_layout(name: str) -> tuple[dict[str, int], int, int]:
     """Return the offsets of a structure's fields, its size and its alignment, by the rules of C [bytes]."""
     offsets, at, widest = {}, 0, 1
-    for field in structs.STRUCTS[name].fields:
+    for field in _describe("structs").STRUCTS[name].fields:
         size, alignment = _type_size(field.type)
         at = -(-at // alignment) * alignment
         offsets[field.name] = at
@@ -110,11 +136,15 @@ def _structure_layout(name: str) -> tuple[dict[str, int], int, int]:
 
 
 def _check_functions() -> None:
+    known = _describe("functions").FUNCTIONS
     for name, expected in _CALLED.items():
-        parameters = functions.FUNCTIONS[name].parameters if name in functions.FUNCTIONS else ()
+        parameters = known[name].parameters if name in known else ()
         if " | ".join(str(parameter.type) for parameter in parameters) != expected:
             raise EngineError(f"MuJoCo {mujoco.__version__} has another function {name}; MuJoCo 4.0 has the right one")
-    if "mjPreContact" not in structs.STRUCTS or _structure_layout("mjPreContact")[0] != _PRE_CONTACT:
+    new = is_present(CONTACT_FORM)
+    name, fields = ("mjPreContact", _PRE_CONTACT) if new else ("mjContact", _CONTACT_START)
+    found = _structure_layout(name)[0] if name in _describe("structs").STRUCTS else {}
+    if not fields.items() <= found.items() or (new and len(found) != len(fields)):
         raise EngineError(f"MuJoCo {mujoco.__version__} takes contacts in another form; MuJoCo 4.0 has the right one")
 
 

@@ -14,6 +14,8 @@ from typing import Any
 
 import llvmlite.binding as llvm
 import mujoco
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
 
 from ..engine import EngineError
 
@@ -79,6 +81,14 @@ def control_slot() -> Any:
         If the library has no such pointer.
     """
     return _callback_slot("control")
+
+
+def read_energy(data: mujoco.MjData) -> np.ndarray:
+    """Return potential and kinetic energy, shape (2,) [J], as MuJoCo has computed them last.
+
+    Before MuJoCo 3.1.4 its view of them has a stride of zero, and shows the potential energy twice.
+    """
+    return as_strided(data.energy, (2,), (data.energy.itemsize,))
 
 
 @contextmanager

@@ -23,6 +23,7 @@ import numpy as np
 
 from ...reference.bicycle import Bicycle
 from ...reference.kinematics import WHEELS
+from .releases import GAP, RESET, is_present
 from .settings import SoftContactSettings, StepSettings
 from .tangent import HALF_THICKNESS
 
@@ -93,8 +94,10 @@ def _add_options(root: Element, bicycle: Bicycle, settings: StepSettings) -> Non
             "tolerance": _number_text(settings.tolerance),
         } | {name: str(value) for name, value in settings.solver_options.items()}
     option = SubElement(root, "option", options)
-    # An unstable run must end; without this flag MuJoCo would reset the state to the model's initial state.
-    SubElement(option, "flag", autoreset="disable")
+    # An unstable run must end; without this flag MuJoCo resets the state to the model's initial state. Releases that
+    # lack the flag leave a warning when they do, by which `find_trouble` ends the run.
+    if is_present(RESET):
+        SubElement(option, "flag", autoreset="disable")
 
 
 def _add_contact_pairs(
@@ -102,6 +105,7 @@ def _add_contact_pairs(
 ) -> None:
     contact = SubElement(root, "contact")
     margin, reach = (EDGE_MARGIN, EDGE_REACH) if touching == "edges" else (MARGIN, 0.0)
+    detected = margin if is_present(GAP) else margin + reach
     for wheel in WHEELS:
         SubElement(
             contact,
@@ -112,7 +116,7 @@ def _add_contact_pairs(
             friction=_number_text(settings.friction, settings.friction, 0.0, 0.0, 0.0),
             solref=_number_text(settings.contact_time, settings.damping_ratio),
             solimp=_number_text(*settings.impedance),
-            margin=_number_text(margin),
+            margin=_number_text(detected),
             gap=_number_text(reach),
         )
 

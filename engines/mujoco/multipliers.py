@@ -9,6 +9,7 @@ lift off nor slide, whatever the forces.
 from __future__ import annotations
 
 from .engine import MujocoEngine
+from .releases import ROLLING
 from .settings import MultiplierSettings
 
 ENGINE = MujocoEngine(
@@ -17,4 +18,5 @@ ENGINE = MujocoEngine(
     "velodrome.engines.mujoco.edges:build_multipliers",
     description="MuJoCo's tree and integrator under the exact forces of rolling, without its contacts",
     settings_source="the suite's own choice: RK4 at MuJoCo's default step, gaps and slip brought back to zero at 20 /s",
+    reach=ROLLING,
 )

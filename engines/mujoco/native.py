@@ -15,6 +15,7 @@ first contact forces lack the part that slip brings; it builds up within a few t
 from __future__ import annotations
 
 from .engine import MujocoEngine
+from .releases import PLANES
 from .settings import NativeSettings
 
 ENGINE = MujocoEngine(
@@ -24,4 +25,5 @@ ENGINE = MujocoEngine(
     description="MuJoCo as a careful user sets it: stiff contacts on tangent planes, hard friction",
     settings_source="the suite's own choice within MuJoCo's documented limits: contacts as stiff as two steps allow, "
     "implicitfast, elliptic cone, impratio 10, and friction 2, which is more than the library's rides need",
+    reach=PLANES,
 )

@@ -14,7 +14,8 @@ from ...reference.kernels.dynamics import guess_contacts
 from ...reference.kinematics import constants
 from ...reference.surface import is_level
 from ..engine import EngineError, Problem
-from .convergence import watch_solver
+from .convergence import leave_unwatched, watch_solver
+from .releases import RESIDUAL, is_present
 from .ride import Rig, bodies, look_at_rims, look_stride, read_contact_forces, rim_stride, set_start, wheel_geoms
 from .settings import ContactSettings
 from .tangent import place_planes
@@ -41,7 +42,7 @@ def build_planes(problem: Problem, settings: ContactSettings) -> Rig:
     follow = partial(place_planes.compile(tuple(typeof(argument) for argument in arguments)), *arguments)
     if not follow():
         raise EngineError("a wheel has no contact point with the surface at the start")
-    wheels = wheel_geoms(model)
+    wheels, watched = wheel_geoms(model), is_present(RESIDUAL)
     return Rig(
         model=model,
         data=data,
@@ -51,6 +52,6 @@ def build_planes(problem: Problem, settings: ContactSettings) -> Rig:
         stride=1 if moving else look_stride(settings.step),
         look=look_at_rims(data, problem, rim_stride(problem, settings.step)),
         forces=partial(read_contact_forces, model, data, wheels),
-        callbacks=lambda: watch_solver(model, data, settings.converged_below),
-        judged=settings.noslip_iterations == 0,
+        callbacks=lambda: watch_solver(model, data, settings.converged_below) if watched else leave_unwatched(),
+        judged=watched and settings.noslip_iterations == 0,
     )

@@ -21,11 +21,15 @@ from ...reference.bicycle import BODIES
 from ...reference.kinematics import WHEELS, constants
 from ...reference.rim import Ending, RimWatch, bicycle_rim_search
 from ..engine import EngineError, Problem, Progress
-from .convergence import SolverConvergence, share
+from .convergence import SolverConvergence, UnknownConvergence, share
+from .library import read_energy
 from .model import Touching, mjcf
+from .releases import ENERGY, is_present
 from .settings import StepSettings
 from .state import to_mujoco
 from .tangent import wheel_poses
+
+Convergence = SolverConvergence | UnknownConvergence
 
 REPORT_INTERVAL = 0.05
 # Interval of the checks on ground that allows long ones [s]; a wheel turns by far less than half a turn in it.
@@ -98,7 +102,7 @@ class Rig:
     callbacks : callable
         Returns the context in which the model may be stepped; it yields the solver's convergence.
     judged : bool
-        Whether that convergence is known; after MuJoCo's noslip pass it is not.
+        Whether that convergence is known; after MuJoCo's noslip pass, and where nobody watches, it is not.
     """
 
     model: mujoco.MjModel
@@ -109,7 +113,7 @@ class Rig:
     stride: int
     look: Callable[[float], Ending | None]
     forces: Callable[[np.ndarray], None]
-    callbacks: Callable[[], AbstractContextManager[SolverConvergence]]
+    callbacks: Callable[[], AbstractContextManager[Convergence]]
     judged: bool = True
 
 
@@ -152,6 +156,8 @@ def set_start(problem: Problem, settings: StepSettings, touching: Touching) -> t
         model = mujoco.MjModel.from_xml_string(mjcf(problem.bicycle, settings, touching, problem.inputs.steer_damping))
     except ValueError as error:
         raise EngineError(f"MuJoCo refuses the bicycle: {error}") from error
+    if not is_present(ENERGY):
+        model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = to_mujoco(problem.q, problem.qd)
     for joint, torque in (("steer", problem.inputs.steer_torque), ("rear_angle", problem.inputs.rear_wheel_torque)):
@@ -234,7 +240,7 @@ def record_sample(rig: Rig, recording: Recording, k: int) -> None:
     mujoco.mj_energyVel(rig.model, data)
     recording.time[k], recording.qpos[k], recording.qvel[k] = data.time, data.qpos, data.qvel
     recording.position[k], recording.quaternion[k] = data.xipos[rig.bodies], data.xquat[rig.bodies]
-    recording.energy[k] = data.energy
+    recording.energy[k] = read_energy(data)
     rig.forces(recording.force[k])
 
 
@@ -246,7 +252,7 @@ def find_trouble(data: mujoco.MjData, standing: bool) -> str | None:
     return None if standing else "a wheel lies flat or has no contact point with the surface"
 
 
-def find_unconverged(convergence: SolverConvergence, step: float) -> str | None:
+def find_unconverged(convergence: Convergence, step: float) -> str | None:
     """Return when and how far MuJoCo's contact solver failed to converge; None if its forces are usable."""
     convergence.look()
     if convergence.wrong is None:
@@ -324,7 +330,7 @@ def ride_rig(rig: Rig, step: float, counts: list[int], progress: Progress) -> Ri
 
 
 def _continue_ride(
-    rig: Rig, step: float, counts: list[int], progress: Progress, recording: Recording, convergence: SolverConvergence
+    rig: Rig, step: float, counts: list[int], progress: Progress, recording: Recording, convergence: Convergence
 ) -> tuple[int, int, float, str | None]:
     """Continue from the first sample; return samples, steps, their CPU time [s] and why the ride ended early."""
     steps, cpu_time, reported = 0, 0.0, 0

@@ -35,9 +35,20 @@ def _show_engine(console: Console, document: Mapping[str, Any]) -> None:
     _print_below(console, f"gives, beside coordinates and poses: {gives}", indent=0)
     takes = "torques and steer damping" if document["takes_inputs"] else "none"
     _print_below(console, f"inputs that it applies: {takes}", indent=0)
+    if document["releases"] is not None:
+        _show_releases(console, document["releases"])
     console.print()
     _print_line(console, f"[engines.{document['name']}]", "bold")
     _show_fields(console, document["settings"])
+
+
+def _show_releases(console: Console, releases: Mapping[str, Any]) -> None:
+    _print_below(console, f"rides with {releases['package']} {releases['oldest']} or newer", indent=0)
+    if releases["refusal"] is not None:
+        _print_below(console, f"refused: {releases['refusal']}", indent=0)
+    for key in ("left_out", "replaced"):
+        for name, text in releases[key].items():
+            _print_below(console, f"{key.replace('_', ' ')}, {name}: {text}", indent=0)
 
 
 def _show_bicycle(console: Console, document: Mapping[str, Any]) -> None:

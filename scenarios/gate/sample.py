@@ -195,7 +195,7 @@ def take_sample(
         steps=trajectory.steps,
         step_noise=own_noise,
         version=engine.version,
-        settings=settings.model_dump(mode="json"),
+        settings=trajectory.settings,
         trajectory=trajectory,
     )
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from ...engines.engine import Engine, Settings, Trajectory
 from ...engines.registry import packages
+from ...engines.releases import find_reach
 from ...reports.drawing import find_unsteadiness, make_summary
 from ..error import ScenarioError
 from ..files import write_sealed, write_text
@@ -97,6 +98,9 @@ def write_manifest(
     engines: dict[str, Any] = {}
     for name, (engine, settings) in plan.engines.items():
         entry: dict[str, Any] = {"version": engine.version, "settings": settings.model_dump()}
+        reach = find_reach(engine)
+        if reach is not None:
+            entry |= reach.list_adaptations()
         if name in trajectories:
             done = trajectories[name]
             entry |= {"cpu_time": done.cpu_time, "steps": done.steps, "ended": done.ended}

@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from ...engines.engine import describe_engine
 from ...engines.names import suggest_name
 from ...engines.registry import load_engine, package_of
+from ...engines.releases import find_reach
 from ...reference.bicycle import Bicycle
 from ..error import ScenarioError
 from ..scenario import (
@@ -69,8 +70,8 @@ def make_document(name: str, sweep: type[BaseModel]) -> dict[str, Any]:
     dict
         ``kind`` and ``name``, and for a ``scenario``: its resolved tables, with all parameters of the bicycle and all
         settings of all installed engines, and ``units`` by dotted key. For an ``engine``: ``version``, ``package``,
-        ``description``, ``gives``, ``settings`` by name (see `FieldFacts`). For the ``bicycle``: ``parameters``,
-        ``units``, ``descriptions``. For a ``file``: ``tables`` (see `TableFacts`).
+        ``description``, ``gives``, ``releases`` of its library, ``settings`` by name (see `FieldFacts`). For the
+        ``bicycle``: ``parameters``, ``units``, ``descriptions``. For a ``file``: ``tables`` (see `TableFacts`).
 
     Raises
     ------
@@ -99,6 +100,7 @@ def _describe_engine(name: str) -> dict[str, Any]:
         "description": describe_engine(engine),
         "gives": list(engine.gives),
         "takes_inputs": engine.takes_inputs,
+        "releases": None if (reach := find_reach(engine)) is None else reach.as_json(name),
         "settings": {key: field.as_json() for key, field in list_fields(settings).items()},
     }
 

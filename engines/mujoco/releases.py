@@ -1,0 +1,69 @@
+"""What releases of MuJoCo lack, and what the models do there instead.
+
+The flag ``autoreset`` came with MuJoCo 3.2.1, `mj_jacDot` with 3.2.3, the description of its own structures in the
+Python package and energies without a flag with 3.3.0, the rows of the inertia matrix in the model with 3.3.6. The
+meaning of a pair's margin and gap changed with 3.9.0, and so did the structure that collision functions fill.
+"""
+
+from __future__ import annotations
+
+from ..releases import Adaptation, LibraryReach
+
+# Values of settings that older releases do not know.
+_VALUES = {("integrator", "discrete"): "4.0.0"}
+RESET = Adaptation(
+    name="autoreset",
+    since="3.2.1",
+    how="left_out",
+    text="the flag that keeps MuJoCo from resetting a state that became infinite; the ride ends there all the same",
+)
+RESIDUAL = Adaptation(
+    name="solver_residual",
+    since="3.2.3",
+    how="left_out",
+    text="the residual of the contact solver, and the count of steps that did not converge: both are not known",
+)
+INERTIA = Adaptation(
+    name="inertia",
+    since="3.3.6",
+    how="replaced",
+    text="the inertia matrix, which the residual of the contact solver needs, is read in MuJoCo's older form",
+    first="3.2.3",
+)
+ENERGY = Adaptation(
+    name="energy",
+    since="3.3.0",
+    how="replaced",
+    text="the flag energy is set, without which MuJoCo's functions of the energies do nothing",
+)
+GAP = Adaptation(
+    name="gap",
+    since="3.9.0",
+    how="replaced",
+    text="a contact pair's margin contains its gap, as it did before MuJoCo 3.9",
+)
+CONTACT_FORM = Adaptation(
+    name="contact",
+    since="3.9.0",
+    how="replaced",
+    text="contacts are given to MuJoCo as mjContact, whose first fields are those of mjPreContact",
+)
+_DESCRIPTION = "mujoco.introspect, the description of its structures"
+
+PLANES = LibraryReach(
+    "mujoco",
+    "MuJoCo",
+    oldest="3.0.0",
+    needs="contacts that hold both geoms in one array",
+    adaptations=(RESET, RESIDUAL, INERTIA, ENERGY),
+    values=_VALUES,
+)
+EDGES = LibraryReach(
+    "mujoco", "MuJoCo", oldest="3.3.0", needs=_DESCRIPTION, adaptations=(INERTIA, GAP, CONTACT_FORM), values=_VALUES
+)
+ROLLING = LibraryReach("mujoco", "MuJoCo", oldest="3.3.0", needs=_DESCRIPTION, values=_VALUES)
+
+
+def is_present(adaptation: Adaptation) -> bool:
+    """Return whether the installed release has what an adaptation stands in for."""
+    return PLANES.has(adaptation.since)
