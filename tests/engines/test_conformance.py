@@ -27,7 +27,7 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ("mujoco-multipliers", {"step": 1e-3, "integrator": "Euler"}),
 ]
 # Examined in files of their own, in the process that has compiled them.
-ELSEWHERE = ("mjx", "mjx-multipliers")
+ELSEWHERE = ("mjx", "mjx-multipliers", "mujoco-warp")
 
 
 @pytest.mark.parametrize("name", [name for name in engine_names() if name not in ELSEWHERE])

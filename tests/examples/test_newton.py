@@ -1,0 +1,96 @@
+"""What Newton's importer changes of models for MuJoCo, and its defects: as long as these pass, users need to know."""
+
+# Newton is an optional library; MuJoCo's compiled bindings carry no types.
+# pyright: reportMissingImports=false, reportAttributeAccessIssue=false
+
+from __future__ import annotations
+
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("newton", reason="needs the extra newton")
+
+import mujoco
+import newton
+import warp
+
+pytestmark = pytest.mark.engines
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+FRICTION = EXAMPLES / "defects" / "newton_solreffriction.py"
+COLLISIONS = EXAMPLES / "defects" / "newton_self_collisions.py"
+IMPORT = EXAMPLES / "newton_import.py"
+FIXED = f"Newton {newton.__version__} has mended this"
+
+
+@pytest.mark.parametrize("script", [FRICTION, COLLISIONS], ids=lambda script: script.stem)
+def test_the_script_shows_the_defect(script: Path, tmp_path: Path) -> None:
+    """Alone, without the suite, and by its exit status."""
+    done = subprocess.run(
+        [sys.executable, "-P", script], capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path
+    )
+    assert done.returncode == 1, FIXED if done.returncode == 0 else done.stderr
+    assert "defect: " in done.stdout.splitlines()[-1]
+    assert "velodrome" not in script.read_text(encoding="utf-8")
+
+
+def test_the_import_creeps_five_times_as_fast() -> None:
+    """Creep is in proportion to the friction rows' time constant: 0.02 s for 0.004 s."""
+    script = runpy.run_path(str(FRICTION), run_name="example")
+    right = script["measure_creep"](mujoco.MjModel.from_xml_string(script["BALL"]))
+    np.testing.assert_allclose(script["measure_creep"](script["import_model"]()) / right, 5, rtol=script["ACCURACY"])
+
+
+def test_a_cure_of_the_friction_is_seen(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    solver = newton.solvers.SolverMuJoCo
+    register = solver.register_custom_attributes
+
+    def register_mended(builder: Any) -> None:
+        register(builder)
+        builder.custom_attributes["mujoco:pair_solreffriction"].default = warp.vec2(0.0, 0.0)
+
+    monkeypatch.setattr(solver, "register_custom_attributes", register_mended)
+    assert runpy.run_path(str(FRICTION), run_name="example")["main"]() == 0
+    assert "cured: " in capsys.readouterr().out
+
+
+def test_a_cure_of_the_lost_ground_is_seen(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    add = newton.ModelBuilder.add_mjcf
+
+    def add_mended(builder: Any, text: str, enable_self_collisions: bool) -> None:
+        """The model has a single body: it has no self-collisions to leave out."""
+        add(builder, text, enable_self_collisions=True)
+
+    monkeypatch.setattr(newton.ModelBuilder, "add_mjcf", add_mended)
+    assert runpy.run_path(str(COLLISIONS), run_name="example")["main"]() == 0
+    assert "cured: " in capsys.readouterr().out
+
+
+def test_every_change_of_the_bicycle_is_known() -> None:
+    script = runpy.run_path(str(IMPORT), run_name="example")
+    equal, changed = script["measure_bicycle"]()
+    assert set(script["_TOLD"]) <= set(equal)
+    unexpected = [quantity.name for quantity in changed if not quantity.meaning]
+    assert not unexpected
+    found = {quantity.name: quantity for quantity in changed}
+    mended = set(script["MEANINGS"]) - set(found)
+    assert not mended, f"Newton {newton.__version__} no longer changes these: drop them from MEANINGS"
+    np.testing.assert_allclose(found["pair_solreffriction"].after, [[0.02, 1.0]] * 2, rtol=1e-7)
+    np.testing.assert_allclose(found["opt.gravity"].after, [0, 0, -9.81], rtol=1e-7)
+
+
+def test_a_change_of_the_model_is_seen() -> None:
+    """Masses and axes by a millionth, which is more than single precision explains."""
+    script = runpy.run_path(str(IMPORT), run_name="example")
+    text = script["mjcf"](script["Bicycle"](), script["ENGINE"].settings(), "plane")
+    before = mujoco.MjModel.from_xml_string(text)
+    for name in ("body_mass", "jnt_axis", "pair_solref", "qpos0"):
+        after = mujoco.MjModel.from_xml_string(text)
+        getattr(after, name)[-1] += 1e-4 * np.abs(getattr(before, name)).max()
+        assert [quantity.name for quantity in script["compare_models"](before, after)[1]] == [name]
