@@ -2,6 +2,7 @@
 
 from .bicycle import bicycle_command
 from .check import check_command
+from .float32 import float32_command
 from .league import league_command
 from .motions import atlas_command, circular_command, critical_command, families_command
 from .run import list_command, run_command
@@ -20,6 +21,7 @@ __all__ = [
     "critical_command",
     "diff_command",
     "families_command",
+    "float32_command",
     "league_command",
     "list_command",
     "paper_command",
