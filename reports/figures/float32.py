@@ -43,13 +43,18 @@ def float32_figure(path: Path, document: Mapping[str, Any]) -> None:
             ax.plot(time, measured, color=shade, marker=_MARKERS[k % len(_MARKERS)], ms=4, ls="none", label=label)
             ax.plot(time, predicted, color=shade, lw=1)
         if document["reference_distance"]:
-            time, distance = zip(*((row["time"], row["distance"]) for row in document["reference_distance"]), strict=True)
+            time, distance = zip(
+                *((row["time"], row["distance"]) for row in document["reference_distance"]), strict=True
+            )
             ax.plot(time, distance, color=GREY, ls=":", label="float64, from the reference")
         ax.set(xscale="log", yscale="log", xlabel="time [s]", ylabel="distance of D from float64 [m]")
         ax.grid(True)
         figure.legend(*ax.get_legend_handles_labels(), loc="outside right upper")
         figure.suptitle(
-            f"{document['scenario']}: marks measured, lines by the last digits", x=0.01, ha="left", fontsize=8.5,
+            f"{document['scenario']}: marks measured, lines by the last digits",
+            x=0.01,
+            ha="left",
+            fontsize=8.5,
             parse_math=False,
         )
         write_figure(path, figure)

@@ -6,8 +6,8 @@ the ride in float64 by
     D(T) = sum over k of Phi(T, t_k) d_k
 
 where Phi is the derivative of the state at T with respect to that at t_k, measured by finite differences of rides in
-float64. Deviations are those of the generalised coordinates and rates, x and y along and across the heading: on a circle
-they change slowly, and Phi with them.
+float64. Deviations are those of the generalised coordinates and rates, x and y along and across the heading: on a
+circle they change slowly, and Phi with them.
 
 Two models of d_k use the ride in float64 alone. The last digit of a number x in float32 is its spacing u(x).
 
@@ -26,7 +26,9 @@ import numpy as np
 
 from ...reference.kinematics import FRONT_ANGLE, PITCH, REAR_ANGLE, YAW
 
-_DISTURBANCE = 1e-6  # of a coordinate or rate; errors of second order and float64's round-off are both 1e-6 of it or less
+_DISTURBANCE = (
+    1e-6  # of a coordinate or rate; errors of second order and float64's round-off are both 1e-6 of it or less
+)
 _SIZE = 18  # coordinates and rates
 # The angles of wheels change nothing else: wheels are round.
 _MATTERING = [i for i in range(_SIZE) if i not in (REAR_ANGLE, FRONT_ANGLE)]
@@ -88,7 +90,7 @@ class Sensitivity:
         found[end, :, :3] = np.eye(3)
         for j in range(end - 1, -1, -1):
             found[j] = found[j + 1] @ self.flow[j]
-        # At an exact start wheels just touch, and a disturbance decides whether they do; contacts form in the first block.
+        # At an exact start wheels just touch, and a disturbance decides whether they do: contacts form in this block.
         if end:
             found[0] = found[1]
         return found
@@ -168,11 +170,13 @@ class LastDigits:
         kept = [store(*state) for state in zip(sensitivity.q, sensitivity.qd, strict=True)]
         numbers = np.array([np.concatenate(pair) for pair in kept])
         count = len(kept[0][0])
-        is_rounded = np.r_[np.full(count, "positions" in rounded), np.full(numbers.shape[1] - count, "velocities" in rounded)]
+        is_rounded = np.r_[
+            np.full(count, "positions" in rounded), np.full(numbers.shape[1] - count, "velocities" in rounded)
+        ]
         self._digits = np.where(is_rounded, np.spacing(np.abs(numbers).astype(np.float32)).astype(float), 0.0)
         middles = np.arange(len(sensitivity.flow)) * block + block // 2
         # Of a quaternion's four numbers the inverse takes the part that turns, and leaves its length out.
-        self._inverses = [np.linalg.pinv(_differentiate(store, sensitivity, k)) for k in middles]
+        self._inverses = [np.linalg.pinv(_differentiate(store, sensitivity, k)) for k in middles.tolist()]
         self._repeated = self._replay(numbers, is_rounded)
 
     def _replay(self, numbers: np.ndarray, is_rounded: np.ndarray) -> np.ndarray:

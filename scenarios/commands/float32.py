@@ -32,8 +32,8 @@ def float32_command(
     engine: Annotated[
         list[str] | None,
         typer.Option(
-            help="Ride only these engines: a name, a pattern such as 'mjx*', or all; may be given several times. Without "
-            "it all installed engines ride that compute in float32.",
+            help="Ride only these engines: a name, a pattern such as 'mjx*', or all; may be given several times. "
+            "Without it all installed engines ride that compute in float32.",
             autocompletion=complete_engine,
         ),
     ] = None,

@@ -29,7 +29,9 @@ def show_float32(console: Console, document: Mapping[str, Any]) -> None:
         console.print(f"warning: {line}", style="yellow", markup=False, highlight=False, soft_wrap=True)
     for name, entry in document["engines"].items():
         if entry["reason"] is not None:
-            console.print(f"{name} left out: {entry['reason']}", style="dim", markup=False, highlight=False, soft_wrap=True)
+            console.print(
+                f"{name} left out: {entry['reason']}", style="dim", markup=False, highlight=False, soft_wrap=True
+            )
             continue
         for variant, found in entry["variants"].items():
             points = found["points"]

@@ -1,7 +1,7 @@
 """Studies of a bicycle, of the precision of engines, of all engines side by side, and of single precision."""
 
 from .bicycle import BicycleStudy, study_bicycle, write_bicycle
-from .float32 import FLOAT32_STARTS, all_rode_float32, study_float32, write_float32
+from .float32 import all_rode_float32, study_float32, write_float32
 from .league import (
     LEAGUE_LEVELS,
     LEAGUE_SCENARIOS,
@@ -14,7 +14,6 @@ from .league_settings import LeagueSettings, read_league_settings
 from .precision import all_ran, study_precision, write_precision
 
 __all__ = [
-    "FLOAT32_STARTS",
     "LEAGUE_LEVELS",
     "LEAGUE_SCENARIOS",
     "BicycleStudy",

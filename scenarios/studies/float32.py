@@ -33,10 +33,10 @@ from ..files import make_folder, write_json
 from ..run import RunPlan, RunWatch, Trace, configure_engine, installed_engines, library_versions, plan_run
 from ..scenario import Scenario, choose_engines, join_complaints, name_bicycle
 
-FLOAT32_STARTS = 8
 _TIMES = (1.0, 3.0, 10.0, 20.0)  # at which distances are given, as far as a ride reaches, beside its end [s]
 _BLOCK = 0.1  # of a block of the sensitivity [s]; in this time the modes of a bicycle hardly turn
 _LAST_DIGIT = 2.0**-23  # relative spacing of float32
+_MOST_STEPS = 200_000  # whose states are kept, some hundred megabytes
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,11 @@ def study_float32(
         "starts": starts,
         "engines": entries,
         "double": [
-            {"engine": found.engine.name, "version": found.engine.version, "settings": found.settings.model_dump(mode="json")}
+            {
+                "engine": found.engine.name,
+                "version": found.engine.version,
+                "settings": found.settings.model_dump(mode="json"),
+            }
             for found in doubles.values()
         ],
         "reference_distance": _measure_reference(plan, next(iter(doubles.values())), watch) if doubles else [],
@@ -180,7 +184,9 @@ def _choose_engines(wanted: list[str] | None) -> dict[str, SinglePrecision]:
     lacking = [name for name in choice.names if name in choice.named and name not in found and name != REFERENCE]
     if lacking or not found:
         able = [name for name in installed_engines() if _is_able(name)]
-        what = f"{' and '.join(lacking)} compute{'s' if len(lacking) == 1 else ''}" if lacking else "these engines compute"
+        what = (
+            f"{' and '.join(lacking)} compute{'s' if len(lacking) == 1 else ''}" if lacking else "these engines compute"
+        )
         raise ScenarioError(f"--engine: {what} in float64 alone; engines with a float32 are {', '.join(able)}")
     return found
 
@@ -217,6 +223,11 @@ def _ride_double(plan: RunPlan, engine: Engine, settings: Settings, starts: int,
     if duration < 2 * block * step:
         raise ScenarioError(f"{plan.name}: the duration is {duration:g} s; it must be at least {2 * block * step:g} s")
     steps = int(duration / step * (1 + 1e-9)) // block * block
+    if steps > _MOST_STEPS:
+        raise ScenarioError(
+            f"{plan.name}: the duration of {duration:g} s has {steps} steps; every step is looked at, so that it must be "
+            f"at most {_MOST_STEPS * step:g} s"
+        )
     problems = _make_problems(plan.start.problem, step, steps, block, starts)
     rides = []
     for number, problem in enumerate(problems):
@@ -309,12 +320,13 @@ def _study_variant(
     # A start that ends early shortens what can be compared.
     reached = min(float(ride.time[-1]) for ride in rides)
     end = int(reached / (block * float(double.problems[0].times[1])) * (1 + 1e-9))
-    errors = np.concatenate(
-        [
-            find_deviations(own.q[:1], own.qd[:1], double.problems[0].q[None], double.problems[0].qd[None]),
-            call_engine(measure_step_errors, own.q[: end * block + 1], own.qd[: end * block + 1], double.advance),
-        ]
-    )
+    exact = double.rides[0]
+    # In the first block contacts form, with errors that are not small; it is taken as it ended.
+    errors = np.zeros((end * block + 1, 18))
+    if end:
+        samples = slice(block, end * block + 1)
+        errors[block] = find_deviations(own.q[[block]], own.qd[[block]], exact.q[[block]], exact.qd[[block]])[0]
+        errors[block + 1 :] = call_engine(measure_step_errors, own.q[samples], own.qd[samples], double.advance)
     digits = LastDigits(double.sensitivity, single.store, variant.rounded)
     ended = next((ride.ended for ride in rides if ride.ended is not None), None)
     return {
