@@ -325,7 +325,8 @@ class Engine(Protocol):
     Two further attributes serve `velodrome league`. ``settings_source`` is one line of text that says whose choice the
     defaults of the settings are, such as the page of the library's documentation. ``bit_variants`` maps descriptions to
     changed settings with which a ride should be the same to the last bit, such as another number of threads or another
-    place in a batch.
+    place in a batch. An engine that computes in float32 tells `velodrome float32` so by ``single_precision``, a
+    `velodrome.engines.single_precision.SinglePrecision`.
 
     The tuple ``packages`` serves `velodrome history`: it names the packages of the library behind the engine, whose
     releases can be compared, where they are neither the engine's own package nor those of its extra.

@@ -12,6 +12,9 @@ from typing import Any, Generic, TypeVar
 
 from ..engine import Problem, Progress, Trajectory, package_version
 from ..mujoco.engine import GIVES, assemble_trajectory, step_counts
+from ..mujoco.native import COMPARED_AT
+from ..mujoco.state import to_mujoco
+from ..single_precision import SinglePrecision, SinglePrecisionVariant
 from .ground import choose_height
 from .process import process_kept
 from .settings import ArraySettings, MjxMultiplierSettings, MjxSettings
@@ -32,6 +35,8 @@ class MjxEngine(Generic[S]):
     settings_source : str
         Whose choice its default settings are.
     gives : tuple of str
+    single_precision : SinglePrecision or None
+        How it rides in float32 what another engine rides in float64; None if no engine does.
     """
 
     name: str
@@ -39,6 +44,7 @@ class MjxEngine(Generic[S]):
     description: str
     settings_source: str
     gives: tuple[str, ...] = GIVES
+    single_precision: SinglePrecision | None = None
     takes_inputs = True
 
     @property
@@ -96,6 +102,12 @@ ENGINE = MjxEngine(
     MjxSettings,
     description="MJX, MuJoCo's port to JAX, with the model of mujoco-native",
     settings_source="those of mujoco-native, whose model it rides: the suite's own choice within MuJoCo's limits",
+    single_precision=SinglePrecision(
+        counterpart="mujoco-native",
+        variants=(SinglePrecisionVariant("float32", changes={"precision": "float32"}),),
+        common=COMPARED_AT,
+        store=to_mujoco,
+    ),
 )
 MULTIPLIERS = MjxEngine(
     "mjx-multipliers",

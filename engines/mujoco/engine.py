@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -13,6 +13,7 @@ import numpy as np
 from ..contact_fields import observe_contact_fields
 from ..engine import Problem, Progress, Trajectory, UnsuitableProblem
 from ..releases import LibraryReach
+from ..single_precision import AdvanceStates, SinglePrecision
 from .settings import StepSettings
 from .state import from_mujoco
 
@@ -61,6 +62,8 @@ class MujocoEngine(Generic[S]):
     reach : LibraryReach
         The releases of MuJoCo with which it rides.
     gives : tuple of str
+    single_precision : SinglePrecision or None
+        How it rides in float32; None if it does not.
     """
 
     name: str
@@ -70,6 +73,7 @@ class MujocoEngine(Generic[S]):
     settings_source: str
     reach: LibraryReach
     gives: tuple[str, ...] = GIVES
+    single_precision: SinglePrecision | None = None
     takes_inputs = True
     packages = ("mujoco",)
 
@@ -121,10 +125,22 @@ class MujocoEngine(Generic[S]):
         counts = step_counts(problem.times, settings.step)
         from .ride import ride_rig
 
+        ridden = ride_rig(self._build(problem, settings), settings.step, counts, progress)
+        return assemble_trajectory(self.name, self.version, problem, settings, ridden, self.reach.list_adaptations())
+
+    def make_advance(self, problem: Problem, settings: Any) -> AdvanceStates:
+        """Return the function that moves states of a problem by a number of steps; see `advance.advance_states`."""
+        from .advance import advance_states
+
+        def advance(q: np.ndarray, qd: np.ndarray, steps: int) -> tuple[np.ndarray, np.ndarray]:
+            return advance_states(self._build(replace(problem, q=q[0], qd=qd[0]), settings), q, qd, steps)
+
+        return advance
+
+    def _build(self, problem: Problem, settings: Any) -> Rig:
         module, name = self.builder.split(":")
         build: Callable[[Problem, Any], Rig] = getattr(import_module(module), name)
-        ridden = ride_rig(build(problem, settings), settings.step, counts, progress)
-        return assemble_trajectory(self.name, self.version, problem, settings, ridden, self.reach.list_adaptations())
+        return build(problem, settings)
 
 
 def assemble_trajectory(

@@ -14,10 +14,22 @@ first contact forces lack the part that slip brings; it builds up within a few t
 
 from __future__ import annotations
 
+from ..single_precision import SinglePrecision, SinglePrecisionVariant
 from .engine import MujocoEngine
 from .releases import PLANES
-from .settings import NativeSettings
+from .settings import NativeSettings, RoundedSettings
+from .state import to_mujoco
 
+# Its settings are compared at a tolerance at which the solver leaves less than float32's last digit.
+COMPARED_AT = {"tolerance": 1e-14}
+_ROUNDED = MujocoEngine(
+    "mujoco-native",
+    RoundedSettings,
+    "velodrome.engines.mujoco.rounding:build_rounded_planes",
+    description="mujoco-native with a state that is rounded to float32 after every step",
+    settings_source="those of mujoco-native",
+    reach=PLANES,
+)
 ENGINE = MujocoEngine(
     "mujoco-native",
     NativeSettings,
@@ -26,4 +38,14 @@ ENGINE = MujocoEngine(
     settings_source="the suite's own choice within MuJoCo's documented limits: contacts as stiff as two steps allow, "
     "implicitfast, elliptic cone, impratio 10, and friction 2, which is more than the library's rides need",
     reach=PLANES,
+    single_precision=SinglePrecision(
+        counterpart="mujoco-native",
+        variants=(
+            SinglePrecisionVariant("state rounded", changes={"rounded": "state"}, engine=_ROUNDED),
+            SinglePrecisionVariant("positions rounded", ("positions",), {"rounded": "positions"}, _ROUNDED),
+            SinglePrecisionVariant("velocities rounded", ("velocities",), {"rounded": "velocities"}, _ROUNDED),
+        ),
+        common=COMPARED_AT,
+        store=to_mujoco,
+    ),
 )

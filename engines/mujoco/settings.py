@@ -184,6 +184,19 @@ class NativeSettings(ContactSettings):
     integrator: Integrator = Field(default="implicitfast", description=_ON_PLANES)
 
 
+class RoundedSettings(NativeSettings):
+    """Settings of `rounding`: those of a careful user, with a state in float32."""
+
+    rounded: Literal["state", "positions", "velocities"] = Field(
+        default="state", description="what of the state is rounded to float32 after every step"
+    )
+
+    @property
+    def noise(self) -> float:
+        """Relative error that a step may add beyond its method: half of float32's last digit, or the solver's."""
+        return max(super().noise, 2.0**-24)
+
+
 class DefaultSettings(ContactSettings):
     """MuJoCo's own defaults."""
 

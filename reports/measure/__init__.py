@@ -5,6 +5,15 @@ from .consistency import LARGEST_NOISE, TURNING, Mismatch, describe_mismatch, ev
 from .convergence import extrapolate, observed_orders
 from .creep import Creep, contact_acceleration, measure_creep
 from .fall import cut_at_fall, fell_at, until_fall
+from .float32 import (
+    LastDigits,
+    Sensitivity,
+    carry_errors,
+    disturb_states,
+    find_deviations,
+    measure_sensitivity,
+    measure_step_errors,
+)
 from .friction import normal_force, required_friction
 from .identify import DISTURBANCES, IDENTIFY_LEVELS, STENCIL_WEIGHT, Identified, identify, interval_of, jacobian_at
 from .inspection import relative_differences, rms_force_error, state_error
@@ -37,12 +46,15 @@ __all__ = [
     "Creep",
     "Identified",
     "InputWork",
+    "LastDigits",
     "Level",
     "Mismatch",
     "Mode",
     "Modes",
     "Quantity",
     "Scale",
+    "Sensitivity",
+    "carry_errors",
     "compared_time",
     "comparison_horizon",
     "compute_metrics",
@@ -50,6 +62,7 @@ __all__ = [
     "contact_acceleration",
     "cut_at_fall",
     "describe_mismatch",
+    "disturb_states",
     "eigenvalue_document",
     "eigenvalue_limits",
     "eigenvalue_pairs",
@@ -57,6 +70,7 @@ __all__ = [
     "evaluate_ride",
     "extrapolate",
     "fell_at",
+    "find_deviations",
     "find_mismatches",
     "find_modes",
     "flatten_metrics",
@@ -65,6 +79,8 @@ __all__ = [
     "jacobian_at",
     "measure_creep",
     "measure_order_range",
+    "measure_sensitivity",
+    "measure_step_errors",
     "measure_work",
     "noise",
     "normal_force",

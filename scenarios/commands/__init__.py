@@ -2,6 +2,7 @@
 
 from .bicycle import bicycle_command
 from .check import check_command
+from .float32 import float32_command
 from .history import history_command
 from .league import league_command
 from .motions import atlas_command, circular_command, critical_command, families_command
@@ -21,6 +22,7 @@ __all__ = [
     "critical_command",
     "diff_command",
     "families_command",
+    "float32_command",
     "history_command",
     "league_command",
     "list_command",

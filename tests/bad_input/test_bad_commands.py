@@ -210,7 +210,7 @@ def test_a_folder_that_no_file_system_takes_is_one_line(folder: Path) -> None:
     assert is_one_line(stderr.removesuffix("\n"))
 
 
-@pytest.mark.parametrize("command", [["paper"], ["precision", "q2"]])
+@pytest.mark.parametrize("command", [["paper"], ["precision", "q2"], ["float32", "q2"]])
 def test_a_folder_that_cannot_be_made_is_said_before_the_work(command: list[str], folder: Path) -> None:
     start = time.process_time()
     assert called([*command, "--out", "file"], folder)[0] == 2

@@ -127,6 +127,7 @@ DOCUMENTS = {
     "precision": [
         "precision q2 --engine mujoco-multipliers --duration 1 --levels 2 --set simulation.output_rate=25 --json"
     ],
+    "float32": ["float32 plane-circle --engine mujoco-native --duration 0.5 --starts 2 --json"],
     "league": ["league plane-circle --engine mujoco-native --duration 0.5 --json"],
     "history": ["history wheelmill==1.0,1.1 circle.toml --cache cache --json"],
     "sweep": ["sweep sweep.toml --json"],
