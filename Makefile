@@ -9,6 +9,9 @@ LOWEST_STAMP := $(LOWEST)/set-up
 # Environment with the libraries of the engines that are extras.
 ENGINES := .venv-engines
 ENGINES_STAMP := $(ENGINES)/set-up
+# Environment of the packages in examples/ whose libraries go with the suite's versions.
+PACKAGES := .venv-packages
+PACKAGES_STAMP := $(PACKAGES)/set-up
 # Environment of the package velodrome-jiminy, whose library needs an older numpy.
 JIMINY := .venv-jiminy
 JIMINY_STAMP := $(JIMINY)/set-up
@@ -34,7 +37,8 @@ test-engines: $(ENGINES_STAMP)
 
 # Run the tests of the packages in examples/ whose engines are other people's libraries, and of those libraries' defects.
 # Their test files have the same names, hence the mode of importing.
-test-packages: $(JIMINY_STAMP)
+test-packages: $(PACKAGES_STAMP) $(JIMINY_STAMP)
+	$(PACKAGES)/bin/python $(PYTEST) -m "" --import-mode importlib examples/velodrome-dart tests/examples/test_dart_defects.py
 	$(JIMINY)/bin/python $(PYTEST) -m "" --import-mode importlib examples/velodrome-jiminy tests/examples/test_jiminy_defects.py
 
 test-lowest: $(LOWEST_STAMP)
@@ -80,6 +84,11 @@ $(DOCS_STAMP): $(STAMP)
 $(ENGINES_STAMP): pyproject.toml constraints.txt constraints-engines.txt
 	$(PYTHON) -m venv $(ENGINES)
 	$(ENGINES)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --constraint constraints-engines.txt --editable '.[dev,engines]'
+	touch $@
+
+$(PACKAGES_STAMP): pyproject.toml constraints.txt constraints-packages.txt examples/velodrome-dart/pyproject.toml
+	$(PYTHON) -m venv $(PACKAGES)
+	$(PACKAGES)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --constraint constraints-packages.txt --editable . --editable examples/velodrome-dart $(TESTING)
 	touch $@
 
 $(JIMINY_STAMP): pyproject.toml constraints-jiminy.txt examples/velodrome-jiminy/pyproject.toml
