@@ -38,7 +38,7 @@ test-engines: $(ENGINES_STAMP)
 # Run the tests of the packages in examples/ whose engines are other people's libraries, and of those libraries' defects.
 # Their test files have the same names, hence the mode of importing.
 test-packages: $(PACKAGES_STAMP) $(JIMINY_STAMP)
-	$(PACKAGES)/bin/python $(PYTEST) -m "" --import-mode importlib examples/velodrome-dart tests/examples/test_dart_defects.py
+	$(PACKAGES)/bin/python $(PYTEST) -m "" --import-mode importlib examples/velodrome-bullet examples/velodrome-dart tests/examples/test_bullet_defects.py tests/examples/test_dart_defects.py
 	$(JIMINY)/bin/python $(PYTEST) -m "" --import-mode importlib examples/velodrome-jiminy tests/examples/test_jiminy_defects.py
 
 test-lowest: $(LOWEST_STAMP)
@@ -86,9 +86,9 @@ $(ENGINES_STAMP): pyproject.toml constraints.txt constraints-engines.txt
 	$(ENGINES)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --constraint constraints-engines.txt --editable '.[dev,engines]'
 	touch $@
 
-$(PACKAGES_STAMP): pyproject.toml constraints.txt constraints-packages.txt examples/velodrome-dart/pyproject.toml
+$(PACKAGES_STAMP): pyproject.toml constraints.txt constraints-packages.txt examples/velodrome-bullet/pyproject.toml examples/velodrome-dart/pyproject.toml
 	$(PYTHON) -m venv $(PACKAGES)
-	$(PACKAGES)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --constraint constraints-packages.txt --editable . --editable examples/velodrome-dart $(TESTING)
+	$(PACKAGES)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --constraint constraints-packages.txt --editable . --editable examples/velodrome-bullet --editable examples/velodrome-dart $(TESTING)
 	touch $@
 
 $(JIMINY_STAMP): pyproject.toml constraints-jiminy.txt examples/velodrome-jiminy/pyproject.toml
