@@ -9,10 +9,18 @@ LOWEST_STAMP := $(LOWEST)/set-up
 # Environment with the libraries of the engines that are extras.
 ENGINES := .venv-engines
 ENGINES_STAMP := $(ENGINES)/set-up
+# Environment of the packages in examples/ whose libraries go with the suite's versions.
+PACKAGES := .venv-packages
+PACKAGES_STAMP := $(PACKAGES)/set-up
+# Environment of the package velodrome-jiminy, whose library needs an older numpy.
+JIMINY := .venv-jiminy
+JIMINY_STAMP := $(JIMINY)/set-up
+# What the tests of packages need besides the packages.
+TESTING := hypothesis pytest pytest-xdist
 # Run the tests in two processes, each file in one of them, so that fixtures of a file are computed once.
 PYTEST := -m pytest -n 2 --dist loadfile
 
-.PHONY: run test test-all test-engines test-lowest test-machines test-machines-short test-wheel lint check docs
+.PHONY: run test test-all test-engines test-packages test-lowest test-machines test-machines-short test-wheel lint check docs
 
 run: $(STAMP)
 	$(BIN)/velodrome run q2-plus
@@ -26,6 +34,12 @@ test-all: $(STAMP)
 # Run the tests of the engines that are extras.
 test-engines: $(ENGINES_STAMP)
 	$(ENGINES)/bin/python $(PYTEST) -m engines
+
+# Run the tests of the packages in examples/ whose engines are other people's libraries, and of those libraries' defects.
+# Their test files have the same names, hence the mode of importing.
+test-packages: $(PACKAGES_STAMP) $(JIMINY_STAMP)
+	$(PACKAGES)/bin/python $(PYTEST) -m "" --import-mode importlib examples/velodrome-bullet examples/velodrome-dart tests/examples/test_bullet_defects.py tests/examples/test_dart_defects.py
+	$(JIMINY)/bin/python $(PYTEST) -m "" --import-mode importlib examples/velodrome-jiminy tests/examples/test_jiminy_defects.py
 
 test-lowest: $(LOWEST_STAMP)
 	$(LOWEST)/bin/python $(PYTEST)
@@ -70,6 +84,16 @@ $(DOCS_STAMP): $(STAMP)
 $(ENGINES_STAMP): pyproject.toml constraints.txt constraints-engines.txt
 	$(PYTHON) -m venv $(ENGINES)
 	$(ENGINES)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --constraint constraints-engines.txt --editable '.[dev,engines]'
+	touch $@
+
+$(PACKAGES_STAMP): pyproject.toml constraints.txt constraints-packages.txt examples/velodrome-bullet/pyproject.toml examples/velodrome-dart/pyproject.toml
+	$(PYTHON) -m venv $(PACKAGES)
+	$(PACKAGES)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --constraint constraints-packages.txt --editable . --editable examples/velodrome-bullet --editable examples/velodrome-dart $(TESTING)
+	touch $@
+
+$(JIMINY_STAMP): pyproject.toml constraints-jiminy.txt examples/velodrome-jiminy/pyproject.toml
+	$(PYTHON) -m venv $(JIMINY)
+	$(JIMINY)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints-jiminy.txt --editable . --editable examples/velodrome-jiminy $(TESTING)
 	touch $@
 
 $(LOWEST_STAMP): pyproject.toml constraints-lowest.txt

@@ -1,0 +1,1 @@
+"""DART as an engine of Velodrome: its contact solver carries thin wheels on the level plane."""
