@@ -11,8 +11,8 @@ import numpy as np
 
 from ...engines.admission import ride_engine
 from ...engines.engine import REFERENCE, Engine, Problem, Settings, Trajectory, why_failed
-from ...engines.registry import load_engine
 from ...engines.guard import call_engine
+from ...engines.registry import load_engine
 from ...engines.single_precision import (
     AdvanceStates,
     SinglePrecision,

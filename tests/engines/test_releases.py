@@ -19,7 +19,7 @@ from numpy.lib.stride_tricks import as_strided
 
 import velodrome
 from velodrome.engines.admission import ride_engine
-from velodrome.engines.engine import EngineError, Settings, UnsuitableProblem, engine_names, load_engine
+from velodrome.engines.engine import EngineError, Settings, UnsuitableProblem
 from velodrome.engines.exudyn import library as exudyn_library
 from velodrome.engines.mujoco import inertia, layout
 from velodrome.engines.mujoco.convergence import watch_solver
@@ -28,6 +28,7 @@ from velodrome.engines.mujoco.model import mjcf
 from velodrome.engines.mujoco.planes import build_planes
 from velodrome.engines.mujoco.ride import ride_rig
 from velodrome.engines.mujoco.settings import ExactContactSettings, NativeSettings
+from velodrome.engines.registry import engine_names, load_engine
 from velodrome.engines.releases import Adaptation, LibraryReach, find_reach, split_adaptations
 from velodrome.reference.bicycle import Bicycle
 from velodrome.scenarios.scenario.schema import load_scenario
