@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import re
-import shlex
 import shutil
 import subprocess
 import sys
@@ -15,12 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
 
 from velodrome.engines import registry
 from velodrome.engines.registry import engine_names, load_engine
 from velodrome.reference.surface import is_level
-from velodrome.scenarios.cli import app
 from velodrome.scenarios.gate import checks as gate
 from velodrome.scenarios.gate.verdict import RIDE_QUANTITIES, SHOWN
 from velodrome.scenarios.run.runner import configure_engine, plan_run, run_plan
@@ -31,7 +27,6 @@ from velodrome.testing import check_engine
 SUITE = Path(__file__).parents[2]
 EXAMPLE = SUITE / "examples" / "velodrome-symbrim"
 GUIDE = (EXAMPLE / "README.md").read_text(encoding="utf-8")
-PROJECT = tomllib.loads((EXAMPLE / "pyproject.toml").read_text(encoding="utf-8"))
 MOVES = {*RIDE_QUANTITIES, "observed_order", "eigenvalue_error", "growth_rate_error"} - {"fell_at"}
 
 
@@ -43,30 +38,11 @@ SHELL = "".join(blocks("sh")).splitlines()
 COMMANDS = [line for line in SHELL if line.startswith("velodrome ")]
 
 
-def test_the_package_announces_the_engine_that_it_has() -> None:
-    point = EntryPoint("symbrim", PROJECT["project"]["entry-points"][registry.ENTRY_POINT_GROUP]["symbrim"], "")
-    source = (EXAMPLE / f"{point.module.replace('.', '/')}.py").read_text(encoding="utf-8")
-    named = [node.targets for node in ast.parse(source).body if isinstance(node, ast.Assign)]
-    assert [point.attr] in [[target.id for target in targets if isinstance(target, ast.Name)] for targets in named]
-    assert PROJECT["tool"]["setuptools"]["packages"] == [point.module.split(".")[0]]
-
-
 def test_the_suite_does_not_pack_the_example() -> None:
     suite = tomllib.loads((SUITE / "pyproject.toml").read_text(encoding="utf-8"))
     (root,) = suite["tool"]["setuptools"]["packages"]["find"]["where"]
     assert [folder.name for folder in (SUITE / root).iterdir() if folder.suffix != ".egg-info"] == ["velodrome"]
     assert "symbrim" not in suite["project"]["entry-points"][registry.ENTRY_POINT_GROUP]
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_the_guides_commands_exist(command: str) -> None:
-    words = shlex.split(command)[1:]
-    group: Any = typer.main.get_command(app)
-    name, chosen, rest = group.resolve_command(group.make_context("velodrome", list(words)), words)
-    chosen.make_context(name, rest)  # raises on an option that there is not
-    for word in words:
-        if "/" in word:
-            assert (SUITE / word).exists(), word
 
 
 def test_the_guides_scenario_starts_on_the_level_plane() -> None:
