@@ -126,7 +126,8 @@ def check_gate(
 
     Every engine gets a verdict on every scenario, except engines that were not asked for, have no baseline and do not
     suit the motion, and those whose rides are long: without named scenarios they ride those of `gate_scenarios` and
-    those of which they have a baseline. An engine that exits, breaks or is not judged for any other reason counts as not run, and fails.
+    those of which they have a baseline. An engine that exits, breaks or is not judged for any other reason counts as
+    not run, and fails.
 
     Parameters
     ----------
@@ -238,9 +239,7 @@ def _engines_to_judge(wanted: Sequence[str] | None, known: Mapping[str, Mapping[
 
 def _choose_for_scenario(choice: EngineChoice, scenario: str, baseline: Mapping[str, Any]) -> EngineChoice:
     """Return the chosen engines without those that have long rides and do not ride this scenario."""
-    riding = [
-        name for name in choice.names if scenario in gate_scenarios().get(name, [scenario]) or name in baseline
-    ]
+    riding = [name for name in choice.names if scenario in gate_scenarios().get(name, [scenario]) or name in baseline]
     return EngineChoice(tuple(riding), choice.named)
 
 
