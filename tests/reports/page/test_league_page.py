@@ -132,8 +132,23 @@ def test_points_lie_where_their_logarithms_are() -> None:
     assert [tick["power"] for tick in drawn["y"]] == [-2, -1, 0]
     lines = {line["engine"]: line["marks"] for line in drawn["lines"]}
     assert lines == {1: [(0.0, 100.0), (100.0, 0.0)], 0: [(50.0, 50.0)]}
+    assert drawn["coinciding"] == []
     assert draw_loglog({"a": [(0.0, 1.0)]}, ["a"]) is None
     assert draw_loglog({}, []) is None
+
+
+def test_engines_at_the_same_places_are_told() -> None:
+    there = [(1e-3, 1e-2), (1e-1, 1.0)]
+    beside = [(x * 1.01, y) for x, y in there]  # 0.2 % of two decades
+    other = [(x, y / 2) for x, y in there]
+    drawn = draw_loglog({"a": there, "b": other, "c": beside, "d": there[:1]}, list("abcd"))
+    assert drawn is not None
+    assert drawn["coinciding"] == [["a", "c"]]
+    again = document()
+    ((name, scenarios),) = ((key, entry["scenarios"]) for key, entry in again["engines"].items() if key == "worse")
+    again["engines"]["twin"] = again["engines"][name] | {"scenarios": scenarios}
+    text = re.sub(r"<[^>]+>", "", make_league_page(again))
+    assert "one drawn over the other: worse, twin." in text
 
 
 @pytest.mark.parametrize("values", [[1.0], [3.0], [1e-12, 5.0], [0.1, 0.100001], [5e-324, 1e308]])

@@ -31,7 +31,7 @@ from velodrome.engines.engine import REFERENCE, Engine, EngineError, Problem, Se
 from velodrome.engines.exudyn import joint
 from velodrome.engines.lagrange import LagrangeSettings
 from velodrome.engines.mujoco import compiled
-from velodrome.engines.registry import engine_names, load_engine
+from velodrome.engines.registry import default_engines, load_engine
 from velodrome.reference.kinematics import LEAN, PITCH, STEER
 from velodrome.reports.measure.inspection import relative_differences
 from velodrome.scenarios.error import ScenarioError
@@ -44,7 +44,7 @@ from velodrome.scenarios.scenario import engine_settings
 from velodrome.scenarios.scenario.schema import LIBRARY, Gate, Perturbation, Scenario, load_scenario
 from velodrome.scenarios.scenario.start import make_start
 
-NAMES = engine_names()
+NAMES = default_engines()  # those of extras: test_gate_extras
 # One of Exudyn's engines stands for the others.
 REPEATED = [
     pytest.param(name, marks=pytest.mark.slow if name in ("exudyn-plane-normal", "exudyn-builtin") else ())
