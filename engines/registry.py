@@ -102,11 +102,35 @@ def load_engine(name: str) -> GuardedEngine:
         raise ValueError(
             f"engine {name!r} needs {' and '.join(missing)}, not installed; install: {install_command(points[name])}"
         )
-    where = f"engine {name!r}, announced as {points[name].value},"
+    return _read_engine(points[name], _MEMBERS)
+
+
+def preview_engine(name: str) -> GuardedEngine:
+    """Load an announced engine whose library may be missing, to read its settings and what it says of itself.
+
+    Returns
+    -------
+    GuardedEngine
+        Without its library it has an empty version and cannot ride.
+
+    Raises
+    ------
+    ValueError
+        If no such engine is announced, or its code cannot be loaded without its library.
+    """
+    points = _find_entry_points()
+    if name in points and list_missing(points[name]):
+        return _read_engine(points[name], tuple(member for member in _MEMBERS if member != "version"))
+    return load_engine(name)
+
+
+def _read_engine(point: EntryPoint, required: tuple[str, ...]) -> GuardedEngine:
+    """Load the engine of an entry point, which must have the required members."""
+    name, where = point.name, f"engine {point.name!r}, announced as {point.value},"
     engine = None
     try:
-        engine = call_engine(points[name].load)
-        members = {member: call_engine(getattr, engine, member) for member in _MEMBERS}
+        engine = call_engine(point.load)
+        members = {member: call_engine(getattr, engine, member) for member in required}
     except Exception as error:  # another package's code may break in any way
         if isinstance(error, AttributeError) and error.obj is engine and where_raised(error) is None:
             raise ValueError(f"{where} is no engine: it has no {error.name}") from error
@@ -116,16 +140,17 @@ def load_engine(name: str) -> GuardedEngine:
     takes = call_engine(getattr, engine, "takes_inputs", False)
     if not isinstance(takes, bool):
         raise ValueError(f"{where} has takes_inputs = {reprlib.repr(takes)}; it must be True or False")
-    return GuardedEngine(engine, **{fact: members[fact] for fact in _FACTS}, takes_inputs=takes)
+    facts = {fact: members.get(fact, "") for fact in _FACTS}
+    return GuardedEngine(engine, **facts, takes_inputs=takes)
 
 
 def package_of(name: str) -> str | None:
-    """Return the name of the distribution that announces an installed engine, or None if it is unknown.
+    """Return the name of the distribution that announces an engine, or None if it is unknown.
 
     Raises
     ------
     KeyError
-        If no engine with that name is installed.
+        If no engine with that name is announced.
     """
     distribution = _find_entry_points()[name].dist
     return None if distribution is None else distribution.name

@@ -34,7 +34,8 @@ def assign_colours(names: Iterable[str]) -> dict[str, Colour]:
     """Assign a colour to each engine name.
 
     The reference is near white. Every other name gets the slot of its checksum, or the next free one,
-    so that an engine has the same colour whatever other engines run, unless two names collide.
+    so that an engine has the same colour whatever other engines run, unless two names collide. When all slots are
+    taken, further engines get paler colours of the same hues, and after these the first ones once more.
 
     Parameters
     ----------
@@ -48,15 +49,24 @@ def assign_colours(names: Iterable[str]) -> dict[str, Colour]:
     """
     assigned: dict[str, Colour] = {}
     taken: set[int] = set()
+    shades = (PALETTE, tuple(_make_paler(colour) for colour in PALETTE))
+    rounds = 0
     for name in names:
         if name == REFERENCE:
             assigned[name] = REFERENCE_COLOUR
             continue
         if len(taken) == len(PALETTE):
-            taken.clear()  # more engines than hues: use them a second time
+            taken.clear()
+            rounds += 1
         slot = zlib.crc32(f"{_SALT}{name}".encode()) % len(PALETTE)
         while slot in taken:
             slot = (slot + 1) % len(PALETTE)
         taken.add(slot)
-        assigned[name] = PALETTE[slot]
+        assigned[name] = shades[rounds % len(shades)][slot]
     return assigned
+
+
+def _make_paler(colour: Colour) -> Colour:
+    """Return the colour halfway to white."""
+    red, green, blue = ((255 + c) // 2 for c in colour)
+    return red, green, blue

@@ -27,7 +27,7 @@ from ..drawing import (
     rank_engines,
 )
 from . import curves, plan, trust, words
-from .ink import line_dashes, make_css, paper_colour
+from .ink import choose_mark_shapes, line_dashes, make_css, paper_colour
 
 _PARTS = Path(__file__).parent
 
@@ -140,14 +140,15 @@ def _script_hash(script: str) -> str:
 
 
 def list_engine_styles(names: list[str]) -> list[dict[str, str]]:
-    """Return the colours and dashes of each engine."""
-    paint, dash = assign_colours(names), line_dashes(names)
+    """Return the colours, the dashes and the shape of the marks of each engine."""
+    paint, dash, shape = assign_colours(names), line_dashes(names), choose_mark_shapes(names)
     return [
         {
             "name": name,
             "screen": make_css(paint[name]),
             "paper": make_css(paper_colour(name, paint[name])),
             "dash": dash[name],
+            "shape": shape[name],
         }
         for name in names
     ]

@@ -12,6 +12,10 @@ REFERENCE_ON_PAPER: Colour = (58, 64, 72)  # near black, as the reference's colo
 # for the first engine, which is drawn on it.
 DASHES = ("", "8 4", "2 3", "12 3 2 3", "5 2", "12 4 2 4 2 4", "1 2", "16 5")
 
+# A mark of a figure has one of these shapes (classes of page.css). Their number has no common factor with that of the
+# dashes: dashes and shape together tell 40 engines apart without colours.
+MARK_SHAPES = ("disc", "square", "diamond", "ring", "box")
+
 
 def luminance(colour: Colour) -> float:
     """Return the relative luminance of an sRGB colour, 0 to 1 (WCAG 2.2)."""
@@ -40,3 +44,11 @@ def line_dashes(names: list[str]) -> dict[str, str]:
     """Return the dash pattern of each engine's line in SVG notation; the reference's is solid."""
     others = [name for name in names if name != REFERENCE]
     return dict.fromkeys(names, "") | {name: DASHES[k % len(DASHES)] for k, name in enumerate(others)}
+
+
+def choose_mark_shapes(names: list[str]) -> dict[str, str]:
+    """Return the shape of each engine's marks; the reference's is a disc."""
+    others = [name for name in names if name != REFERENCE]
+    return dict.fromkeys(names, MARK_SHAPES[0]) | {
+        name: MARK_SHAPES[k % len(MARK_SHAPES)] for k, name in enumerate(others)
+    }

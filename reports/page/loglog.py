@@ -14,6 +14,7 @@ from .curves import round_values
 
 _MOST_LABELS = 8  # on an axis; further powers of ten have lines of the grid without a label
 _DIGITS = 5
+_ALIKE = 1.0  # per cent of an axis: points closer than this are covered by one another's marks
 
 Points = Sequence[tuple[float, float]]
 
@@ -62,7 +63,7 @@ def draw_loglog(series: Mapping[str, Points], names: Sequence[str], guide: Point
     -------
     dict or None
         ``x`` and ``y`` ticks; ``lines`` with ``engine`` (index), ``path`` (SVG, y down) and ``marks``; ``guide``, an
-        SVG path or None. None without a point.
+        SVG path or None; ``coinciding``, groups of engines whose marks cover each other. None without a point.
     """
     kept = {
         name: [(x, y) for x, y in points if x > 0 and y > 0 and math.isfinite(x) and math.isfinite(y)]
@@ -77,15 +78,33 @@ def draw_loglog(series: Mapping[str, Points], names: Sequence[str], guide: Point
     def trace(points: Points) -> list[tuple[float, float]]:
         return [(across.place(x), round_values(100 - up.place(y), _DIGITS)) for x, y in points]
 
+    marks = {name: trace(points) for name, points in kept.items()}
     return {
         "x": across.ticks,
         "y": up.ticks,
         "lines": [
-            {"engine": names.index(name), "path": _write_path(trace(points)), "marks": trace(points)}
-            for name, points in kept.items()
+            {"engine": names.index(name), "path": _write_path(places), "marks": places}
+            for name, places in marks.items()
         ],
         "guide": _write_path(trace(guide)) if guide else None,
+        "coinciding": _find_coinciding(marks),
     }
+
+
+def _find_coinciding(marks: Mapping[str, Points]) -> list[list[str]]:
+    """Return groups of engines whose marks all lie at those of the group's first."""
+    groups: list[list[str]] = []
+    for name, places in marks.items():
+        for group in groups:
+            first = marks[group[0]]
+            if len(first) == len(places) and all(
+                max(abs(x - u), abs(y - v)) < _ALIKE for (x, y), (u, v) in zip(first, places, strict=True)
+            ):
+                group.append(name)
+                break
+        else:
+            groups.append([name])
+    return [group for group in groups if len(group) > 1]
 
 
 def _write_path(places: Points) -> str:

@@ -27,8 +27,10 @@ def show_document(console: Console, document: Mapping[str, Any]) -> None:
 
 
 def _show_engine(console: Console, document: Mapping[str, Any]) -> None:
-    _print_line(console, f"{document['name']} {document['version']}", "bold")
+    _print_line(console, f"{document['name']} {document['version'] or ''}".rstrip(), "bold")
     _print_below(console, document["description"], indent=0)
+    if document["install"] is not None:
+        _print_below(console, f"its library is not installed; install: {document['install']}", indent=0)
     if document["package"] is not None:
         _print_below(console, f"announced by the package {document['package']}", indent=0)
     gives = ", ".join(document["gives"]) or "nothing"

@@ -126,7 +126,8 @@ def check_gate(
 
     Every engine gets a verdict on every scenario, except engines that were not asked for, have no baseline and do not
     suit the motion, and those whose rides are long: without named scenarios they ride those of `gate_scenarios` and
-    those of which they have a baseline. An engine that exits, breaks or is not judged for any other reason counts as not run, and fails.
+    those of which they have a baseline. An engine that exits, breaks or is not judged for any other reason counts as
+    not run, and fails.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from ...engines.engine import describe_engine
 from ...engines.names import suggest_name
-from ...engines.registry import load_engine, package_of
+from ...engines.registry import package_of, preview_engine, uninstalled_engines
 from ...engines.releases import find_reach
 from ...reference.bicycle import Bicycle
 from ..error import ScenarioError
@@ -43,7 +43,7 @@ def kind_of(name: str) -> str:
     """
     if name in (BICYCLE, *FILES):
         return name
-    if name in installed_engines():
+    if name in [*installed_engines(), *uninstalled_engines()]:
         return "engine"
     if name in library_names() or Path(name).suffix == ".toml":
         return "scenario"
@@ -69,9 +69,10 @@ def make_document(name: str, sweep: type[BaseModel]) -> dict[str, Any]:
     -------
     dict
         ``kind`` and ``name``, and for a ``scenario``: its resolved tables, with all parameters of the bicycle and all
-        settings of all installed engines, and ``units`` by dotted key. For an ``engine``: ``version``, ``package``,
-        ``description``, ``gives``, ``releases`` of its library, ``settings`` by name (see `FieldFacts`). For the
-        ``bicycle``: ``parameters``, ``units``, ``descriptions``. For a ``file``: ``tables`` (see `TableFacts`).
+        settings of all installed engines, and ``units`` by dotted key. For an ``engine``: ``version``, ``install``
+        (the command for its library where that is missing), ``package``, ``description``, ``gives``, ``releases`` of
+        its library, ``settings`` by name (see `FieldFacts`). For the ``bicycle``: ``parameters``, ``units``,
+        ``descriptions``. For a ``file``: ``tables`` (see `TableFacts`).
 
     Raises
     ------
@@ -91,11 +92,12 @@ def make_document(name: str, sweep: type[BaseModel]) -> dict[str, Any]:
 
 def _describe_engine(name: str) -> dict[str, Any]:
     settings = settings_schema(name)
-    engine = load_engine(name)
+    engine = preview_engine(name)
     return {
         "kind": "engine",
         "name": name,
-        "version": engine.version,
+        "version": engine.version or None,
+        "install": uninstalled_engines().get(name),
         "package": package_of(name),
         "description": describe_engine(engine),
         "gives": list(engine.gives),

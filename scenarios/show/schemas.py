@@ -9,7 +9,7 @@ from pydantic import BaseModel
 
 from ...engines.engine import why_failed
 from ...engines.guard import call_engine
-from ...engines.registry import load_engine
+from ...engines.registry import preview_engine, uninstalled_engines
 from ..error import ScenarioError
 from ..scenario import Scenario, installed_engines
 
@@ -49,15 +49,15 @@ def make_schema(kind: str, name: str, sweep: type[BaseModel]) -> dict[str, Any]:
 
 
 def scenario_schema() -> dict[str, Any]:
-    """Return the JSON schema of scenario files, with the settings of all installed engines that can be loaded."""
+    """Return the JSON schema of scenario files, with the settings of all announced engines that can be loaded."""
     schema = Scenario.model_json_schema()
     engines = {}
-    for name in installed_engines():
+    for name in [*installed_engines(), *uninstalled_engines()]:
         try:
             engines[name] = _nest_schema(name, settings_schema(name), schema.setdefault("$defs", {}))
         except ScenarioError:
             continue  # the schema is still useful for the other engines
-    # Scenarios with tables of engines that are not installed are refused, so the schema refuses them too.
+    # Scenarios with tables of engines that are not announced are refused, so the schema refuses them too.
     schema["properties"]["engines"] |= {"properties": engines, "additionalProperties": False}
     return schema
 
@@ -71,7 +71,7 @@ def settings_schema(name: str) -> dict[str, Any]:
         If the engine cannot be loaded, or its settings have no JSON schema.
     """
     try:
-        engine = load_engine(name)
+        engine = preview_engine(name)
     except ValueError as error:
         raise ScenarioError(" ".join(str(error).split())) from error
     try:

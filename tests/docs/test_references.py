@@ -15,13 +15,13 @@ from typing import Any
 import pytest
 from command_pages import commands, describe_commands, option_names
 from documents import COMMON, documented, find_key, find_paths
-from engine_settings import describe_engines, own_engines
+from engine_settings import describe_engines, find_own_engines
 from generated import GENERATORS, MARK, fill_page
 from pages import ROOT, source_pages
 from scenario_files import describe_scenario_file, describe_sweep_file, scenario_tables
 
 import velodrome
-from velodrome.engines.registry import load_engine
+from velodrome.engines.registry import preview_engine
 from velodrome.engines.storage import trajectory_columns
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reports.measure import QUANTITIES
@@ -83,12 +83,13 @@ def test_every_field_of_a_scenario_and_a_sweep_is_in_the_reference() -> None:
 
 
 def test_every_setting_is_in_the_reference_with_its_range() -> None:
-    parts = dict(zip(own_engines(), describe_engines().split("(engine-")[1:], strict=True))
+    parts = dict(zip(find_own_engines(), describe_engines().split("(engine-")[1:], strict=True))
     for name, part in parts.items():
-        for setting, field in load_engine(name).settings.model_fields.items():
+        for setting, field in preview_engine(name).settings.model_fields.items():
             assert f"\n`{setting}`\n: " in part, f"{name}: {setting}"
             assert field.description, f"{name}: {setting} has no description"
     assert "number from 1e-06 to 0.02 [s]; default `0.002`" in parts["mujoco-native"]
+    assert "`pip install 'velodrome[drake]'`" in parts["drake-native"]  # whether it is installed or not
 
 
 def test_every_metric_has_a_definition_and_none_is_left() -> None:

@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
+from tests.installed import parametrise_engines
 from velodrome.engines.engine import REFERENCE
-from velodrome.engines.registry import engine_names, load_engine
+from velodrome.engines.registry import load_engine
 from velodrome.testing import check_engine
 
 # Engines that refuse every ground but the plane.
@@ -26,11 +27,11 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ("mujoco-exact-contact", {"integrator": "implicitfast"}),
     ("mujoco-multipliers", {"step": 1e-3, "integrator": "Euler"}),
 ]
-# Examined in files of their own, in the process that has compiled them.
-ELSEWHERE = ("mjx", "mjx-multipliers", "mujoco-warp")
+# Examined in files of their own, with several settings; those of JAX and Warp in the process that has compiled them.
+ELSEWHERE = ("drake-multipliers", "drake-native", "mjx", "mjx-multipliers", "mujoco-warp", "pinocchio-constraint")
 
 
-@pytest.mark.parametrize("name", [name for name in engine_names() if name not in ELSEWHERE])
+@pytest.mark.parametrize("name", parametrise_engines(without=ELSEWHERE))
 def test_an_engine_conforms(name: str) -> None:
     report = check_engine(name)
     outcomes = {check.name: check.outcome for check in report.checks}

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.installed import parametrise_engines
 from velodrome.engines import lagrange, registry
 from velodrome.engines.engine import REFERENCE, Problem, Trajectory, UnsuitableProblem
 from velodrome.engines.registry import engine_names, load_engine
@@ -90,7 +91,7 @@ def test_two_packages_may_not_announce_one_name(monkeypatch: pytest.MonkeyPatch,
             call()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", parametrise_engines())
 def test_a_step_between_the_outputs_is_refused_with_one_that_fits(name: str) -> None:
     engine = load_engine(name)
     fixed = {"integrator": "modified-euler"} if name == REFERENCE else {}
@@ -99,7 +100,7 @@ def test_a_step_between_the_outputs_is_refused_with_one_that_fits(name: str) -> 
         engine.check(problem(name), engine.settings.model_validate(fixed | {"step": 0.003}))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", parametrise_engines())
 def test_samples_carry_the_engines_own_clock(name: str) -> None:
     start, trajectory = problem(name), ridden(name)
     # Which may add its step up.

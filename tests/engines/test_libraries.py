@@ -8,10 +8,18 @@ from pathlib import Path
 import pytest
 
 from velodrome.engines import registry
-from velodrome.engines.registry import default_engines, engine_names, load_engine, uninstalled_engines
+from velodrome.engines.registry import (
+    default_engines,
+    engine_names,
+    load_engine,
+    preview_engine,
+    uninstalled_engines,
+)
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run import plan_run
 from velodrome.scenarios.scenario import choose_engines, list_engine_faults, load_scenario
+from velodrome.scenarios.show import make_document, make_schema
+from velodrome.scenarios.sweep.file import SweepFile
 
 EXTRAS = {
     "present": "numpy>=1.0",  # the suite's own dependency
@@ -65,6 +73,20 @@ def test_an_engine_without_its_library_is_refused_with_the_command(package: None
     ):
         plan_run(*load_scenario("q2"), ["flywheel-older"])
     assert load_engine("flywheel-present").name == "flywheel-present"
+
+
+def test_the_settings_of_an_engine_are_read_without_its_library(package: None) -> None:
+    engine = preview_engine("flywheel-absent")
+    assert (engine.name, engine.version) == ("flywheel-absent", "")
+    assert engine.settings is load_engine("reference").settings
+    assert preview_engine("flywheel-present").version == load_engine("flywheel-present").version
+    document = make_document("flywheel-absent", SweepFile)
+    assert (document["version"], document["install"]) == (None, "pip install 'flywheel[absent]'")
+    assert document["settings"] == make_document("reference", SweepFile)["settings"]
+    assert make_document("reference", SweepFile)["install"] is None
+    assert "flywheel-absent" in make_schema("scenario", "", SweepFile)["properties"]["engines"]["properties"]
+    with pytest.raises(ValueError, match="'flywheel-unknown' is not installed"):
+        preview_engine("flywheel-unknown")
 
 
 def test_engines_of_extras_and_of_other_packages_ride_only_when_chosen(package: None) -> None:

@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import velodrome
+from tests.installed import parametrise_engines
 from tests.sealing import change_document
 from velodrome.engines.engine import SHAPES
 from velodrome.scenarios.run import runner
@@ -186,7 +187,7 @@ class Cancelled(Exception):
     """Raised by a user's callback."""
 
 
-@pytest.mark.parametrize("name", velodrome.engine_names())
+@pytest.mark.parametrize("name", parametrise_engines())
 def test_an_exception_of_the_callback_comes_out_unchanged(name: str, tmp_path: Path) -> None:
     cause = ValueError("the user's own cause")
     error = Cancelled("stop please")

@@ -118,3 +118,23 @@ def simulated(simulate: Simulate) -> Chosen:
 def set_to(**changes: Any) -> Chosen:
     """An engine with other settings."""
     return lambda name, values: configure_engine(name, {**values, **changes})
+
+
+def set_silently(**changes: Any) -> Chosen:
+    """An engine that rides with other settings than it says."""
+
+    def simulate(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
+        return engine.simulate(problem, settings.model_copy(update=changes), progress)
+
+    return simulated(simulate)
+
+
+def with_bicycle(problem: Problem, **factors: float) -> Problem:
+    """A problem with factors on values of its bicycle."""
+    values = {name: factor * getattr(problem.bicycle, name) for name, factor in factors.items()}
+    return replace(problem, bicycle=replace(problem.bicycle, **values))
+
+
+def with_factors(**factors: float) -> Chosen:
+    """An engine that rides another bicycle than it is given."""
+    return altered(before=lambda problem: with_bicycle(problem, **factors))

@@ -63,6 +63,11 @@ def document() -> dict[str, Any]:
     }
 
 
+def read_text(page: str) -> str:
+    """The text of a page, without its tags."""
+    return re.sub(r"<[^>]*>", "", page)
+
+
 class Tags(HTMLParser):
     def __init__(self) -> None:
         super().__init__()
@@ -103,7 +108,7 @@ def test_rows_stand_by_error_with_their_reasons() -> None:
 def test_only_wheels_near_the_law_are_said_to_creep() -> None:
     found = document()
     assert find_creeping(found, HOSTILE) == {"worse": [(0.002 / 2**k, 0.002 / 2**k) for k in range(3)]}
-    page = make_league_page(found)
+    page = read_text(make_league_page(found))
     assert "Roll without creep" in page
     assert "for 1 / b: better." in page
     assert "Slip otherwise" not in page
@@ -112,7 +117,7 @@ def test_only_wheels_near_the_law_are_said_to_creep() -> None:
     assert list(find_creeping(found, HOSTILE)) == ["worse", "better"]
     rides["better"]["creep"] = creep_of(0.002, 1.0, share=0.99 * EXPLAINED)
     assert classify_slip(rides["better"]) == "slides"
-    assert "of it: better." in make_league_page(found)
+    assert "of it: better." in read_text(make_league_page(found))
     assert classify_slip(rides[REFERENCE]) is None
 
 
@@ -132,8 +137,22 @@ def test_points_lie_where_their_logarithms_are() -> None:
     assert [tick["power"] for tick in drawn["y"]] == [-2, -1, 0]
     lines = {line["engine"]: line["marks"] for line in drawn["lines"]}
     assert lines == {1: [(0.0, 100.0), (100.0, 0.0)], 0: [(50.0, 50.0)]}
+    assert drawn["coinciding"] == []
     assert draw_loglog({"a": [(0.0, 1.0)]}, ["a"]) is None
     assert draw_loglog({}, []) is None
+
+
+def test_engines_at_the_same_places_are_told() -> None:
+    there = [(1e-3, 1e-2), (1e-1, 1.0)]
+    beside = [(x * 1.01, y) for x, y in there]  # 0.2 % of two decades
+    other = [(x, y / 2) for x, y in there]
+    drawn = draw_loglog({"a": there, "b": other, "c": beside, "d": there[:1]}, list("abcd"))
+    assert drawn is not None
+    assert drawn["coinciding"] == [["a", "c"]]
+    again = document()
+    ((name, scenarios),) = ((key, entry["scenarios"]) for key, entry in again["engines"].items() if key == "worse")
+    again["engines"]["twin"] = again["engines"][name] | {"scenarios": scenarios}
+    assert "one drawn over the other: worse, twin." in read_text(make_league_page(again))
 
 
 @pytest.mark.parametrize("values", [[1.0], [3.0], [1e-12, 5.0], [0.1, 0.100001], [5e-324, 1e308]])

@@ -29,6 +29,7 @@ from velodrome.reports.drawing.summary import COLUMNS, format_table, format_verd
 from velodrome.reports.measure.metrics import compute_metrics
 from velodrome.reports.page import make_page
 from velodrome.reports.page.curves import GROUPS, choose_samples, make_curve
+from velodrome.reports.page.document import list_engine_styles
 from velodrome.reports.page.ink import CONTRAST, DASHES, line_dashes, luminance, make_css, paper_colour
 from velodrome.reports.page.trust import COLUMN_MEANINGS, explain_columns
 from velodrome.reports.page.words import (
@@ -336,6 +337,10 @@ def test_engines_are_told_apart_on_paper() -> None:
     patterns = line_dashes(names)
     assert patterns[REFERENCE] == ""
     assert [patterns[name] for name in "abcdefgh"] == list(DASHES)
+    many = [REFERENCE, *(f"engine {k}" for k in range(2 * len(PALETTE)))]
+    styles = [(style["dash"], style["shape"]) for style in list_engine_styles(many)[1:]]
+    assert len(set(styles)) == len(styles)  # without a colour
+    assert len({style["paper"] for style in list_engine_styles(many)}) == len(many)
 
 
 def test_what_ran_is_said_in_words() -> None:

@@ -20,8 +20,11 @@ from gating import (
     compute_starts_once,
     failing,
     measure_rides_only,
+    set_silently,
     simulated,
     verdicts_of,
+    with_bicycle,
+    with_factors,
 )
 from plain import PlainEngine, PlainSettings, without_gyroscopic_moment
 
@@ -51,15 +54,6 @@ def heavier_if(condition: Callable[[Problem], bool]) -> Chosen:
         return with_bicycle(problem, gravity=1.05) if condition(problem) else problem
 
     return altered(before=before)
-
-
-def with_bicycle(problem: Problem, **factors: float) -> Problem:
-    values = {name: factor * getattr(problem.bicycle, name) for name, factor in factors.items()}
-    return replace(problem, bicycle=replace(problem.bicycle, **values))
-
-
-def with_factors(**factors: float) -> Chosen:
-    return altered(before=lambda problem: with_bicycle(problem, **factors))
 
 
 def on_other_ground(problem: Problem) -> bool:
@@ -138,13 +132,6 @@ def weaker_while_leaning(trajectory: Trajectory, force: np.ndarray) -> np.ndarra
 
 
 # What is computed in another way than is said.
-
-
-def set_silently(**changes: Any) -> Chosen:
-    def simulate(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
-        return engine.simulate(problem, settings.model_copy(update=changes), progress)
-
-    return simulated(simulate)
 
 
 def copy_with(noise: float) -> Chosen:

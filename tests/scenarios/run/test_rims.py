@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.installed import parametrise_engines
 from velodrome.engines.admission import ride_engine
 from velodrome.engines.engine import REFERENCE, Trajectory, UnsuitableProblem
-from velodrome.engines.registry import engine_names, load_engine
+from velodrome.engines.registry import load_engine
 from velodrome.reference.simulate import simulate
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.scenario.schema import library_names, load_scenario
@@ -30,7 +31,7 @@ def ridden(case: str, engine: str) -> Trajectory:
     return ride_engine(rider, problem, settings, lambda _: None)
 
 
-@pytest.mark.parametrize("engine", [name for name in engine_names() if name != REFERENCE])
+@pytest.mark.parametrize("engine", parametrise_engines(without=[REFERENCE]))
 @pytest.mark.parametrize("case", ["hollow", "curb"])
 def test_every_engine_ends_where_the_reference_does(case: str, engine: str) -> None:
     exact = ridden(case, REFERENCE)
