@@ -386,7 +386,7 @@ def test_exact_models_ride_with_old_releases_of_mujoco(releases: Any, version: s
     folder = releases("mujoco", version)
     coarse, fine = (ride_in_process(folder, "q2-plus", engine, step) for step in (0.002, 0.001))
     assert coarse["version"] == version
-    # RK4 with a free joint has order 2 before MuJoCo 4.0; the next order of the error is h times its rates of some 10/s.
+    # RK4 with a free joint has order 2 before MuJoCo 4.0; the next order of its error is h times rates of some 10/s.
     assert coarse["error"] / fine["error"] == pytest.approx(4, rel=10 * 0.002 * 2)
     # Its error there is a thousand times that of order 4, which says that the model itself is right.
     assert fine["error"] < 1e-6
