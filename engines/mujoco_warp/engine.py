@@ -1,7 +1,7 @@
 """MuJoCo Warp as an engine: the model of `mujoco-native` under its own contacts, in single precision.
 
-Warp compiles its kernels before a ride, which takes some 15 to 60 s of CPU time and no part of a trajectory's CPU time,
-and keeps them on disk, in the folder that the environment variable WARP_CACHE_PATH names or in the user's cache.
+Warp compiles its kernels before a ride, which takes some 35 s of CPU time and no part of a trajectory's CPU time, and
+keeps them on disk, in the folder that the environment variable WARP_CACHE_PATH names or in the user's cache.
 """
 
 from __future__ import annotations

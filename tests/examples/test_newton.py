@@ -86,7 +86,7 @@ def test_every_change_of_the_bicycle_is_known() -> None:
 
 
 def test_a_change_of_the_model_is_seen() -> None:
-    """Masses and axes by a millionth, which is more than single precision explains."""
+    """By a ten-thousandth of the largest number, which is more than single precision explains."""
     script = runpy.run_path(str(IMPORT), run_name="example")
     text = script["mjcf"](script["Bicycle"](), script["ENGINE"].settings(), "plane")
     before = mujoco.MjModel.from_xml_string(text)

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import typer
 
-from velodrome.engines.engine import ENTRY_POINT_GROUP
+from velodrome.engines.registry import ENTRY_POINT_GROUP
 from velodrome.scenarios.cli import app
 from velodrome.scenarios.gate.checks import read_baseline
 
