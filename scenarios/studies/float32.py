@@ -225,8 +225,8 @@ def _ride_double(plan: RunPlan, engine: Engine, settings: Settings, starts: int,
     steps = int(duration / step * (1 + 1e-9)) // block * block
     if steps > _MOST_STEPS:
         raise ScenarioError(
-            f"{plan.name}: the duration of {duration:g} s has {steps} steps; every step is looked at, so that it must be "
-            f"at most {_MOST_STEPS * step:g} s"
+            f"{plan.name}: the duration of {duration:g} s has {steps} steps; every step is looked at, so that it "
+            f"must be at most {_MOST_STEPS * step:g} s"
         )
     problems = _make_problems(plan.start.problem, step, steps, block, starts)
     rides = []
