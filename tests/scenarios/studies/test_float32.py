@@ -139,6 +139,16 @@ def test_repeated_roundings_dominate_where_a_bicycle_rolls_straight_on() -> None
 
 
 @pytest.mark.engines
+def test_a_port_that_the_ground_does_not_suit_is_left_out() -> None:
+    document = study("waves", None, 1.0)
+    assert "closed form" in document["engines"]["mjx"]["reason"]
+    assert document["engines"]["mujoco-native"]["reason"] is None
+    assert all_rode_float32(document)
+    with pytest.raises(ScenarioError, match="closed form"):
+        study("waves", ["mjx"], 1.0)
+
+
+@pytest.mark.engines
 def test_a_port_is_compared_with_mujoco() -> None:
     document = study("plane-circle", ["mjx"], 1.0)
     (point,) = points(document, "mjx", "float32")
