@@ -10,7 +10,20 @@ from typing import Any
 import numpy as np
 
 from ...engines.admission import ride_engine
+<<<<<<< HEAD
 from ...engines.engine import REFERENCE, Engine, Problem, Settings, Trajectory, why_failed
+=======
+from ...engines.engine import (
+    REFERENCE,
+    Engine,
+    Problem,
+    Settings,
+    Trajectory,
+    UnsuitableProblem,
+    load_engine,
+    why_failed,
+)
+>>>>>>> float32
 from ...engines.guard import call_engine
 from ...engines.registry import load_engine
 from ...engines.single_precision import (
@@ -32,7 +45,7 @@ from ...reports.measure import (
 from ..error import ScenarioError
 from ..files import make_folder, write_json
 from ..run import RunPlan, RunWatch, Trace, configure_engine, installed_engines, library_versions, plan_run
-from ..scenario import Scenario, choose_engines, join_complaints, name_bicycle
+from ..scenario import Scenario, choose_engines, join_complaints, make_start, name_bicycle
 
 _TIMES = (1.0, 3.0, 10.0, 20.0)  # at which distances are given, as far as a ride reaches, beside its end [s]
 _BLOCK = 0.1  # of a block of the sensitivity [s]; in this time the modes of a bicycle hardly turn
@@ -118,13 +131,14 @@ def study_float32(
     ScenarioError
         If an engine has no single precision, the scenario cannot be run, or its ride in double precision ends early.
     """
-    chosen = _choose_engines(wanted)
-    plan = plan_run(name, scenario, [*chosen])
+    chosen, named = _choose_engines(wanted)
+    left_out = _list_unsuitable(scenario, [engine for engine in chosen if engine not in named])
+    plan = plan_run(name, scenario, [engine for engine in chosen if engine not in left_out] or [REFERENCE])
     doubles: dict[str, _Double] = {}
     entries: dict[str, Any] = {}
     for engine_name, single in chosen.items():
-        if engine_name not in plan.engines:
-            entries[engine_name] = {"reason": plan.left_out[engine_name], "ran": True, "variants": {}}
+        if engine_name in left_out:
+            entries[engine_name] = {"reason": left_out[engine_name], "ran": True, "variants": {}, "failures": []}
             continue
         engine, settings = plan.engines[engine_name]
         settings = _tighten(settings, single)
@@ -160,8 +174,22 @@ def all_rode_float32(document: Mapping[str, Any]) -> bool:
     )
 
 
-def _choose_engines(wanted: list[str] | None) -> dict[str, SinglePrecision]:
-    """Return the chosen engines with what they say of their single precision.
+def _list_unsuitable(scenario: Scenario, names: list[str]) -> dict[str, str]:
+    """Return those of some engines that a scenario does not suit, with the reason."""
+    problem, found = make_start(scenario).problem, {}
+    for name in names:
+        engine, settings = configure_engine(name, scenario.engines.get(name, {}))
+        try:
+            engine.check(problem, settings)
+        except UnsuitableProblem as error:
+            found[name] = " ".join(str(error).split())
+        except Exception:  # `plan_run` says what it is
+            continue
+    return found
+
+
+def _choose_engines(wanted: list[str] | None) -> tuple[dict[str, SinglePrecision], frozenset[str]]:
+    """Return the chosen engines with what they say of their single precision, and those chosen by name.
 
     Raises
     ------
@@ -173,15 +201,14 @@ def _choose_engines(wanted: list[str] | None) -> dict[str, SinglePrecision]:
         raise ScenarioError(join_complaints(list(unknown.values())))
     found = {}
     for name in choice.names:
-        if name in choice.named or name in installed_engines():
-            try:
-                single = find_single_precision(load_engine(name))
-            except ValueError as error:
-                if name in choice.named:
-                    raise ScenarioError(str(error)) from error
-                continue  # broken, and not asked for by its name
-            if single is not None:
-                found[name] = single
+        try:
+            single = find_single_precision(load_engine(name))
+        except ValueError as error:
+            if name in choice.named:
+                raise ScenarioError(str(error)) from error
+            continue  # broken, and not asked for by its name
+        if single is not None:
+            found[name] = single
     lacking = [name for name in choice.names if name in choice.named and name not in found and name != REFERENCE]
     if lacking or not found:
         able = [name for name in installed_engines() if _is_able(name)]
@@ -189,7 +216,7 @@ def _choose_engines(wanted: list[str] | None) -> dict[str, SinglePrecision]:
             f"{' and '.join(lacking)} compute{'s' if len(lacking) == 1 else ''}" if lacking else "these engines compute"
         )
         raise ScenarioError(f"--engine: {what} in float64 alone; engines with a float32 are {', '.join(able)}")
-    return found
+    return found, choice.named
 
 
 def _is_able(name: str) -> bool:
@@ -226,8 +253,8 @@ def _ride_double(plan: RunPlan, engine: Engine, settings: Settings, starts: int,
     steps = int(duration / step * (1 + 1e-9)) // block * block
     if steps > _MOST_STEPS:
         raise ScenarioError(
-            f"{plan.name}: the duration of {duration:g} s has {steps} steps; every step is looked at, so that it must be "
-            f"at most {_MOST_STEPS * step:g} s"
+            f"{plan.name}: the duration of {duration:g} s has {steps} steps; every step is looked at, so that it "
+            f"must be at most {_MOST_STEPS * step:g} s"
         )
     problems = _make_problems(plan.start.problem, step, steps, block, starts)
     rides = []
