@@ -10,9 +10,6 @@ from typing import Any
 import numpy as np
 
 from ...engines.admission import ride_engine
-<<<<<<< HEAD
-from ...engines.engine import REFERENCE, Engine, Problem, Settings, Trajectory, why_failed
-=======
 from ...engines.engine import (
     REFERENCE,
     Engine,
@@ -20,10 +17,8 @@ from ...engines.engine import (
     Settings,
     Trajectory,
     UnsuitableProblem,
-    load_engine,
     why_failed,
 )
->>>>>>> float32
 from ...engines.guard import call_engine
 from ...engines.registry import load_engine
 from ...engines.single_precision import (

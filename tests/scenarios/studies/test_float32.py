@@ -13,9 +13,9 @@ from scipy.stats import chi2
 
 from tests.sealing import contents
 from velodrome.engines.admission import ride_engine
-from velodrome.engines.engine import load_engine
 from velodrome.engines.mujoco.rounding import build_rounded_planes
 from velodrome.engines.mujoco.settings import RoundedSettings
+from velodrome.engines.registry import load_engine
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.scenario import load_scenario, make_start
 from velodrome.scenarios.studies import all_rode_float32, study_float32, write_float32
