@@ -40,7 +40,7 @@ from velodrome.scenarios.gate import sample as gate_sample
 from velodrome.scenarios.gate.exact import find_exact, scale_of
 from velodrome.scenarios.gate.verdict import ABSOLUTE, HELD_CPU, RIDE_QUANTITIES, SHOWN, Verdict
 from velodrome.scenarios.run.runner import configure_engine
-from velodrome.scenarios.scenario import engine_settings
+from velodrome.scenarios.scenario import EngineChoice, engine_settings
 from velodrome.scenarios.scenario.schema import LIBRARY, Gate, Perturbation, Scenario, load_scenario
 from velodrome.scenarios.scenario.start import make_start
 
@@ -120,6 +120,24 @@ def test_an_engine_that_no_gated_motion_suits_fails_only_if_it_was_asked_for(mon
     monkeypatch.setattr(engine_settings, "default_engines", lambda: ["exudyn-builtin"])
     with pytest.raises(ScenarioError, match="nothing was judged"):
         gate.check_gate(lambda *_: None, ["q2"])
+
+
+def test_engines_with_long_rides_ride_what_is_declared_and_what_has_a_baseline() -> None:
+    declared = gate.gate_scenarios()
+    assert {scenario for names in declared.values() for scenario in names} <= {*gate.gated_names()}
+    choice = EngineChoice(("reference", "mjx"), frozenset())
+    riding = {name: gate._choose_for_scenario(choice, name, {}).names for name in ("iftomm-2", "p1")}
+    assert riding == {"iftomm-2": ("reference", "mjx"), "p1": ("reference",)}
+    assert gate._choose_for_scenario(choice, "p1", {"mjx": {}}).names == choice.names
+
+
+def test_engines_with_a_baseline_and_without_their_library_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    missing = {"drake-native": "pip install drake", "mjx": "pip install mjx", "other": "pip install other"}
+    monkeypatch.setattr(gate, "uninstalled_engines", lambda: missing)
+    assert gate.list_left_out() == {name: missing[name] for name in ("drake-native", "mjx")}
+    assert list(gate.list_left_out(sources=["p1"])) == ["drake-native"]
+    known = {"p1": gate.read_baseline("p1")}
+    assert "drake-native" not in gate._engines_to_judge(None, known).names
 
 
 @pytest.mark.usefixtures("rides_only")
