@@ -23,7 +23,7 @@ import numpy as np
 
 from ..engine import EngineError
 from .library import callbacks_set_aside
-from .releases import CONTACT_FORM, is_present
+from .releases import CONTACT_FORM, EDGES, is_present
 
 _SIZES = {
     "mjtNum": 8,
@@ -136,6 +136,8 @@ def _structure_layout(name: str) -> tuple[dict[str, int], int, int]:
 
 
 def _check_functions() -> None:
+    if (refusal := EDGES.find_refusal("a knife edge")) is not None:
+        raise EngineError(refusal)
     known = _describe("functions").FUNCTIONS
     for name, expected in _CALLED.items():
         parameters = known[name].parameters if name in known else ()

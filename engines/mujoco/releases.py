@@ -10,7 +10,7 @@ from __future__ import annotations
 from ..releases import Adaptation, LibraryReach
 
 # Values of settings that older releases do not know.
-_VALUES = {("integrator", "discrete"): "4.0.0"}
+_VALUES = {("integrator", "discrete"): "3.13.0"}
 RESET = Adaptation(
     name="autoreset",
     since="3.2.1",
@@ -48,7 +48,9 @@ CONTACT_FORM = Adaptation(
     how="replaced",
     text="contacts are given to MuJoCo as mjContact, whose first fields are those of mjPreContact",
 )
-_DESCRIPTION = "mujoco.introspect, the description of its structures"
+# Before, it lacked the motion of the point to which the Jacobian belongs: nothing where wheels roll, but much where
+# they slide. The description of the structures, mujoco.introspect, came one release earlier.
+_RATE = "mj_jacDot with all its terms"
 
 PLANES = LibraryReach(
     "mujoco",
@@ -59,9 +61,9 @@ PLANES = LibraryReach(
     values=_VALUES,
 )
 EDGES = LibraryReach(
-    "mujoco", "MuJoCo", oldest="3.3.0", needs=_DESCRIPTION, adaptations=(INERTIA, GAP, CONTACT_FORM), values=_VALUES
+    "mujoco", "MuJoCo", oldest="3.3.1", needs=_RATE, adaptations=(INERTIA, GAP, CONTACT_FORM), values=_VALUES
 )
-ROLLING = LibraryReach("mujoco", "MuJoCo", oldest="3.3.0", needs=_DESCRIPTION, values=_VALUES)
+ROLLING = LibraryReach("mujoco", "MuJoCo", oldest="3.3.1", needs=_RATE, values=_VALUES)
 
 
 def is_present(adaptation: Adaptation) -> bool:

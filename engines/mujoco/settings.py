@@ -29,7 +29,7 @@ WRONG = 0.01
 SLOPE = 1e-14
 
 
-# "discrete" solves for the contact forces in the effective inertia of the whole step; MuJoCo 4.0 is the first with it.
+# "discrete" solves for the contact forces in the effective inertia of the whole step; MuJoCo 3.13 is the first with it.
 Integrator = Literal["Euler", "implicit", "implicitfast", "RK4", "discrete"]
 # Exact contacts are corrected for the inertia of the tree itself; without contacts "discrete" is "implicitfast".
 TreeIntegrator = Literal["Euler", "implicit", "implicitfast", "RK4"]

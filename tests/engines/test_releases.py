@@ -97,8 +97,8 @@ def test_adaptations_have_a_first_and_a_last_release(installed: Any) -> None:
 
 def test_values_that_a_release_lacks_are_refused(installed: Any) -> None:
     engine = load_engine("mujoco-native")
-    installed("3.17.0")
-    with pytest.raises(UnsuitableProblem, match=r"integrator 'discrete' needs MuJoCo 4\.0\.0 or newer .* is 3\.17\.0"):
+    installed("3.12.0")
+    with pytest.raises(UnsuitableProblem, match=r"integrator 'discrete' needs MuJoCo 3\.13\.0 or newer .* is 3\.12\.0"):
         engine.check(start_problem(), NativeSettings(integrator="discrete"))
     engine.check(start_problem(), NativeSettings())
 
@@ -228,6 +228,13 @@ def test_description_of_another_release_is_not_taken(monkeypatch: pytest.MonkeyP
     with pytest.raises(EngineError, match=r"no description of its structures, mujoco\.introspect; MuJoCo 3\.3 has"):
         layout.find_layout()
     layout._describe.cache_clear()
+
+
+def test_knife_edges_are_refused_where_the_engine_is(installed: Any) -> None:
+    layout.find_layout.cache_clear()
+    installed("3.3.0")
+    with pytest.raises(EngineError, match=r"a knife edge needs MuJoCo 3\.3\.1 or newer"):
+        layout.find_layout()
 
 
 def test_watching_needs_no_description(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -380,7 +387,7 @@ def test_native_model_rides_with_old_releases_of_mujoco(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("version", ["3.3.0", "3.8.1"])
+@pytest.mark.parametrize("version", ["3.3.1", "3.8.1"])
 @pytest.mark.parametrize("engine", ["mujoco-exact-contact", "mujoco-multipliers"])
 def test_exact_models_ride_with_old_releases_of_mujoco(releases: Any, version: str, engine: str) -> None:
     folder = releases("mujoco", version)
