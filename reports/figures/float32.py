@@ -42,11 +42,15 @@ def float32_figure(path: Path, document: Mapping[str, Any]) -> None:
             predicted = np.array([max(point["unrelated_digits"], point["repeated_digits"]) for point in points])
             ax.plot(time, measured, color=shade, marker=_MARKERS[k % len(_MARKERS)], ms=4, ls="none", label=label)
             ax.plot(time, predicted, color=shade, lw=1)
-        if document["reference_distance"]:
-            time, distance = zip(
-                *((row["time"], row["distance"]) for row in document["reference_distance"]), strict=True
+        rest = document["reference_distance"]
+        if rest:
+            ax.plot(
+                [row["time"] for row in rest],
+                [row["distance"] for row in rest],
+                color=GREY,
+                ls=":",
+                label="float64, from the reference",
             )
-            ax.plot(time, distance, color=GREY, ls=":", label="float64, from the reference")
         ax.set(xscale="log", yscale="log", xlabel="time [s]", ylabel="distance of D from float64 [m]")
         ax.grid(True)
         figure.legend(*ax.get_legend_handles_labels(), loc="outside right upper")
