@@ -37,7 +37,7 @@ def read_engines(package: Path) -> dict[str, str]:
 def read_commands(package: Path) -> list[str]:
     guide = (package / "README.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```sh\n(.*?)^```$", guide, re.DOTALL | re.MULTILINE)
-    return "".join(blocks).splitlines()
+    return [str(line) for line in "".join(blocks).splitlines()]
 
 
 def test_there_are_packages() -> None:
