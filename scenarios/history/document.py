@@ -1,19 +1,41 @@
-"""The JSON document of a history: rows, the verdicts between neighbouring releases, and the turning points."""
+"""The JSON documents of a history: rows, verdicts between neighbouring releases, turning points and their rides."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
+from .pairs import list_suite_versions, make_pair_document
 from .plan import HistoryPlan, PlannedRide
 from .ride import NOT_INSTALLABLE, RODE
 from .verdicts import StepVerdict, judge_step
 
+if TYPE_CHECKING:
+    from ...reports.page import AnchorNames
 
-def make_history_document(
+PAIRS_FOLDER = "rides"  # of the pages of turning points, beside the document
+
+
+@dataclass(frozen=True)
+class HistoryDocuments:
+    """The document of a history, and those of the rides of its turning points.
+
+    Attributes
+    ----------
+    history : dict
+    pairs : dict
+        By name of the file, without its suffix, which the turning point has as ``page``.
+    """
+
+    history: dict[str, Any]
+    pairs: dict[str, dict[str, Any]]
+
+
+def make_history_documents(
     plan: HistoryPlan, rows: Mapping[PlannedRide, Mapping[str, Any]], *, complete: bool, bisected: bool
-) -> dict[str, Any]:
-    """Return the document of the rows that there are.
+) -> HistoryDocuments:
+    """Return the documents of the rows that there are.
 
     A row is judged against the release before it that could be installed.
 
@@ -27,8 +49,12 @@ def make_history_document(
     bisected : bool
         Whether only some of the releases were ridden.
     """
+    from ...reports.page import AnchorNames  # here, so that the processes that ride do not load the pages
+
     entries: list[dict[str, Any]] = []
     turning_points: list[dict[str, Any]] = []
+    pairs: dict[str, dict[str, Any]] = {}
+    names = AnchorNames()
     last: dict[tuple[str, str], PlannedRide] = {}
     for ride in plan.rides:
         row = rows.get(ride)
@@ -38,22 +64,29 @@ def make_history_document(
         earlier = last.get(pair)
         verdict = None if earlier is None else judge_step(rows[earlier], row)
         since = None if earlier is None else earlier.release.label
-        entries.append(_describe_row(ride, row, verdict, since))
-        if verdict is not None and verdict.moved:
+        date = plan.find_date(ride.release)
+        entries.append(_describe_row(ride, row, date, verdict, since))
+        if earlier is not None and verdict is not None and verdict.moved:
+            found = make_pair_document(plan, (earlier, ride), (rows[earlier], row), verdict)
+            name = None if found is None else _name_pair(names, earlier, ride)
+            if found is not None and name is not None:
+                pairs[name] = found
             turning_points.append(
                 {
                     "version": ride.release.version,
                     "release": ride.release.label,
+                    "date": date,
                     "since": since,
                     "engine": ride.engine,
                     "scenario": ride.scenario,
                     "verdict": verdict.status,
                     "quantities": [move.as_json() for move in verdict.moves],
+                    "page": None if name is None else f"{PAIRS_FOLDER}/{name}.html",
                 }
             )
         if row["status"] != NOT_INSTALLABLE:
             last[pair] = ride
-    return {
+    document = {
         "package": plan.package,
         "scenarios": {name: ride.title for name, ride in plan.scenarios.items()},
         "engines": list(plan.engines),
@@ -62,15 +95,23 @@ def make_history_document(
         "remarks": list(plan.remarks),
         "releases": entries,
         "turning_points": turning_points,
+        "libraries": list_suite_versions(plan.package),
     }
+    return HistoryDocuments(document, pairs)
+
+
+def _name_pair(names: AnchorNames, before: PlannedRide, after: PlannedRide) -> str:
+    versions = [f"{one.release.version}{'-wheel' if one.release.wheel else ''}" for one in (before, after)]
+    return names.choose(after.engine, after.scenario, *versions)
 
 
 def _describe_row(
-    ride: PlannedRide, row: Mapping[str, Any], verdict: StepVerdict | None, since: str | None
+    ride: PlannedRide, row: Mapping[str, Any], date: str | None, verdict: StepVerdict | None, since: str | None
 ) -> dict[str, Any]:
     return {
         "version": ride.release.version,
         "release": ride.release.label,
+        "date": date,
         "wheel": None if ride.release.wheel is None else ride.release.wheel.name,
         "engine": ride.engine,
         "scenario": ride.scenario,

@@ -12,7 +12,7 @@ from typing import Any
 
 from .bisect import bisect_history
 from .children import Children, StoppedError
-from .document import make_history_document
+from .document import make_history_documents
 from .environments import NotInstallable, open_environment
 from .plan import HistoryPlan, PlannedRide
 from .problems import store_rides
@@ -51,7 +51,7 @@ class HistoryOptions:
 def run_history(
     plan: HistoryPlan, folder: HistoryFolder, options: HistoryOptions, watch: HistoryWatch, children: Children
 ) -> tuple[dict[str, Any], list[Path]]:
-    """Ride what is missing, and write the document and the table.
+    """Ride what is missing, and write the documents, the table and the pages.
 
     Ctrl-C ends the rides that run; the finished ones are in the document, which is then not complete.
 
@@ -84,8 +84,8 @@ def run_history(
         finally:
             children.stop()
         found = {ride: rows[ride] for ride in plan.rides if ride in rows}
-        document = make_history_document(plan, found, complete=complete, bisected=options.bisect)
-        return document, folder.finish(document, found)
+        documents = make_history_documents(plan, found, complete=complete, bisected=options.bisect)
+        return documents.history, folder.finish(documents, found)
 
 
 def _ride_all(

@@ -1,0 +1,177 @@
+"""A quantity over the releases of a package, drawn without a script: lines in an SVG, marks and labels beside it.
+
+The axis shows values of the data only: the smallest and the largest one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .curves import round_values
+
+_DIGITS = 5
+_PADDING = 0.06  # of the axis, beyond the smallest and the largest value
+LABEL_SPACING = 15.0  # least distance of two labels [percent of the figure's height]
+_LOG_FROM = 10.0  # ratio of the largest to the smallest value from which the axis is logarithmic
+_LABEL_ROOM = 24.0  # least distance of two labels of releases [percent of the figure's width]
+_MOST_DIGITS = 17
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """A linear or logarithmic axis from low to high; places are from 0, at the top, to 100."""
+
+    low: float
+    high: float
+    log: bool
+
+    def place(self, value: float) -> float:
+        low, high, at = self.low, self.high, value
+        if self.log:
+            # Below the axis, which has no place for values that are not positive.
+            low, high, at = math.log10(low), math.log10(high), math.log10(max(value, self.low * 0.1))
+        share = (at - low) / (high - low)
+        return round_values(min(100.0, max(0.0, 100 * (1 - share))), _DIGITS)
+
+
+def format_distinct(values: Sequence[float], digits: int = 3) -> list[str]:
+    """Return numbers with so many digits, at least three, that different ones look different."""
+    for count in range(digits, _MOST_DIGITS + 1):
+        found = [format(value, f".{count}g") for value in values]
+        if len(set(found)) == len(set(values)):
+            return found
+    return [repr(value) for value in values]
+
+
+def find_limit(row: Row, name: str) -> float | None:
+    """Return by how much a quantity of a row may differ from that of the release before it."""
+    return row["limits"].get(name)
+
+
+def draw_releases(rows: Sequence[Row], name: str, absolute: bool = False) -> dict[str, Any] | None:
+    """Place a quantity of the releases of one engine and scenario.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Rows of the document of `velodrome history`, oldest first.
+    name : str
+        Quantity.
+    absolute : bool
+        Whether the limit is one of the value itself, and not of its change.
+
+    Returns
+    -------
+    dict or None
+        ``log``; ``line``, an SVG path; ``marks`` with ``at``, ``up``, ``row`` (index) and ``moved``; ``bands`` with
+        ``at``, ``width``, ``top`` and ``height`` of what the limit allows; ``gaps`` with ``at`` and ``width`` of
+        releases that did not ride; ``labels`` of values with ``up`` and ``text``; ``releases`` with ``at``, ``row`` and
+        ``side``. None where no release has a value.
+    """
+    values = [row["quantities"].get(name) for row in rows]
+    there = [value for value in values if value is not None]
+    if not there:
+        return None
+    bands = _find_bands(rows, values, name, absolute)
+    scale = _fit_scale(there, [edge for _, low, high in bands for edge in (low, high)])
+    width = 100 / len(rows)
+
+    def centre(number: int) -> float:
+        return round_values((number + 0.5) * width, _DIGITS)
+
+    def boundary(number: int) -> float:
+        return round_values(number * width, _DIGITS)
+
+    return {
+        "log": scale.log,
+        "line": _write_lines([None if v is None else (centre(k), scale.place(v)) for k, v in enumerate(values)]),
+        "marks": [
+            {"at": centre(k), "up": scale.place(value), "row": k, "moved": name in rows[k]["changed"]}
+            for k, value in enumerate(values)
+            if value is not None
+        ],
+        "bands": [
+            {
+                "at": boundary(k),
+                "width": round_values(width, _DIGITS),
+                "top": scale.place(high),
+                "height": round_values(scale.place(low) - scale.place(high), _DIGITS),
+            }
+            for k, low, high in bands
+        ],
+        "gaps": [
+            {"at": boundary(k), "width": round_values(width, _DIGITS)}
+            for k, row in enumerate(rows)
+            if row["status"] != "rode"
+        ],
+        "labels": _label_values(there, scale),
+        "releases": _label_releases(rows, values, name, centre),
+    }
+
+
+def _find_bands(
+    rows: Sequence[Row], values: Sequence[float | None], name: str, absolute: bool
+) -> list[tuple[int, float, float]]:
+    """Return (number of the row, low, high): within these a value counts as that of the release before."""
+    found = []
+    before: float | None = None
+    for number, (row, value) in enumerate(zip(rows, values, strict=True)):
+        limit = find_limit(row, name)
+        if value is not None and limit is not None and absolute:
+            found.append((number, 0.0, limit))
+        elif value is not None and limit is not None and before is not None and row["since_previous"] is not None:
+            found.append((number, before - limit, before + limit))
+        if row["status"] != "not-installable":  # such a release is passed over
+            before = value
+    return found
+
+
+def _fit_scale(values: Sequence[float], edges: Sequence[float]) -> _Scale:
+    low, high = min(values), max(values)
+    if low > 0 and high > _LOG_FROM * low:
+        positive = [edge for edge in edges if edge > 0]
+        low, high = math.log10(min(low, *positive, low)), math.log10(max(high, *positive, high))
+        spare = _PADDING * (high - low)
+        return _Scale(10 ** (low - spare), 10 ** (high + spare), log=True)
+    low, high = min([low, *edges]), max([high, *edges])
+    spare = _PADDING * (high - low) or 0.5 * abs(high) or 1.0
+    return _Scale(low - spare, high + spare, log=False)
+
+
+def _write_lines(places: Sequence[tuple[float, float] | None]) -> str:
+    """Return an SVG path through the places, broken where one is missing."""
+    path, drawing = "", False
+    for place in places:
+        if place is not None:
+            path += f"{'L' if drawing else 'M'}{place[0]:g} {place[1]:g}"
+        drawing = place is not None
+    return path
+
+
+def _label_values(values: Sequence[float], scale: _Scale) -> list[dict[str, Any]]:
+    ends = sorted({max(values), min(values)}, reverse=True)
+    if len(ends) == 2 and abs(scale.place(ends[0]) - scale.place(ends[1])) < LABEL_SPACING:
+        ends = ends[:1]  # two labels would lie on each other
+    return [{"up": scale.place(value), "text": text} for value, text in zip(ends, format_distinct(ends), strict=True)]
+
+
+def _label_releases(
+    rows: Sequence[Row], values: Sequence[float | None], name: str, centre: Any
+) -> list[dict[str, Any]]:
+    """Return the releases named at the axis: the first, the last, and those between that moved the quantity."""
+    last = len(rows) - 1
+    found = [{"at": 0.0, "row": 0, "side": "left"}]
+    if last > 0:
+        found.append({"at": 100.0, "row": last, "side": "right"})
+    for number, value in enumerate(values):
+        at = centre(number)
+        if value is None or name not in rows[number]["changed"] or number in (0, last):
+            continue
+        if all(abs(at - other["at"]) >= _LABEL_ROOM for other in found):
+            found.append({"at": at, "row": number, "side": "middle"})
+    return found
