@@ -120,12 +120,14 @@ def find_moved_kind(verdict: str) -> CellKind:
     return _KINDS[verdict]
 
 
-def describe_move(move: Mapping[str, Any]) -> str:
-    """Return how a quantity moved, in words."""
+def _describe_move(move: Mapping[str, Any]) -> tuple[str, str]:
+    """Return a quantity and how it moved; the latter is empty where there are no numbers."""
     if move["quantity"] == _RUN:
-        return {"better": "rides again", "worse": "does not ride any more"}[move["status"]]
+        return {"better": "it rides, and the one before did not", "worse": "it does not ride any more"}[
+            move["status"]
+        ], ""
     before, after = format_numbers(move["before"], move["after"])
-    return f"{format_title(move['quantity'])} {before} → {after}"
+    return format_title(move["quantity"]), f"{before} → {after}"
 
 
 def rank_moves(moves: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
@@ -211,7 +213,7 @@ def _make_cell(row: Row, anchor: str) -> dict[str, Any]:
         "kind": kind,
         "turn": is_turning_point(row),
         "version": row["version"],
-        "wheel": row["wheel"],
+        "build": row["release"].removeprefix(row["version"]).strip(),
         "words": words,
         "title": f"{_name_release(row)}: {words}",
         "anchor": anchor,
@@ -234,7 +236,7 @@ def _describe_row(row: Row) -> str:
             "same-bits": f"same to the bit as {row['compared_with']}",
             "round-off": f"the same as {row['compared_with']} within round-off",
         }[row["since_previous"]]
-    moved = ", ".join("rides again" if name == _RUN else format_title(name) for name in row["changed"])
+    moved = ", ".join("rides at all" if name == _RUN else format_title(name) for name in row["changed"])
     return f"{row['since_previous']} since {row['compared_with']}: {moved}"
 
 
@@ -321,7 +323,7 @@ def _list_turns(document: Mapping[str, Any], sections: Sequence[Mapping[str, Any
                 | {
                     "anchor": anchors[point["scenario"], point["engine"], point["release"]],
                     "kind": find_moved_kind(point["verdict"]),
-                    "first": describe_move(rank_moves(point["quantities"])[0]),
+                    "first": _describe_move(rank_moves(point["quantities"])[0]),
                     "others": [format_title(move["quantity"]) for move in rank_moves(point["quantities"])[1:]],
                 }
                 for point in found

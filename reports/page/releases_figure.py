@@ -18,6 +18,7 @@ LABEL_SPACING = 15.0  # least distance of two labels [percent of the figure's he
 _LOG_FROM = 10.0  # ratio of the largest to the smallest value from which the axis is logarithmic
 _LABEL_ROOM = 24.0  # least distance of two labels of releases [percent of the figure's width]
 _MOST_DIGITS = 17
+_MOST_LABEL_DIGITS = 7  # of a label beside the figure, which has no room for more
 
 Row = Mapping[str, Any]
 
@@ -39,13 +40,13 @@ class _Scale:
         return round_values(min(100.0, max(0.0, 100 * (1 - share))), _DIGITS)
 
 
-def format_distinct(values: Sequence[float], digits: int = 3) -> list[str]:
-    """Return numbers with so many digits, at least three, that different ones look different."""
-    for count in range(digits, _MOST_DIGITS + 1):
+def format_distinct(values: Sequence[float], least: int = 3, most: int = _MOST_DIGITS) -> list[str]:
+    """Return numbers with as few digits as make different ones look different, from the least to the most."""
+    for count in range(least, most + 1):
         found = [format(value, f".{count}g") for value in values]
         if len(set(found)) == len(set(values)):
             return found
-    return [repr(value) for value in values]
+    return [format(value, f".{most}g") for value in values]
 
 
 def find_limit(row: Row, name: str) -> float | None:
@@ -157,7 +158,10 @@ def _label_values(values: Sequence[float], scale: _Scale) -> list[dict[str, Any]
     ends = sorted({max(values), min(values)}, reverse=True)
     if len(ends) == 2 and abs(scale.place(ends[0]) - scale.place(ends[1])) < LABEL_SPACING:
         ends = ends[:1]  # two labels would lie on each other
-    return [{"up": scale.place(value), "text": text} for value, text in zip(ends, format_distinct(ends), strict=True)]
+    texts = format_distinct(ends, most=_MOST_LABEL_DIGITS)
+    if len(set(texts)) < len(ends):
+        ends, texts = ends[:1], texts[:1]  # they differ in digits for which there is no room
+    return [{"up": scale.place(value), "text": text} for value, text in zip(ends, texts, strict=True)]
 
 
 def _label_releases(

@@ -39,6 +39,7 @@ class HistoryProgress:
         )
         self._console = Console(stderr=True)
         self._bars = bars.Progress(*columns, console=self._console, transient=True)
+        self._told: set[str] = set()
         self._task = self._bars.add_task(plan.package, total=None if bisect else len(plan.rides))
 
     def __enter__(self) -> HistoryProgress:
@@ -53,8 +54,11 @@ class HistoryProgress:
     def watch(self, ride: PlannedRide, row: Mapping[str, Any], fresh: bool) -> None:
         """Count a row; a row of an earlier session is not told again."""
         self._bars.update(self._task, advance=1, description=f"{ride.release.package} {ride.release.label}")
-        if fresh and row["reason"] is not None:
-            self.note(f"{ride.release.label} {ride.engine} {ride.scenario}: {row['status']}: {row['reason']}")
+        line = f"{ride.release.label} {ride.engine}: {row['status']}: {row['reason']}"
+        # The same reason on every scenario is told once.
+        if fresh and row["reason"] is not None and line not in self._told:
+            self._told.add(line)
+            self.note(line)
 
     def note(self, line: str) -> None:
         """Print a line above the bar."""
@@ -78,6 +82,9 @@ def show_history(console: Console, document: Mapping[str, Any]) -> None:
             Column("since the release before", [_describe_step(group[0]) for group in found], right=False),
         ]
         print_table(console, columns)
+    console.print()
+    for release, wheel in {row["release"]: row["wheel"] for row in document["releases"] if row["wheel"]}.items():
+        console.print(f"{release}: {wheel}", style="dim", markup=False, highlight=False, soft_wrap=True)
     _show_turning_points(console, document["turning_points"])
     for line in document["remarks"]:
         console.print(line, style="yellow", markup=False, highlight=False, soft_wrap=True)
@@ -119,7 +126,6 @@ def _describe_step(row: Mapping[str, Any]) -> str:
 
 
 def _show_turning_points(console: Console, points: Sequence[Mapping[str, Any]]) -> None:
-    console.print()
     if not points:
         console.print("no release moved a quantity beyond its limit", style="bold green")
         return
@@ -146,7 +152,7 @@ def _rank_move(move: Mapping[str, Any]) -> float:
 
 def _describe_move(move: Mapping[str, Any]) -> str:
     if move["quantity"] == "run":
-        return {"better": "it rides again", "worse": "it does not ride any more"}[move["status"]]
+        return {"better": "it rides, and the one before did not", "worse": "it does not ride any more"}[move["status"]]
     before, after = ("none" if move[part] is None else f"{move[part]:.6g}" for part in ("before", "after"))
     limit = "" if move["limit"] is None else f", limit {move['limit']:.2g}"
     return f"{move['quantity']}: {move['status']}: {before} -> {after}{limit}"

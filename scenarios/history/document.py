@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .pairs import list_suite_versions, make_pair_document
 from .plan import HistoryPlan, PlannedRide
 from .ride import NOT_INSTALLABLE, RODE
 from .verdicts import StepVerdict, judge_step
-
-if TYPE_CHECKING:
-    from ...reports.page import AnchorNames
 
 PAIRS_FOLDER = "rides"  # of the pages of turning points, beside the document
 
@@ -68,8 +65,9 @@ def make_history_documents(
         entries.append(_describe_row(ride, row, date, verdict, since))
         if earlier is not None and verdict is not None and verdict.moved:
             found = make_pair_document(plan, (earlier, ride), (rows[earlier], row), verdict)
-            name = None if found is None else _name_pair(names, earlier, ride)
-            if found is not None and name is not None:
+            name = None
+            if found is not None:
+                name = names.choose(ride.engine, ride.scenario, earlier.release.label, ride.release.label)
                 pairs[name] = found
             turning_points.append(
                 {
@@ -100,11 +98,6 @@ def make_history_documents(
     return HistoryDocuments(document, pairs)
 
 
-def _name_pair(names: AnchorNames, before: PlannedRide, after: PlannedRide) -> str:
-    versions = [f"{one.release.version}{'-wheel' if one.release.wheel else ''}" for one in (before, after)]
-    return names.choose(after.engine, after.scenario, *versions)
-
-
 def _describe_row(
     ride: PlannedRide, row: Mapping[str, Any], date: str | None, verdict: StepVerdict | None, since: str | None
 ) -> dict[str, Any]:
@@ -112,7 +105,7 @@ def _describe_row(
         "version": ride.release.version,
         "release": ride.release.label,
         "date": date,
-        "wheel": None if ride.release.wheel is None else ride.release.wheel.name,
+        "wheel": None if ride.release.wheel is None else str(ride.release.wheel),
         "engine": ride.engine,
         "scenario": ride.scenario,
         "status": row["status"],

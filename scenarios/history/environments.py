@@ -112,7 +112,7 @@ def open_environment(release: Release, cache: Path, children: Children) -> Relea
 
 
 def _fill_environment(folder: Path, release: Release, children: Children) -> None:
-    wanted = [f"{release.package}=={release.version}" if release.wheel is None else str(release.wheel)]
+    wanted = [f"{release.package}=={release.version}" if release.wheel is None else str(release.wheel.resolve())]
     for _ in range(_DEEPEST):
         # In a folder of its own, since pip replaces whole modules in a folder that has them already.
         own = folder / ".new"

@@ -87,9 +87,9 @@ def measure_distance(before: Row, after: Row) -> dict[str, list[float]]:
 
 
 def write_pair_command(before: Release, after: Release, engine: str, scenario: str) -> str:
-    """Return the command that rides two releases again, for the shell; of a wheel it has the name alone."""
+    """Return the command that rides two releases again, for the shell; wheels are named as the user did."""
     versions = [release.version for release in (before, after) if release.wheel is None]
-    wheels = [release.wheel.name for release in (before, after) if release.wheel is not None]
+    wheels = [str(release.wheel) for release in (before, after) if release.wheel is not None]
     wanted = before.package + ("==" + ",".join(versions) if versions else "")
     named = [part for wheel in wheels for part in ("--wheel", wheel)]
     return shlex.join(["velodrome", "history", wanted, scenario, "--engine", engine, *named, "--out", "two-releases"])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import selectors
-import signal
 import subprocess
 import sys
 import time
@@ -17,8 +16,9 @@ from typing import Any
 
 from .children import Children
 from .environments import ReleaseEnvironment
+from .problems import digest_suite
 from .releases import Release
-from .ride import FAILED, RideSetup
+from .ride import FAILED, RideSetup, describe_exit
 
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
@@ -43,7 +43,7 @@ def ride_tasks(
 ) -> Iterator[dict[str, Any]]:
     """Ride a release's tasks, one after the other, and yield the row of each.
 
-    The process is replaced after a ride that failed, whose traces in it could change the next one.
+    A process that hangs or ends is replaced.
 
     Parameters
     ----------
@@ -56,19 +56,27 @@ def ride_tasks(
     children : Children
     """
     setup = RideSetup(
-        os.getpid(), str(environment.folder), release.package, release.version, str(rides.path), rides.digest
+        parent=os.getpid(),
+        folder=str(environment.folder),
+        package=release.package,
+        version=release.version,
+        rides=str(rides.path),
+        rides_sha256=rides.digest,
+        suite_sha256=digest_suite(),
     )
-    left = list(tasks)
-    while left:
-        process = _start_process(setup, children)
-        try:
-            for scenario, engine in list(left):
-                row = _ask_for_row(process, {"scenario": scenario, "engine": engine}, time_limit, children)
-                left.pop(0)
-                yield row
-                if row["status"] == FAILED:
-                    break
-        finally:
+    process: subprocess.Popen[bytes] | None = None
+    try:
+        for scenario, engine in tasks:
+            if process is None:
+                process = _start_process(setup, children)
+            row = _ask_for_row(process, {"scenario": scenario, "engine": engine}, time_limit)
+            if row is None or "broken" in row:
+                status = children.end(process)
+                process = None
+                row = _describe_lost_process(row, status, time_limit)
+            yield row
+    finally:
+        if process is not None:
             children.end(process)
 
 
@@ -82,18 +90,22 @@ def _start_process(setup: RideSetup, children: Children) -> subprocess.Popen[byt
     return process
 
 
-def _ask_for_row(
-    process: subprocess.Popen[bytes], task: Mapping[str, str], time_limit: float, children: Children
-) -> dict[str, Any]:
+def _ask_for_row(process: subprocess.Popen[bytes], task: Mapping[str, str], time_limit: float) -> dict[str, Any] | None:
+    """Return the answer to a task; None if it does not come in time, ``broken`` if the process has ended or cannot."""
     _say(process, json.dumps(task))
     line = _read_line(process, time.monotonic() + time_limit)
     if line is None:
-        return {"status": FAILED, "reason": f"no result within {time_limit:g} s"}
+        return None
     try:
-        row = json.loads(line)
+        return json.loads(line)
     except ValueError:
-        return {"status": FAILED, "reason": f"its process ended by {_describe_end(children.end(process))}"}
-    return {"status": FAILED, "reason": row["broken"]} if "broken" in row else row
+        return {"broken": None}
+
+
+def _describe_lost_process(answer: Mapping[str, Any] | None, status: int, time_limit: float) -> dict[str, Any]:
+    if answer is None:
+        return {"status": FAILED, "reason": f"no result within {time_limit:g} s"}
+    return {"status": FAILED, "reason": answer["broken"] or f"its process ended by {describe_exit(status)}"}
 
 
 def _say(process: subprocess.Popen[bytes], line: str) -> None:
@@ -118,7 +130,3 @@ def _read_line(process: subprocess.Popen[bytes], due: float) -> bytes | None:
                 break
             data += part
     return data
-
-
-def _describe_end(status: int) -> str:
-    return signal.Signals(-status).name if status < 0 else f"exit status {status}"

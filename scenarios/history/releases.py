@@ -31,7 +31,7 @@ class Release:
         Canonical name of the package.
     version : str
     wheel : Path or None
-        File of a wheel; None for a release of the registry.
+        File of a wheel, as the user named it; None for a release of the registry.
     digest : str or None
         SHA-256 of the wheel in hexadecimal digits.
     """
@@ -43,8 +43,8 @@ class Release:
 
     @property
     def label(self) -> str:
-        """The version, with the name of the file for a wheel."""
-        return self.version if self.wheel is None else f"{self.version} ({self.wheel.name})"
+        """The version, for a wheel with the first digits of its digest, since builds may have a version in common."""
+        return self.version if self.digest is None else f"{self.version} wheel {self.digest[:8]}"
 
     @property
     def key(self) -> str:
@@ -136,7 +136,7 @@ def read_wheel(path: Path, package: str) -> Release:
         raise ScenarioError(f"{where}: is a wheel of {name}, not of {package}")
     if not zipfile.is_zipfile(path):
         raise ScenarioError(f"{where}: is damaged or no wheel: it is no zip file")
-    return Release(package, str(version), path.resolve(), file_digest(path))
+    return Release(package, str(version), path, file_digest(path))
 
 
 def order_releases(package: str, versions: Collection[str], wheels: Sequence[Release]) -> tuple[Release, ...]:

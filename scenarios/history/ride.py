@@ -1,8 +1,9 @@
 """The process that rides one release: ``python -m velodrome.scenarios.history.ride``, in lines of JSON.
 
 Standard input: first the `RideSetup`, then one task per line. Standard output: one line per task. The process lays the
-release's environment over its own before it loads any engine, and holds each result back unless all that was loaded of
-the release's packages comes from there.
+release's environment over its own and loads the reference. Every ride is done by a fork of it, in which the engine's
+library is loaded: no ride can change another one, and a crash ends one ride only. A result is held back unless all
+that was loaded of the release's packages comes from its environment.
 """
 
 from __future__ import annotations
@@ -21,14 +22,14 @@ from typing import Any
 
 import numpy as np
 
-from ...engines.engine import Trajectory, UnsuitableProblem, why_failed
+from ...engines.engine import REFERENCE, Trajectory, UnsuitableProblem, load_engine, why_failed
 from ...engines.guard import call_engine
 from ...engines.storage import digest, trajectory_table
 from ..error import ScenarioError
 from ..gate import SHOWN, take_sample
 from ..run import configure_engine
 from .overlay import WrongRelease, lay_over, require_loaded_from, require_release
-from .problems import MeasuredRide, read_rides
+from .problems import MeasuredRide, digest_suite, read_rides
 
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux's prctl
 _MOST_SAMPLES = 41  # of a stored ride; the digest covers all of it
@@ -51,6 +52,8 @@ class RideSetup:
         The release.
     rides, rides_sha256 : str
         File of the rides, by `velodrome.scenarios.history.problems.store_rides`, and its digest.
+    suite_sha256 : str
+        Digest of the suite's code, with which this process must ride too.
     """
 
     parent: int
@@ -59,6 +62,7 @@ class RideSetup:
     version: str
     rides: str
     rides_sha256: str
+    suite_sha256: str
 
     def line(self) -> str:
         """Return the setup as one line of JSON."""
@@ -78,13 +82,50 @@ def main() -> None:
         folder = Path(setup.folder)
         own = lay_over(folder)
         require_release(folder, setup.package, setup.version)
+        if digest_suite() != setup.suite_sha256:
+            raise WrongRelease("the suite's own code has changed since the history was started")
         rides = read_rides(Path(setup.rides), setup.rides_sha256)
+        _warm_up(next(iter(rides.values())))
     except Exception as error:  # reported to the parent, since there is no other output
         _send(results, {"broken": reason_of_failure(error)})
         sys.exit(1)
     for line in tasks:
         task = json.loads(line)
-        _send(results, ride_release(rides[task["scenario"]], task["engine"], own))
+        _send(results, _ride_in_fork(rides[task["scenario"]], task["engine"], own))
+
+
+def _ride_in_fork(ride: MeasuredRide, engine: str, own: list[Path]) -> dict[str, Any]:
+    """Ride in a fork of this process, and return the row."""
+    ours, theirs = os.pipe()
+    parent = os.getpid()
+    child = os.fork()
+    if child == 0:
+        status = 1
+        try:
+            _die_with(parent)
+            _send(theirs, ride_release(ride, engine, own))
+            status = 0
+        finally:
+            os._exit(status)
+    os.close(theirs)
+    with os.fdopen(ours, "rb") as answer:
+        line = answer.readline()  # up to its end, or to the end of the process
+    _, ended = os.waitpid(child, 0)
+    try:
+        return json.loads(line)
+    except ValueError:
+        return {"status": FAILED, "reason": f"its process ended by {describe_exit(os.waitstatus_to_exitcode(ended))}"}
+
+
+def describe_exit(status: int) -> str:
+    """Return words for the exit status of a process, negative for a signal."""
+    return signal.Signals(-status).name if status < 0 else f"exit status {status}"
+
+
+def _warm_up(ride: MeasuredRide) -> None:
+    """Load what every ride needs, so that its fork has it."""
+    reference = load_engine(REFERENCE)
+    take_sample(ride.start, ride.exact, ride.gate, reference, reference.settings(), lambda _: None)
 
 
 def ride_release(ride: MeasuredRide, name: str, own: list[Path]) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import runpy
 import subprocess
 import sys
 from importlib import import_module
@@ -16,7 +17,7 @@ from command_pages import commands, describe_commands, option_names
 from documents import COMMON, documented, find_key, find_paths
 from engine_settings import describe_engines, own_engines
 from generated import GENERATORS, MARK, fill_page
-from pages import source_pages
+from pages import ROOT, source_pages
 from scenario_files import describe_scenario_file, describe_sweep_file, scenario_tables
 
 import velodrome
@@ -127,6 +128,7 @@ DOCUMENTS = {
         "precision q2 --engine mujoco-multipliers --duration 1 --levels 2 --set simulation.output_rate=25 --json"
     ],
     "league": ["league plane-circle --engine mujoco-native --duration 0.5 --json"],
+    "history": ["history wheelmill==1.0,1.1 circle.toml --cache cache --json"],
     "sweep": ["sweep sweep.toml --json"],
     "critical": ["critical --json"],
     "atlas": ["atlas --size 2000 --json"],
@@ -155,8 +157,12 @@ def test_what_a_manifest_may_say_of_the_platform_is_in_the_reference(monkeypatch
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in DOCUMENTS]
 )
-def test_every_key_of_a_document_is_in_the_reference(name: str, tmp_path: Path) -> None:
+def test_every_key_of_a_document_is_in_the_reference(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "sweep.toml").write_text(SWEEP, encoding="utf-8")
+    if name == "history":
+        make_releases(tmp_path, monkeypatch)
     printed = ""
     for line in DOCUMENTS[name]:
         printed = typed(line, tmp_path)
@@ -170,6 +176,16 @@ def test_every_key_of_a_document_is_in_the_reference(name: str, tmp_path: Path) 
     assert [path for path, key in found.items() if key is None] == []
     unseen = {key for key in keys if key not in found.values()}
     assert [key for key in unseen if not any(word in keys[key] for word in SOMETIMES)] == []
+
+
+def make_releases(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make a registry of two releases of a tiny package, with an engine that rides in them, and a scenario."""
+    mill = runpy.run_path(str(ROOT / "tests" / "scenarios" / "history" / "mill.py"))
+    mill["install_mill"](folder / "installed", monkeypatch)
+    mill["use_registry"](folder / "registry", monkeypatch)
+    mill["make_wheel"](folder / "registry", "1.0")
+    mill["make_wheel"](folder / "registry", "1.1", stretch=mill["FAULT"])
+    (folder / "circle.toml").write_text(mill["CIRCLE"], encoding="utf-8")
 
 
 def typed(line: str, folder: Path) -> str:

@@ -1,0 +1,121 @@
+"""What of a release's environment is laid over, and what is never loaded from elsewhere."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from velodrome.scenarios.history.requirements import RequirementConflict, find_suite_packages, list_unmet
+
+_PROBE = """
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from velodrome.scenarios.history.overlay import WrongRelease, lay_over, require_loaded_from, require_release
+own = lay_over(Path(sys.argv[1]))
+try:
+    require_release(Path(sys.argv[1]), "mill", "2.0")
+    {body}
+    require_loaded_from(own)
+except (WrongRelease, ImportError) as error:
+    print(f"{{type(error).__name__}}: {{error}}")
+else:
+    print("right")
+"""
+
+
+def write_package(
+    folder: Path, name: str, version: str, needs: str = "", modules: Mapping[str, str] | None = None
+) -> None:
+    """Write a package as pip would install it, with modules by their paths."""
+    info = folder / f"{name}-{version}.dist-info"
+    info.mkdir(parents=True)
+    requires = f"Requires-Dist: {needs}\n" if needs else ""
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n{requires}")
+    record = []
+    for module, text in (modules or {}).items():
+        path = folder / module
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        record.append(f"{path.relative_to(folder)},,\n")
+    (info / "RECORD").write_text("".join(record))
+
+
+@pytest.mark.parametrize("needs", ["numpy", "numpy>=1", "numpy; python_version < '3'", "absent; extra == 'all'"])
+def test_what_the_suite_has_is_not_laid_over(needs: str, tmp_path: Path) -> None:
+    write_package(tmp_path, "mill", "2.0", needs, {"mill.py": ""})
+    assert list_unmet(tmp_path, "mill") == []
+
+
+def test_what_the_suite_has_not_is_laid_over(tmp_path: Path) -> None:
+    write_package(tmp_path, "mill", "2.0", "mill-companion[fine]>=1.0", {"mill.py": ""})
+    assert list_unmet(tmp_path, "mill") == ["mill-companion[fine]>=1.0"]
+
+
+def test_a_companion_of_the_same_module_is_laid_over_although_the_suite_has_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_package(tmp_path / "suite", "mill-core", "2.0", "", {"mill/core.py": ""})
+    write_package(tmp_path / "own", "mill", "2.0", "mill-core==2.0", {"mill/face.py": ""})
+    monkeypatch.syspath_prepend(str(tmp_path / "suite"))
+    assert list_unmet(tmp_path / "own", "mill") == ["mill-core==2.0"]
+
+
+def test_what_the_reference_needs_is_never_replaced(tmp_path: Path) -> None:
+    assert {"numpy", "scipy", "llvmlite"} <= find_suite_packages("mujoco")
+    assert "mujoco-core" not in find_suite_packages("mujoco")
+    write_package(tmp_path, "mill", "2.0", "numpy<1", {"mill.py": ""})
+    with pytest.raises(RequirementConflict, match=r"mill needs numpy<1, and numpy is .* in the suite's environment"):
+        list_unmet(tmp_path, "mill")
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        ("import mill", "right"),
+        ("import mill.face", "right"),
+        ("pass", "WrongRelease: the engine loaded nothing of the release"),
+        # The suite's own release has a module that this one has not.
+        ("import mill.extra", "ModuleNotFoundError: No module named 'mill.extra' in the release"),
+        (
+            "import runpy, importlib.util as u; s = u.spec_from_file_location('mill.stray', OTHER / 'mill/extra.py'); "
+            "m = u.module_from_spec(s); sys.modules['mill.stray'] = m",
+            "WrongRelease: module mill.stray was loaded from",
+        ),
+    ],
+)
+def test_only_the_release_itself_is_loaded(body: str, told: str, tmp_path: Path) -> None:
+    extending = "__path__ = __import__('pkgutil').extend_path(__path__, __name__)\n"
+    write_package(tmp_path / "suite", "mill", "1.0", "", {"mill/__init__.py": extending, "mill/extra.py": ""})
+    write_package(tmp_path / "own", "mill", "2.0", "", {"mill/__init__.py": extending, "mill/face.py": ""})
+    found = probe(tmp_path, body)
+    assert found.startswith(told)
+
+
+def probe(tmp_path: Path, body: str) -> str:
+    """Lay the release in ``own`` over the one in ``suite``, in a process of its own, and run a line."""
+    script = f"import sys; sys.path.insert(0, {str(tmp_path / 'suite')!r})\n" + _PROBE.format(
+        body=body.replace("OTHER", f"Path({str(tmp_path / 'suite')!r})")
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path / "own")], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_another_release_than_the_one_asked_for_is_seen(tmp_path: Path) -> None:
+    write_package(tmp_path / "suite", "mill", "2.0", "", {"mill.py": ""})
+    write_package(tmp_path / "own", "mill", "2.1", "", {"mill.py": ""})
+    assert probe(tmp_path, "import mill").startswith("WrongRelease: mill 2.0 was asked for, and 2.1 in")
+
+
+def test_path_files_of_the_environment_come_first(tmp_path: Path) -> None:
+    write_package(tmp_path / "suite", "mill", "1.0", "", {"mill.py": "WHERE = 'suite'"})
+    write_package(tmp_path / "own", "mill", "2.0", "", {"prefix/mill.py": "WHERE = 'own'"})
+    (tmp_path / "own" / "mill.pth").write_text("prefix\n")
+    assert probe(tmp_path, "import mill; assert mill.WHERE == 'own'") == "right"
