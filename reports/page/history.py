@@ -60,7 +60,8 @@ def group_releases(rows: Sequence[Row]) -> list[list[Row]]:
     numbered: list[tuple[int, Row]] = []
     number, before = 0, None
     for row in rows:
-        state = (row["status"], row["reason"])
+        # A reason that names the release is the same for the next one.
+        state = (row["status"], (row["reason"] or "").replace(row["version"], ""))
         if before is not None and (is_turning_point(row) or state != before):
             number += 1
         before = state
@@ -186,7 +187,7 @@ def _make_pair(
         {
             "anchor": anchors.choose(scenario, engine, group[0]["version"]),
             "rows": group,
-            "text": _describe_group(group),
+            "text": _describe_group(group, points.get(group[0]["release"])),
             "point": _describe_point(points.get(group[0]["release"])),
         }
         for group in group_releases(rows)
@@ -196,6 +197,7 @@ def _make_pair(
     drawn = [figure for figure in figures if figure is not None]
     return {
         "engine": engine,
+        "number": list(document["engines"]).index(engine),
         "anchor": anchors.choose(scenario, engine),
         "rows": rows,
         "cells": [_make_cell(row, group["anchor"]) for group in groups for row in group["rows"]],
@@ -240,8 +242,10 @@ def _describe_row(row: Row) -> str:
     return f"{row['since_previous']} since {row['compared_with']}: {moved}"
 
 
-def _describe_group(group: Sequence[Row]) -> str:
-    """Return what the releases of a group have in common."""
+def _describe_group(group: Sequence[Row], point: Mapping[str, Any] | None) -> str | None:
+    """Return what the releases of a group have in common; None where the turning point alone says all."""
+    if len(group) == 1 and point is not None and group[0]["status"] == "rode":
+        return None
     if group[0]["status"] != "rode":
         return f"{group[0]['status']}: {group[0]['reason']}"
     inside = {row["since_previous"] for row in group[1:]}
@@ -259,12 +263,13 @@ def _describe_point(point: Mapping[str, Any] | None) -> dict[str, Any] | None:
         "kind": find_moved_kind(point["verdict"]),
         "moves": [
             {
-                "title": "rides at all" if move["quantity"] == _RUN else format_title(move["quantity"]),
+                "title": format_title(move["quantity"]),
                 "unit": describe_unit(move["quantity"]),
                 "cells": [*format_numbers(move["before"], move["after"]), format_limit(move["limit"])],
                 "kind": find_moved_kind(move["status"]),
             }
             for move in rank_moves(point["quantities"])
+            if move["quantity"] != _RUN
         ],
         "page": point["page"],
     }

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from .curves import round_values
 from .document import list_engine_styles, load_template, read_part
-from .history import describe_unit, find_moved_kind, format_limit, format_numbers
+from .history import describe_unit, find_moved_kind, format_limit, format_numbers, rank_moves
 from .judged_quantities import format_title
 from .loglog import fit_axis
 from .releases_figure import LABEL_SPACING
@@ -126,7 +126,7 @@ def _list_facts(document: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def _make_rows(document: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the quantities, those that moved first, with their values on both sides, limit and sign."""
-    moved = {move["quantity"]: move for move in document["moved"]}
+    moved = {move["quantity"]: move for move in rank_moves(document["moved"])}
     before, after = (document[side]["quantities"] for side in _SIDES)
     names = [*moved, *(name for name in dict.fromkeys([*after, *before]) if name not in moved)]
     return [
