@@ -25,18 +25,28 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class _Scale:
-    """A linear or logarithmic axis from low to high; places are from 0, at the top, to 100."""
+    """A linear or logarithmic axis; places are from 0, at the top, to 100.
+
+    Attributes
+    ----------
+    low, high : float
+        Ends: values over the unit, or their decimal logarithms.
+    unit : float
+        Largest size of any value on a linear axis, so that no difference overflows; 1 on a logarithmic one.
+    log : bool
+    """
 
     low: float
     high: float
+    unit: float
     log: bool
 
     def place(self, value: float) -> float:
-        low, high, at = self.low, self.high, value
+        """Return the place of a value; one beyond the axis is at its end."""
+        at = value / self.unit
         if self.log:
-            # Below the axis, which has no place for values that are not positive.
-            low, high, at = math.log10(low), math.log10(high), math.log10(max(value, self.low * 0.1))
-        share = (at - low) / (high - low)
+            at = math.log10(at) if at > 0 else self.low
+        share = (at - self.low) / (self.high - self.low)
         return round_values(min(100.0, max(0.0, 100 * (1 - share))), _DIGITS)
 
 
@@ -134,14 +144,15 @@ def _find_bands(
 
 def _fit_scale(values: Sequence[float], edges: Sequence[float]) -> _Scale:
     low, high = min(values), max(values)
-    if low > 0 and high > _LOG_FROM * low:
+    log = low > 0 and high / _LOG_FROM > low
+    if log:
         positive = [edge for edge in edges if edge > 0]
-        low, high = math.log10(min(low, *positive, low)), math.log10(max(high, *positive, high))
-        spare = _PADDING * (high - low)
-        return _Scale(10 ** (low - spare), 10 ** (high + spare), log=True)
-    low, high = min([low, *edges]), max([high, *edges])
-    spare = _PADDING * (high - low) or 0.5 * abs(high) or 1.0
-    return _Scale(low - spare, high + spare, log=False)
+        unit, low, high = 1.0, math.log10(min([low, *positive])), math.log10(max([high, *positive]))
+    else:
+        unit = max(abs(value) for value in (*values, *edges)) or 1.0
+        low, high = min([low, *edges]) / unit, max([high, *edges]) / unit
+    spare = _PADDING * (high - low) or 0.5
+    return _Scale(low - spare, high + spare, unit, log)
 
 
 def _write_lines(places: Sequence[tuple[float, float] | None]) -> str:
