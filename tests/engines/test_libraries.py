@@ -8,7 +8,13 @@ from pathlib import Path
 import pytest
 
 from velodrome.engines import engine as registry
-from velodrome.engines.engine import default_engines, engine_names, load_engine, uninstalled_engines
+from velodrome.engines.engine import (
+    default_engines,
+    engine_names,
+    list_library_packages,
+    load_engine,
+    uninstalled_engines,
+)
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run import plan_run
 from velodrome.scenarios.scenario import choose_engines, list_engine_faults, load_scenario
@@ -104,3 +110,18 @@ def test_an_entry_that_chooses_nothing_is_refused(package: None, entry: str, mes
 def test_settings_of_engines_that_are_not_installed_are_no_fault(package: None) -> None:
     assert list_engine_faults({"flywheel-absent": {"step": 1.0}}) == []
     assert len(list_engine_faults({"flywheel-unknown": {}})) == 1
+
+
+@pytest.mark.parametrize(
+    ("engine", "packages"),
+    [
+        ("mujoco-native", ("mujoco",)),
+        ("exudyn-builtin", ("exudyn",)),
+        ("reference", ("velodrome",)),
+        ("flywheel", ("flywheel",)),
+        ("flywheel-present", ("numpy",)),
+    ],
+)
+@pytest.mark.usefixtures("package")
+def test_the_packages_whose_releases_an_engine_rides_in(engine: str, packages: tuple[str, ...]) -> None:
+    assert list_library_packages(engine) == packages

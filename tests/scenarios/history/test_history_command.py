@@ -81,7 +81,7 @@ def test_every_kind_of_release_has_its_row(velodrome, registry: Path, tmp_path: 
         "1.0": ("rode", None),
         "1.1": ("rode", "same-bits"),
         "1.2": ("rode", "round-off"),
-        "1.3": ("rode", "worse"),
+        "1.3": ("rode", "changed"),  # the fault cancels a part of the error of some quantities
         "1.4": ("failed", "worse"),
         "1.5": ("failed", None),
         "1.6": ("refused", None),
@@ -100,7 +100,7 @@ def test_every_kind_of_release_has_its_row(velodrome, registry: Path, tmp_path: 
     assert [point["version"] for point in document["turning_points"]] == ["1.3", "1.4", "1.10"]
     assert {path.name.split("-")[1] for path in cached(tmp_path)} == {f"1.{n}" for n in (0, 1, 2, 3, 4, 5, 6, 7, 10)}
 
-    # A fork of the same releases that are there by now needs no ride, and no registry.
+    # What is there already is not ridden again.
     before = rows_of(tmp_path / "history" / PACKAGE)
     again = velodrome("history", f"{PACKAGE}>=1.0,<1.4", "circle.toml", "--resume", "--json")
     assert statuses(again.json()) == {v: s for v, s in statuses(document).items() if v in ("1.0", "1.1", "1.2", "1.3")}
