@@ -81,7 +81,9 @@ def _read_dates(path: Path) -> dict[str, str | None]:
         found = read_json(path)["dates"]
     except (OSError, ValueError, KeyError, TypeError):
         return {}
-    return dict(found) if isinstance(found, dict) else {}
+    if not isinstance(found, dict):
+        return {}
+    return {version: day for version, day in found.items() if day is None or isinstance(day, str)}
 
 
 def _ask_upload_times(package: str, children: Children) -> dict[str, str] | None:
