@@ -59,11 +59,6 @@ def format_distinct(values: Sequence[float], least: int = 3, most: int = _MOST_D
     return [format(value, f".{most}g") for value in values]
 
 
-def find_limit(row: Row, name: str) -> float | None:
-    """Return by how much a quantity of a row may differ from that of the release before it."""
-    return row["limits"].get(name)
-
-
 def draw_releases(rows: Sequence[Row], name: str, absolute: bool = False) -> dict[str, Any] | None:
     """Place a quantity of the releases of one engine and scenario.
 
@@ -132,7 +127,7 @@ def _find_bands(
     found = []
     before: float | None = None
     for number, (row, value) in enumerate(zip(rows, values, strict=True)):
-        limit = find_limit(row, name)
+        limit = row["limits"].get(name)
         if value is not None and limit is not None and absolute:
             found.append((number, 0.0, limit))
         elif value is not None and limit is not None and before is not None and row["since_previous"] is not None:

@@ -55,7 +55,7 @@ def make_pair_document(
         "limits": rows[0]["limits"] | rows[1]["limits"],
         "before": before,
         "after": after,
-        "distance": measure_distance(before, after),
+        "distance": measure_separation(before, after),
         "libraries": list_suite_versions(plan.package),
         "command": write_pair_command(first, second, rides[1].engine, rides[1].scenario),
     }
@@ -66,7 +66,7 @@ def list_suite_versions(package: str) -> dict[str, str]:
     return {name: version for name, version in library_versions().items() if name != package}
 
 
-def measure_distance(before: Row, after: Row) -> dict[str, list[float]]:
+def measure_separation(before: Row, after: Row) -> dict[str, list[float]]:
     """Return the distance of the points D of two rides at the samples that both have.
 
     Parameters

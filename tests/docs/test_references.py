@@ -113,6 +113,7 @@ def test_every_column_of_a_trajectory_is_in_the_reference() -> None:
 
 RUN = "run q2-plus --engine mujoco-multipliers --duration 0.5 --json --out"
 SWEEP = 'scenario = "q2"\n[grid]\nsimulation.duration = [1.0]\nperturbation.lean_rate = [0.0, 0.1]\n'
+HISTORY = "history wheelmill==1.0,1.1 circle.toml --cache cache --out history"
 DOCUMENTS = {
     "list": ["list --json"],
     "run": [f"{RUN} runs"],
@@ -128,7 +129,8 @@ DOCUMENTS = {
         "precision q2 --engine mujoco-multipliers --duration 1 --levels 2 --set simulation.output_rate=25 --json"
     ],
     "league": ["league plane-circle --engine mujoco-native --duration 0.5 --json"],
-    "history": ["history wheelmill==1.0,1.1 circle.toml --cache cache --json"],
+    "history": [f"{HISTORY} --json"],
+    "history-rides": [HISTORY],
     "sweep": ["sweep sweep.toml --json"],
     "critical": ["critical --json"],
     "atlas": ["atlas --size 2000 --json"],
@@ -161,13 +163,16 @@ def test_every_key_of_a_document_is_in_the_reference(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "sweep.toml").write_text(SWEEP, encoding="utf-8")
-    if name == "history":
+    if name in ("history", "history-rides"):
         make_releases(tmp_path, monkeypatch)
     printed = ""
     for line in DOCUMENTS[name]:
         printed = typed(line, tmp_path)
     if name == "manifest":
         (path,) = tmp_path.glob("runs/*/manifest.json")
+        printed = path.read_text(encoding="utf-8")
+    if name == "history-rides":
+        (path,) = tmp_path.glob("history/rides/*.json")
         printed = path.read_text(encoding="utf-8")
     document: dict[str, Any] = json.loads(printed)
     keys = documented()[name]["keys"]

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from mill import CIRCLE, FAULT, PACKAGE, install_mill, make_wheel, use_registry
 
-from velodrome.scenarios.history.pairs import measure_distance, write_pair_command
+from velodrome.scenarios.history.pairs import measure_separation, write_pair_command
 from velodrome.scenarios.history.releases import Release
 
 
@@ -67,8 +67,8 @@ def test_pages_follow_the_turning_points(velodrome, tmp_path: Path, monkeypatch:
 def test_distances_are_those_of_samples_that_both_have() -> None:
     before = {"time": [0.0, 1.0, 2.0], "position": [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]}
     after = {"time": [0.0, 0.5, 2.0], "position": [[0.0, 0.0, 0.0], [9.0, 9.0, 9.0], [2.0, 3.0, 4.0]]}
-    assert measure_distance(before, after) == {"time": [0.0, 2.0], "distance": [0.0, 5.0]}
-    assert measure_distance(before, {"time": [0.25], "position": [[0.0, 0.0, 0.0]]}) == {"time": [], "distance": []}
+    assert measure_separation(before, after) == {"time": [0.0, 2.0], "distance": [0.0, 5.0]}
+    assert measure_separation(before, {"time": [0.25], "position": [[0.0, 0.0, 0.0]]}) == {"time": [], "distance": []}
 
 
 def test_the_command_names_both_releases() -> None:
