@@ -65,10 +65,11 @@ def run_history(
 
     def ride_missing(rides: Sequence[PlannedRide]) -> dict[PlannedRide, Mapping[str, Any]]:
         found: dict[PlannedRide, Mapping[str, Any]] = {}
-        found |= {ride: row for ride in rides if (row := folder.read(ride)) is not None}
-        rows.update(found)
-        for ride, row in found.items():
-            watch(ride, row, False)
+        for ride in rides:
+            row = folder.read(ride)
+            if row is not None:
+                rows[ride] = found[ride] = row
+                watch(ride, row, False)
         missing = [ride for ride in rides if ride not in found]
         found.update(_ride_all(plan, missing, folder, options, watch, children, rows))
         return found

@@ -119,7 +119,7 @@ def ride_as(plan: HistoryPlan, errors: dict[str, list[float | None]], asked: lis
 @pytest.mark.parametrize("turn", range(1, 20))
 def test_bisection_finds_the_one_between_in_few_releases(turn: int) -> None:
     plan, asked = plan_of(20), list[PlannedRide]()
-    two: list[float | None] = [1e-3] * turn + [1e-2] * (20 - turn)
+    two: list[float | None] = [1e-3 if place < turn else 1e-2 for place in range(20)]
     errors: dict[str, list[float | None]] = {"one": [1e-3] * 20, "two": two}
     rows = bisect_history(plan, ride_as(plan, errors, asked))
     document = make_history_document(plan, rows, complete=True, bisected=True)
