@@ -183,7 +183,7 @@ def _make_pair(
         for point in document["turning_points"]
         if point["scenario"] == scenario and point["engine"] == engine
     }
-    groups = [
+    groups: list[dict[str, Any]] = [
         {
             "anchor": anchors.choose(scenario, engine, group[0]["version"]),
             "rows": group,

@@ -25,7 +25,7 @@ def make_ride_pair_page(document: Mapping[str, Any], history: str) -> str:
     Parameters
     ----------
     document : mapping
-        As `velodrome.scenarios.history.pairs.make_pair_document` returns it.
+        As `velodrome.scenarios.history.pairs.make_pair_documents` returns them.
     history : str
         Address of the page of the history.
 

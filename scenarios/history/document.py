@@ -1,38 +1,20 @@
-"""The JSON documents of a history: rows, verdicts between neighbouring releases, turning points and their rides."""
+"""The JSON document of a history: rows, the verdicts between neighbouring releases, and the turning points."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
-from .pairs import list_suite_versions, make_pair_document
+from .pairs import PAIR_FOLDER, list_suite_versions
 from .plan import HistoryPlan, PlannedRide
 from .ride import NOT_INSTALLABLE, RODE
 from .verdicts import StepVerdict, judge_step
 
-PAIRS_FOLDER = "rides"  # of the pages of turning points, beside the document
 
-
-@dataclass(frozen=True)
-class HistoryDocuments:
-    """The document of a history, and those of the rides of its turning points.
-
-    Attributes
-    ----------
-    history : dict
-    pairs : dict
-        By name of the file, without its suffix, which the turning point has as ``page``.
-    """
-
-    history: dict[str, Any]
-    pairs: dict[str, dict[str, Any]]
-
-
-def make_history_documents(
+def make_history_document(
     plan: HistoryPlan, rows: Mapping[PlannedRide, Mapping[str, Any]], *, complete: bool, bisected: bool
-) -> HistoryDocuments:
-    """Return the documents of the rows that there are.
+) -> dict[str, Any]:
+    """Return the document of the rows that there are.
 
     A row is judged against the release before it that could be installed.
 
@@ -50,7 +32,6 @@ def make_history_documents(
 
     entries: list[dict[str, Any]] = []
     turning_points: list[dict[str, Any]] = []
-    pairs: dict[str, dict[str, Any]] = {}
     names = AnchorNames()
     last: dict[tuple[str, str], PlannedRide] = {}
     for ride in plan.rides:
@@ -64,11 +45,8 @@ def make_history_documents(
         date = plan.find_date(ride.release)
         entries.append(_describe_row(ride, row, date, verdict, since))
         if earlier is not None and verdict is not None and verdict.moved:
-            found = make_pair_document(plan, (earlier, ride), (rows[earlier], row), verdict)
-            name = None
-            if found is not None:
-                name = names.choose(ride.engine, ride.scenario, earlier.release.label, ride.release.label)
-                pairs[name] = found
+            both = rows[earlier]["status"] == row["status"] == RODE
+            name = names.choose(ride.engine, ride.scenario, earlier.release.label, ride.release.label) if both else None
             turning_points.append(
                 {
                     "version": ride.release.version,
@@ -79,12 +57,12 @@ def make_history_documents(
                     "scenario": ride.scenario,
                     "verdict": verdict.status,
                     "quantities": [move.as_json() for move in verdict.moves],
-                    "page": None if name is None else f"{PAIRS_FOLDER}/{name}.html",
+                    "page": None if name is None else f"{PAIR_FOLDER}/{name}.html",
                 }
             )
         if row["status"] != NOT_INSTALLABLE:
             last[pair] = ride
-    document = {
+    return {
         "package": plan.package,
         "scenarios": {name: ride.title for name, ride in plan.scenarios.items()},
         "engines": list(plan.engines),
@@ -95,7 +73,6 @@ def make_history_documents(
         "turning_points": turning_points,
         "libraries": list_suite_versions(plan.package),
     }
-    return HistoryDocuments(document, pairs)
 
 
 def _describe_row(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
+from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -11,27 +12,44 @@ import numpy as np
 from ..run import library_versions
 from .plan import HistoryPlan, PlannedRide
 from .releases import Release
-from .ride import RODE
-from .verdicts import StepVerdict
+
+PAIR_FOLDER = "rides"  # of the documents and pages, beside the document of the history
 
 Row = Mapping[str, Any]
 
 
-def make_pair_document(
-    plan: HistoryPlan, rides: tuple[PlannedRide, PlannedRide], rows: tuple[Row, Row], verdict: StepVerdict
-) -> dict[str, Any] | None:
-    """Return the document of a pair of rides, None unless both releases ride.
+def make_pair_documents(
+    plan: HistoryPlan, rows: Mapping[PlannedRide, Row], document: Mapping[str, Any]
+) -> dict[str, dict[str, Any]]:
+    """Return the documents of the turning points whose two releases both ride.
 
     Parameters
     ----------
     plan : HistoryPlan
-    rides, rows : tuple
-        Of the release before, and of the one that moved something.
-    verdict : StepVerdict
-        On the step between them.
+    rows : mapping
+        By ride.
+    document : mapping
+        Of the history, by `velodrome.scenarios.history.document.make_history_document`.
+
+    Returns
+    -------
+    dict
+        By name of the file, without its suffix, as the turning points have it in ``page``.
     """
-    if any(row["status"] != RODE for row in rows):
-        return None
+    rides = {(ride.release.label, ride.engine, ride.scenario): ride for ride in rows}
+    found = {}
+    for point in document["turning_points"]:
+        if point["page"] is not None:
+            before, after = (rides[point[key], point["engine"], point["scenario"]] for key in ("since", "release"))
+            found[PurePosixPath(point["page"]).stem] = _describe_pair(
+                plan, (before, after), (rows[before], rows[after]), point
+            )
+    return found
+
+
+def _describe_pair(
+    plan: HistoryPlan, rides: tuple[PlannedRide, PlannedRide], rows: tuple[Row, Row], point: Mapping[str, Any]
+) -> dict[str, Any]:
     before, after = (
         {
             "release": ride.release.label,
@@ -50,8 +68,8 @@ def make_pair_document(
         "engine": rides[1].engine,
         "scenario": rides[1].scenario,
         "title": plan.scenarios[rides[1].scenario].title,
-        "verdict": verdict.status,
-        "moved": [move.as_json() for move in verdict.moves],
+        "verdict": point["verdict"],
+        "moved": point["quantities"],
         "limits": rows[0]["limits"] | rows[1]["limits"],
         "before": before,
         "after": after,

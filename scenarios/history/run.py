@@ -12,8 +12,9 @@ from typing import Any
 
 from .bisect import bisect_history
 from .children import Children, StoppedError
-from .document import make_history_documents
+from .document import make_history_document
 from .environments import NotInstallable, open_environment
+from .pairs import make_pair_documents
 from .plan import HistoryPlan, PlannedRide
 from .problems import store_rides
 from .process import RideFile, ride_tasks
@@ -85,8 +86,8 @@ def run_history(
         finally:
             children.stop()
         found = {ride: rows[ride] for ride in plan.rides if ride in rows}
-        documents = make_history_documents(plan, found, complete=complete, bisected=options.bisect)
-        return documents.history, folder.finish(documents, found)
+        document = make_history_document(plan, found, complete=complete, bisected=options.bisect)
+        return document, folder.finish(document, make_pair_documents(plan, found, document), found)
 
 
 def _ride_all(

@@ -21,7 +21,7 @@ from ...engines.storage import versioned_metadata
 from ..error import ScenarioError
 from ..files import content_digest, make_folder, write_json, write_sealed, write_text
 from ..run import read_json
-from .document import PAIRS_FOLDER, HistoryDocuments
+from .pairs import PAIR_FOLDER
 from .plan import PlannedRide
 from .ride import NOT_INSTALLABLE
 
@@ -90,25 +90,39 @@ class HistoryFolder:
         who = {"release": ride.release.label, "engine": ride.engine, "scenario": ride.scenario, "key": ride.key}
         write_sealed(self._path(ride), who | {"row": dict(row)}, _ROW_VERSION)
 
-    def finish(self, documents: HistoryDocuments, rows: Mapping[PlannedRide, Mapping[str, Any]]) -> list[Path]:
+    def finish(
+        self,
+        document: Mapping[str, Any],
+        pairs: Mapping[str, Mapping[str, Any]],
+        rows: Mapping[PlannedRide, Mapping[str, Any]],
+    ) -> list[Path]:
         """Write the documents, the table and the pages, and return the paths of the document, the table and the page.
 
         Pages of turning points that there are no more, since a release was added between, are removed.
+
+        Parameters
+        ----------
+        document : mapping
+            Of the history.
+        pairs : mapping
+            Documents of the rides of turning points, by name of the file.
+        rows : mapping
+            By ride.
         """
         from ...reports.page import make_history_page, make_ride_pair_page
 
         paths = [self._out / HISTORY_DOCUMENT, self._out / HISTORY_TABLE, self._out / HISTORY_PAGE]
-        pairs = self._out / PAIRS_FOLDER
-        for name, pair in documents.pairs.items():
-            make_folder(pairs)
-            write_json(pairs / f"{name}.json", pair)
-            write_text(pairs / f"{name}.html", make_ride_pair_page(pair, f"../{HISTORY_PAGE}"))
-        for path in [*pairs.glob("*.json"), *pairs.glob("*.html")]:
-            if path.stem not in documents.pairs:
-                path.unlink()
-        write_json(paths[0], documents.history)
+        folder = self._out / PAIR_FOLDER
+        for name, pair in pairs.items():
+            make_folder(folder)
+            write_json(folder / f"{name}.json", pair)
+            write_text(folder / f"{name}.html", make_ride_pair_page(pair, f"../{HISTORY_PAGE}"))
+        write_json(paths[0], document)
         _write_table(paths[1], rows)
-        write_text(paths[2], make_history_page(documents.history))
+        write_text(paths[2], make_history_page(document))
+        for path in [*folder.glob("*.json"), *folder.glob("*.html")]:
+            if path.stem not in pairs:
+                path.unlink()
         return paths
 
     def _path(self, ride: PlannedRide) -> Path:
