@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -18,6 +19,7 @@ Row = Mapping[str, Any]
 _ABSOLUTE = "report_mismatch"  # its limit is one of the value itself
 _RUN = "run"  # the quantity that moved where only one of two releases rides
 _DIGITS = 4  # of figures in tables
+_CODE = re.compile(r"`([^`]*)`")
 
 
 @dataclass(frozen=True)
@@ -339,6 +341,11 @@ def _list_turns(document: Mapping[str, Any], sections: Sequence[Mapping[str, Any
 
 
 def _list_meanings(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Return title, unit and meaning of the quantities; other quantities in a meaning have their titles."""
     names = dict.fromkeys(name for row in document["releases"] for name in (*row["quantities"], *row["changed"]))
-    found = [(name, find_quantity(name)) for name in names]
-    return [(format_title(name), quantity.unit, quantity.meaning) for name, quantity in found if quantity.meaning]
+    found = [(name, find_quantity(name).meaning) for name in names]
+    return [
+        (format_title(name), describe_unit(name), _CODE.sub(lambda code: format_title(code[1]), meaning))
+        for name, meaning in found
+        if meaning
+    ]

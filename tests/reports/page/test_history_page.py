@@ -21,7 +21,7 @@ from velodrome.scenarios.gate.sample import EIGENVALUE_QUANTITIES
 from velodrome.scenarios.gate.verdict import RIDE_QUANTITIES, SHOWN
 
 HOSTILE = "<script>alert(1)</script>"
-NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)*(?:e[+-]?\d+)?")
+NUMBER = re.compile(r"(?<![\w.^])-?\d+(?:\.\d+)*(?:e[+-]?\d+)?")
 VALUES = {"position_error": 1.2345678e-5, "radius_drift_rate": -4.5678e-7, "observed_order": 2.01234, "steps": 2500.0}
 LIMITS = {"position_error": 3.4e-10, "radius_drift_rate": 5.6e-11, "observed_order": 0.0123, "steps": 1.0}
 
