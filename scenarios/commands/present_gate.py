@@ -57,7 +57,9 @@ def _show_outcome(console: Console, verdicts: list[Verdict]) -> None:
     if outcome == "holds":
         line, style = "the gate holds" + (f": {others}, the rest as before" if others else ""), "bold green"
     elif outcome == NEW:
-        line, style = f"nothing to hold {failing} against: there is no baseline yet", "bold yellow"
+        engines = dict.fromkeys(verdict.engine for verdict in verdicts if verdict.status == NEW)
+        rest = "" if all(verdict.status == NEW for verdict in verdicts) else "; all else passes"
+        line, style = f"no verdict, without a baseline yet: {', '.join(engines)}{rest}", "bold yellow"
     else:
         line, style = f"the gate fails: {failing}", "bold red"
     console.print(line, style=style, markup=False, highlight=False, soft_wrap=True)

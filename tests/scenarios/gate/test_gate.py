@@ -424,10 +424,11 @@ def test_an_engine_that_cannot_any_more_fails_where_it_could(tmp_path: Path) -> 
     assert "rolls on the level plane only" in verdict.reason
 
 
-def test_an_engine_without_a_baseline_fails(tmp_path: Path) -> None:
+def test_an_engine_without_a_baseline_is_new(tmp_path: Path) -> None:
     stored({}, tmp_path)
     ((_, verdict),) = gate.check_gate(lambda *_: None, ["q2"], ["reference"], tmp_path)[0]
-    assert (verdict.engine, verdict.status) == ("reference", "missing")
+    assert (verdict.engine, verdict.status) == ("reference", "new")
+    assert not verdict.passes
     assert "no baseline" in verdict.reason
 
 
