@@ -38,7 +38,7 @@ from ..scenario import (
 from .exact import find_exact
 from .given import GivenBaselines
 from .sample import SHORT_HORIZON, take_sample
-from .verdict import ABSOLUTE, CHANGES, Verdict, judge_sample, missing_verdict
+from .verdict import ABSOLUTE, CHANGES, NEW, Verdict, judge_sample, missing_verdict
 
 BASELINES = Path(__file__).parent / "baselines"
 GATED_TAG = "gated"
@@ -486,6 +486,8 @@ def update_baselines(
 
 
 def _describe_move(verdict: Verdict) -> str:
-    """Return the words for what a verdict reports: a quantity that moved, or a change of version or settings."""
+    """Return the words for what a verdict reports: a new engine, a move, or a change of version or settings."""
+    if verdict.status == NEW:
+        return f"{verdict.engine}: new"
     what = verdict.reason if verdict.quantity == CHANGES else f"{verdict.quantity}: {verdict.status}"
     return f"{verdict.engine}: {what}"

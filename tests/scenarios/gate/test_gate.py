@@ -450,7 +450,7 @@ def test_updated_baselines_hold_the_next_run(tmp_path: Path) -> None:
     (path,) = gate.update_baselines(fresh, verdicts, None, folder)
     document = json.loads(path.read_text())
     assert path == folder / "q2.json"
-    assert document["reason"] == "mujoco-native: run: missing"
+    assert document["reason"] == "mujoco-native: new"
     assert document["libraries"]["mujoco"] == document["engines"]["mujoco-native"]["version"]
     assert document["engines"]["mujoco-native"]["settings"]["step"] == 0.004
     assert {verdict.status for _, verdict in check(set_to(step=0.004))[0]} == {"holds", "shown"}
