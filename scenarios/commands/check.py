@@ -6,13 +6,27 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..error import ScenarioError
 from .completion import complete_engine, complete_scenario
-from .options import JsonOption, TracebackOption, ending_with, print_json, print_traceback, showing_traceback
+from .options import (
+    HISTORIES,
+    LONGEST_RIDE,
+    CacheOption,
+    JsonOption,
+    TracebackOption,
+    ending_with,
+    print_json,
+    print_traceback,
+    showing_traceback,
+)
+
+if TYPE_CHECKING:
+    from ..gate import GivenBaselines
+    from .progress import ProgressBars
 
 
 def check_command(
@@ -33,6 +47,25 @@ def check_command(
         ),
     ] = None,
     baselines: Annotated[Path | None, typer.Option(help="Folder of the baselines instead of the suite's own.")] = None,
+    baseline_of: Annotated[
+        str | None,
+        typer.Option(
+            metavar="'PACKAGE==VERSION'",
+            help="Hold the engines of a package against a release of it, which rides in an environment of its own "
+            "first; see velodrome history. With --wheel the package alone.",
+        ),
+    ] = None,
+    wheel: Annotated[
+        Path | None, typer.Option(metavar="FILE.whl", help="A build as the release of --baseline-of.")
+    ] = None,
+    cache: CacheOption = None,
+    history: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of a history, or of several, by which a message names the release that moved something; "
+            "history if not given and there is one."
+        ),
+    ] = None,
     update: Annotated[
         bool, typer.Option("--update", help="Write the values of engines that moved, changed or are new as baselines.")
     ] = False,
@@ -55,14 +88,18 @@ def check_command(
     from ..gate import (
         UNFINISHED_JUNIT,
         UNFINISHED_MARKDOWN,
+        GivenBaselines,
         check_gate,
         junit_xml,
         list_bicycle_warnings,
         list_left_out,
+        list_unjudged_engines,
         markdown_page,
+        read_baselines,
         refused_verdicts,
         update_baselines,
     )
+    from ..history import find_stored_histories, name_origins
     from ..run import configure_engine, installed_engines
     from .present_gate import show_verdicts
     from .progress import ProgressBars
@@ -71,6 +108,8 @@ def check_command(
     if reason is not None and not update:
         raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
     # Checked first, so that minutes of work are not lost.
+    _check_baseline_options(baseline_of, wheel, baselines, update, hold_cpu)
+    histories = find_stored_histories(HISTORIES if history is None else history, named=history is not None)
     if baselines is not None and not baselines.exists() and not update:
         raise ScenarioError(f"--baselines {baselines}: there is no such folder; with --update it is made")
     for option, path in (("--junit", junit), ("--markdown", markdown)):
@@ -80,7 +119,13 @@ def check_command(
     unfinished = _mark_unfinished({junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN})
     with showing_traceback(traceback), unfinished, ProgressBars() as progress:
         trace = print_traceback if traceback else None
-        verdicts, fresh = check_gate(progress.watch, scenario, engine, baselines, configure_engine, trace, hold_cpu)
+        held: Path | GivenBaselines | None = baselines
+        if baseline_of is not None:
+            held = _ride_baselines(progress, baseline_of, scenario, engine, wheel, cache)
+        verdicts, fresh = check_gate(progress.watch, scenario, engine, held, configure_engine, trace, hold_cpu)
+        if histories:
+            after = {name: one["engines"] for name, one in fresh.items()}
+            verdicts = name_origins(verdicts, scenario or (), read_baselines(held, scenario), after, histories)
     for path, page in files:
         if path is not None:
             write_text(path, page(verdicts))
@@ -98,7 +143,8 @@ def check_command(
         written = [str(path) for path in update_baselines(fresh, verdicts, reason, baselines)]
     refused = refused_verdicts(verdicts) if update else []
     warnings = list_bicycle_warnings(scenario)
-    left_out = {} if engine else list_left_out(baselines, scenario)
+    left_out = {} if engine or baseline_of else list_left_out(baselines, scenario)
+    others = [] if engine or not isinstance(held, GivenBaselines) else list_unjudged_engines(held)
     passes = not refused if update else all(verdict.passes for _, verdict in verdicts)
     with ending_with(0 if passes else 1):
         if as_json:
@@ -109,12 +155,17 @@ def check_command(
                     "updated": written,
                     "warnings": warnings,
                     "left_out": left_out,
+                    "baseline_of": held.release if isinstance(held, GivenBaselines) else None,
+                    "of_other_packages": others,
                     "verdicts": rows,
                 }
             )
         else:
             console = make_console()
             show_verdicts(console, verdicts, renewed=update)
+            if isinstance(held, GivenBaselines) and others:
+                line = f"not judged, not of the package {held.package}: {', '.join(others)}"
+                console.print(line, markup=False, highlight=False, soft_wrap=True)
             if left_out:
                 install = "; ".join(dict.fromkeys(left_out.values()))
                 line = f"not judged, their libraries are not installed: {', '.join(left_out)}; install: {install}"
@@ -130,6 +181,56 @@ def check_command(
             for name, verdict in refused:
                 line = f"no baseline written of {verdict.engine} on {name}: {verdict.reason}"
                 console.print(line, style="red", markup=False, soft_wrap=True)
+
+
+def _check_baseline_options(
+    baseline_of: str | None, wheel: Path | None, baselines: Path | None, update: bool, hold_cpu: bool
+) -> None:
+    """Raise a ScenarioError if options do not go together."""
+    if baseline_of is None:
+        if wheel is not None:
+            raise ScenarioError("--wheel: it belongs to --baseline-of, e.g. --baseline-of mujoco --wheel FILE.whl")
+        return
+    if update:
+        raise ScenarioError("--baseline-of: it writes no baselines; give it without --update")
+    if baselines is not None:
+        raise ScenarioError("--baseline-of: the release takes the place of the baselines; give it without --baselines")
+    if hold_cpu:
+        raise ScenarioError(
+            "--baseline-of: CPU times of a release are not measured; give it without --hold-cpu, or write baselines in "
+            "an environment that has the release"
+        )
+
+
+def _ride_baselines(
+    progress: ProgressBars,
+    wanted: str,
+    scenarios: list[str] | None,
+    engines: list[str] | None,
+    wheel: Path | None,
+    cache: Path | None,
+) -> GivenBaselines:
+    """Install a release, ride it, and return its baselines."""
+    from ..history import Children, find_cache_folder, plan_release_baselines, ride_release_baselines
+
+    children, environments = Children(), find_cache_folder(cache)
+    try:
+        plan = plan_release_baselines(
+            wanted, scenarios or (), engines or (), wheel, cache=environments, children=children
+        )
+        for line in plan.remarks:
+            progress.note(line)
+        name = f"{plan.package} {plan.releases[0].label}"
+        return ride_release_baselines(
+            plan,
+            lambda done, total: progress.watch(name, done, total, "rides"),
+            all_rides=bool(scenarios),
+            cache=environments,
+            time_limit=LONGEST_RIDE,
+            children=children,
+        )
+    finally:
+        children.stop()
 
 
 @contextmanager

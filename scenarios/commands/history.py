@@ -10,7 +10,10 @@ import typer
 
 from .completion import complete_engine, complete_scenario
 from .options import (
+    HISTORIES,
+    LONGEST_RIDE,
     STARTING,
+    CacheOption,
     JsonOption,
     TracebackOption,
     answering_missing_motion,
@@ -19,8 +22,6 @@ from .options import (
     show_written,
     showing_traceback,
 )
-
-FOLDER = Path("history")
 
 
 def history_command(
@@ -72,21 +73,13 @@ def history_command(
             help="Go on with what the folder has: ride what is missing. Releases, engines and scenarios may be added.",
         ),
     ] = False,
-    cache: Annotated[
-        Path | None,
-        typer.Option(
-            envvar="VELODROME_CACHE",
-            show_envvar=True,
-            help="Folder whose subfolder releases keeps the releases' environments; velodrome in the user's cache "
-            "folder if not given.",
-        ),
-    ] = None,
+    cache: CacheOption = None,
     workers: Annotated[
         int | None, typer.Option(min=1, max=64, help="Number of releases that ride at once; two if not given.")
     ] = None,
     time_limit: Annotated[
         float, typer.Option(min=1.0, help="Time after which a ride with its measurements counts as hung [s].")
-    ] = 600.0,
+    ] = LONGEST_RIDE,
     traceback: TracebackOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -105,7 +98,7 @@ def history_command(
     children = Children()
     with answering_missing_motion(as_json), showing_traceback(traceback), show_working(STARTING):
         plan = plan_history(releases, scenario or (), engine or (), wheel or (), cache=environments, children=children)
-    where = FOLDER / plan.package if out is None else out
+    where = HISTORIES / plan.package if out is None else out
     folder = HistoryFolder(where, resume)
     options = HistoryOptions(environments, workers or min(2, len(os.sched_getaffinity(0))), time_limit, bisect)
     with HistoryProgress(plan, bisect) as progress:

@@ -56,6 +56,18 @@ RearTorqueOption = Annotated[
 SteerDampingOption = Annotated[
     float, typer.Option(min=0, help="Coefficient of the torque against the steer rate [N m s/rad].")
 ]
+CacheOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--cache",
+        envvar="VELODROME_CACHE",
+        show_envvar=True,
+        help="Folder whose subfolder releases keeps the releases' environments; velodrome in the user's cache folder "
+        "if not given.",
+    ),
+]
+HISTORIES = Path("history")  # where histories are written and looked for if no folder is named
+LONGEST_RIDE = 600.0  # [s] after which a ride of a release counts as hung
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else.")]
 
 

@@ -7,7 +7,7 @@ from itertools import groupby
 from rich.console import Console
 from rich.text import Text
 
-from ..gate import SHOWN, Verdict
+from ..gate import CHANGES, NEW, SHOWN, Verdict, count_held, count_statuses, find_outcome, status_word
 from .tables import Column, print_table
 
 STATUS_STYLES = {
@@ -17,6 +17,7 @@ STATUS_STYLES = {
     "changed": "red",
     "worse": "red",
     "missing": "red",
+    NEW: "cyan",
 }
 
 
@@ -40,18 +41,33 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed
         print_table(console, columns)
     for name, verdict in verdicts:
         if verdict.told:
-            line = f"{name}: {verdict.engine}: {verdict.quantity}: {verdict.status}: {verdict.reason}"
-            console.print(line, style=STATUS_STYLES[verdict.status], markup=False, soft_wrap=True)
-    if renewed:
-        return
-    passes = all(verdict.passes for _, verdict in verdicts)
-    console.print("the gate holds" if passes else "the gate fails", style="bold green" if passes else "bold red")
+            # That the version or a setting is another is no verdict on a quantity.
+            what = "" if verdict.quantity == CHANGES else f"{verdict.quantity}: {status_word(verdict)}: "
+            style = "default" if verdict.quantity == CHANGES else STATUS_STYLES[verdict.status]
+            console.print(
+                f"{name}: {verdict.engine}: {what}{verdict.reason}", style=style, markup=False, soft_wrap=True
+            )
+    if not renewed:
+        _show_outcome(console, [verdict for _, verdict in verdicts])
+
+
+def _show_outcome(console: Console, verdicts: list[Verdict]) -> None:
+    outcome, others = find_outcome(verdicts), count_statuses(verdicts)
+    failing = count_statuses(verdicts, failing=True)
+    if outcome == "holds":
+        line, style = "the gate holds" + (f": {others}, the rest as before" if others else ""), "bold green"
+    elif outcome == NEW:
+        engines = dict.fromkeys(verdict.engine for verdict in verdicts if verdict.status == NEW)
+        rest = "" if all(verdict.status == NEW for verdict in verdicts) else "; all else passes"
+        line, style = f"no verdict, without a baseline yet: {', '.join(engines)}{rest}", "bold yellow"
+    else:
+        line, style = f"the gate fails: {failing}", "bold red"
+    console.print(line, style=style, markup=False, highlight=False, soft_wrap=True)
 
 
 def _format_engine_row(engine: str, verdicts: list[Verdict]) -> tuple[str, Text, str, str, str]:
-    held = sum(verdict.status == "holds" for verdict in verdicts)
-    judged = sum(verdict.status != "shown" for verdict in verdicts)
-    passes = all(verdict.passes for verdict in verdicts)
+    held = ", ".join(filter(None, [count_held(verdicts), count_statuses(verdicts)]))
+    style = {"holds": "green", NEW: "cyan"}.get(find_outcome(verdicts), "red")
     shares = {verdict.quantity: share for verdict in verdicts if (share := verdict.share) is not None}
     moved = "nothing moved" if shares else "–"
     if any(shares.values()):
@@ -59,4 +75,4 @@ def _format_engine_row(engine: str, verdicts: list[Verdict]) -> tuple[str, Text,
         moved = f"{most}, {shares[most]:.2g}"
     values = {verdict.quantity: verdict.value for verdict in verdicts}
     friction, cpu = ("–" if (value := values.get(name)) is None else f"{value:.2g}" for name in SHOWN)
-    return engine, Text(f"{held} of {judged}", "green" if passes else "red"), friction, cpu, moved
+    return engine, Text(held, style), friction, cpu, moved

@@ -36,8 +36,9 @@ from ..scenario import (
     show_value,
 )
 from .exact import find_exact
+from .given import GivenBaselines
 from .sample import SHORT_HORIZON, take_sample
-from .verdict import ABSOLUTE, CHANGES, Verdict, judge_sample, missing_verdict
+from .verdict import ABSOLUTE, CHANGES, NEW, Verdict, judge_sample, missing_verdict
 
 BASELINES = Path(__file__).parent / "baselines"
 GATED_TAG = "gated"
@@ -113,11 +114,17 @@ def list_left_out(baselines: Path | None = None, sources: Sequence[str] | None =
     return {engine: command for engine, command in uninstalled_engines().items() if engine in stored}
 
 
+def list_unjudged_engines(given: GivenBaselines) -> list[str]:
+    """Return the engines that the gate judges by the suite's own baselines, and not by given ones."""
+    known = {name: read_baseline(name) for name in gated_names()}
+    return [name for name in _engines_to_judge(None, known).names if name not in given.engines]
+
+
 def check_gate(
     watch: RunWatch,
     sources: Sequence[str] | None = None,
     engines: Sequence[str] | None = None,
-    baselines: Path | None = None,
+    baselines: Path | GivenBaselines | None = None,
     chosen: Chosen = configure_engine,
     trace: Trace | None = None,
     hold_cpu: bool = False,
@@ -138,8 +145,8 @@ def check_gate(
     engines : sequence of str, optional
         Engines to judge, by name or pattern, or ``all``; those of the suite's own dependencies and all that have a
         baseline if not given.
-    baselines : Path, optional
-        Folder of the baselines; the suite's own if not given.
+    baselines : Path or GivenBaselines, optional
+        Folder of the baselines, or baselines with the engines to judge by them; the suite's own if not given.
     chosen : callable
         Maps an engine's name and its settings in the scenario to the engine and its settings.
     trace : callable, optional
@@ -158,15 +165,23 @@ def check_gate(
     ScenarioError
         If a scenario or a baseline is invalid, or an engine is neither installed nor in a baseline.
     """
-    folder = BASELINES if baselines is None else baselines
     scenarios = [load_gated(source) for source in (sources or gated_names())]
-    known = {name: read_baseline(name, folder, scenario) for name, scenario in scenarios}
-    choice = _engines_to_judge(engines, known)
+    reasons: Mapping[str, Mapping[str, str]] = {}
+    known: dict[str, Mapping[str, Any]]
+    if isinstance(baselines, GivenBaselines):
+        known = {name: baselines.entries.get(name, {}) for name, _ in scenarios}
+        choice = EngineChoice(baselines.engines, choose_engines(engines)[0].named & {*baselines.engines})
+        reasons = baselines.reasons
+    else:
+        known = {name: read_baseline(name, baselines, scenario) for name, scenario in scenarios}
+        choice = _engines_to_judge(engines, known)
     verdicts: list[tuple[str, Verdict]] = []
     fresh: dict[str, dict[str, Any]] = {}
     for name, scenario in scenarios:
         riding = choice if sources else _choose_for_scenario(choice, name, known[name])
-        results = _judge_scenario(name, scenario, riding, known[name], watch, chosen, trace, hold_cpu)
+        results = _judge_scenario(
+            name, scenario, riding, known[name], reasons.get(name, {}), watch, chosen, trace, hold_cpu
+        )
         verdicts += [(name, verdict) for verdict in [*results.verdicts, *_missing_verdicts(riding.names, results)]]
         fresh[name] = {
             VERSION_KEY: BASELINE_VERSION,
@@ -180,6 +195,16 @@ def check_gate(
     if not verdicts:
         raise ScenarioError("nothing was judged: none of the engines suits any of the scenarios")
     return verdicts, fresh
+
+
+def read_baselines(
+    baselines: Path | GivenBaselines | None = None, sources: Sequence[str] | None = None
+) -> Mapping[str, Mapping[str, Any]]:
+    """Return the entries of baselines by scenario and engine; the arguments are those of `check_gate`."""
+    if isinstance(baselines, GivenBaselines):
+        return baselines.entries
+    names = [load_gated(source)[0] for source in sources or gated_names()]
+    return {name: read_baseline(name, baselines) for name in names}
 
 
 def list_bicycle_warnings(sources: Sequence[str] | None = None) -> dict[str, list[str]]:
@@ -269,6 +294,7 @@ def _judge_scenario(
     scenario: Scenario,
     engines: EngineChoice,
     baseline: Mapping[str, Any],
+    absent: Mapping[str, str],
     watch: RunWatch,
     chosen: Chosen,
     trace: Trace | None,
@@ -276,7 +302,8 @@ def _judge_scenario(
 ) -> _ScenarioResults:
     """Judge the engines on one scenario against the baseline.
 
-    An engine that the motion does not suit is passed over, unless it was named or has a baseline.
+    An engine that the motion does not suit is passed over, unless it was named or has a baseline. ``absent`` says, by
+    engine, why there is no baseline where one was to be.
     """
     start = make_start(scenario)
     try:
@@ -319,7 +346,14 @@ def _judge_scenario(
             "quantities": found.values,
         }
         verdicts = judge_sample(
-            engine_name, found.values, entry, found.limits, found.settings, found.version, found.reasons
+            engine_name,
+            found.values,
+            entry,
+            found.limits,
+            found.settings,
+            found.version,
+            found.reasons,
+            absent.get(engine_name),
         )
         results.verdicts.extend(verdicts)
     return results
@@ -452,6 +486,8 @@ def update_baselines(
 
 
 def _describe_move(verdict: Verdict) -> str:
-    """Return the words for what a verdict reports: a quantity that moved, or a change of version or settings."""
+    """Return the words for what a verdict reports: a new engine, a move, or a change of version or settings."""
+    if verdict.status == NEW:
+        return f"{verdict.engine}: new"
     what = verdict.reason if verdict.quantity == CHANGES else f"{verdict.quantity}: {verdict.status}"
     return f"{verdict.engine}: {what}"

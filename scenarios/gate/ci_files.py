@@ -7,11 +7,12 @@ from itertools import groupby
 from xml.etree import ElementTree
 
 from ...reports.drawing import escape_markdown, make_printable
-from .verdict import Verdict
+from .verdict import CHANGES, NEW, Verdict, count_held, count_statuses, find_outcome, status_word
 
 Verdicts = Sequence[tuple[str, Verdict]]
 # Order of the statuses in the Markdown page.
-_WORST_FIRST = ("missing", "worse", "changed", "better", "holds", "shown")
+_WORST_FIRST = ("missing", "worse", "changed", NEW, "better", "holds", "shown")
+_TITLES = {"holds": "holds", "fails": "fails", NEW: "no baseline yet"}
 
 
 UNFINISHED_MARKDOWN = "# Drift gate: not finished\n\nThe check has not come to its verdicts.\n"
@@ -69,16 +70,19 @@ def markdown_page(verdicts: Verdicts) -> str:
     -------
     str
     """
-    passes = all(verdict.passes for _, verdict in verdicts)
-    held = sum(verdict.status == "holds" for _, verdict in verdicts)
-    judged = sum(verdict.status != "shown" for _, verdict in verdicts)
-    lines = [f"# Drift gate: {'holds' if passes else 'fails'}", "", f"{held} of {judged} quantities hold.", ""]
+    found = [verdict for _, verdict in verdicts]
+    held = count_held(found)
+    counts = [f"{held} quantities hold" if held else "", count_statuses(found)]
+    title = _TITLES[find_outcome(found)]
+    lines = [f"# Drift gate: {title}", "", f"{'; '.join(filter(None, counts))}.", ""]
     ordered = sorted(verdicts, key=lambda item: _WORST_FIRST.index(item[1].status))
     moved = [(name, verdict) for name, verdict in ordered if verdict.told]
     for name, verdict in moved:
         reason = escape_markdown(verdict.reason)
         who = escape_markdown(f"{name}, {verdict.engine}")
-        lines.append(f"- **{verdict.status}** {who}, {verdict.quantity}: {reason}")
+        # That the version or a setting is another is no verdict on a quantity.
+        what = f"{who}" if verdict.quantity == CHANGES else f"**{status_word(verdict)}** {who}, {verdict.quantity}"
+        lines.append(f"- {what}: {reason}")
     lines += [""] if moved else []
     lines += [
         "| scenario | engine | quantity | value | baseline | limit | verdict |",

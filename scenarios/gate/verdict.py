@@ -7,7 +7,8 @@ as long as version and settings are the baseline's: a fault may cancel part of a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -39,6 +40,7 @@ SHOWN = ("required_friction", "cpu_ratio")
 BELOW_NOISE = "the errors of its steps cannot be told from what its iterations leave"
 
 CHANGES = "settings"  # quantity under which a change of settings or version is reported
+NEW = "new"  # status of an engine that has no baseline yet
 
 # Judged against limits of their own, without the baseline: no engine may contradict itself.
 ABSOLUTE = ("report_mismatch",)
@@ -64,8 +66,8 @@ class Verdict:
         The value holds within baseline +- limit; without a baseline, within the limit of 0.
     status : str
         ``holds``, ``worse`` (an error larger beyond the limit, an earlier fall, a lower order), ``better`` (the
-        opposite, with another version or other settings), ``changed`` (otherwise moved), ``missing`` or ``shown``
-        (not judged).
+        opposite, with another version or other settings), ``changed`` (otherwise moved), ``missing``, ``new`` (an
+        engine without a baseline yet: nothing is judged, and the gate does not pass) or ``shown`` (not judged).
     reason : str
         One line for a reader.
     """
@@ -105,6 +107,42 @@ class Verdict:
         return asdict(self) | {"passes": self.passes}
 
 
+# Statuses in words, the worst first.
+_STATUS_WORDS = {"missing": "missing", "worse": "worse", "changed": "changed", NEW: "new", "better": "improved"}
+
+
+def status_word(verdict: Verdict) -> str:
+    """Return the word for a verdict's status in a message."""
+    return _STATUS_WORDS.get(verdict.status, verdict.status)
+
+
+def count_statuses(verdicts: Sequence[Verdict], failing: bool = False) -> str:
+    """Return how many verdicts have each status other than ``holds`` and ``shown``, the worst first; may be empty.
+
+    Parameters
+    ----------
+    verdicts : sequence of Verdict
+    failing : bool
+        Whether to count only those that do not let the gate pass.
+    """
+    found = Counter(verdict.status for verdict in verdicts if not (failing and verdict.passes))
+    return ", ".join(f"{found[status]} {word}" for status, word in _STATUS_WORDS.items() if found[status])
+
+
+def count_held(verdicts: Sequence[Verdict]) -> str:
+    """Return how many of the judged quantities hold, such as ``25 of 36``; empty where none was to be judged."""
+    judged = [one for one in verdicts if one.status not in ("shown", NEW) and one.quantity != CHANGES]
+    return f"{sum(verdict.status == 'holds' for verdict in judged)} of {len(judged)}" if judged else ""
+
+
+def find_outcome(verdicts: Sequence[Verdict]) -> str:
+    """Return the outcome of the gate: ``holds``, ``fails``, or ``new`` where all that does not pass is new."""
+    failing = {verdict.status for verdict in verdicts if not verdict.passes}
+    if not failing:
+        return "holds"
+    return NEW if failing == {NEW} else "fails"
+
+
 def judge_sample(
     engine: str,
     values: Mapping[str, float | None],
@@ -113,6 +151,7 @@ def judge_sample(
     settings: Mapping[str, Any],
     version: str,
     reasons: Mapping[str, str] | None = None,
+    absent: str | None = None,
 ) -> list[Verdict]:
     """Judge an engine's quantities against its baseline.
 
@@ -122,13 +161,16 @@ def judge_sample(
     values : mapping
         Quantities of this run.
     baseline : mapping or None
-        The engine's entry: ``quantities``, ``settings``, ``version``, and where known the date ``created``.
+        The engine's entry: ``quantities``, ``settings``, ``version``, and where known the date ``created``, or the
+        ``release`` that was ridden for it.
     allowed : mapping
         Limits by quantity; None where this run cannot determine the quantity.
     settings, version
         Those of this run, to explain a change.
     reasons : mapping, optional
         Why this run does not give a quantity.
+    absent : str, optional
+        Why there is no baseline, if one was to be; without it the engine is new.
 
     Returns
     -------
@@ -136,10 +178,11 @@ def judge_sample(
     """
     absolute = [_judge_absolute(engine, name, values, allowed, reasons or {}) for name in ABSOLUTE if name in allowed]
     if baseline is None:
-        without = missing_verdict(engine, "no baseline; velodrome check --update writes one")
+        new = Verdict(engine, "run", None, None, None, NEW, "no baseline yet; velodrome check --update writes one")
+        without = new if absent is None else missing_verdict(engine, absent)
         return [without, *(verdict for verdict in absolute if not verdict.passes)]
     changes = _describe_changes(baseline, settings, version)
-    stored = " ".join(["the baseline", *(["of " + baseline["created"]] if "created" in baseline else [])])
+    stored = _name_baseline(baseline)
     since = f"since {stored}: {changes}" if changes else f"same version and settings as {stored}"
     verdicts = [Verdict(engine, CHANGES, None, None, None, "holds", since)] if changes else []
     verdicts += absolute
@@ -220,6 +263,12 @@ def _find_status(quantity: str, value: float, before: float, limit: float, excus
 def missing_verdict(engine: str, reason: str) -> Verdict:
     """Return the failing verdict on an engine that gives nothing to judge."""
     return Verdict(engine, "run", None, None, None, "missing", reason)
+
+
+def _name_baseline(baseline: Mapping[str, Any]) -> str:
+    if "release" in baseline:
+        return baseline["release"]
+    return f"the baseline of {baseline['created']}" if "created" in baseline else "the baseline"
 
 
 def _describe_changes(baseline: Mapping[str, Any], settings: Mapping[str, Any], version: str) -> str:

@@ -2,7 +2,9 @@
 
 from .children import Children
 from .environments import find_cache_folder
+from .origin import find_stored_histories, name_origins
 from .plan import HistoryPlan, PlannedRide, plan_history
+from .release_baselines import plan_release_baselines, ride_release_baselines
 from .run import HistoryOptions, run_history
 from .store import HistoryFolder
 
@@ -13,6 +15,10 @@ __all__ = [
     "HistoryPlan",
     "PlannedRide",
     "find_cache_folder",
+    "find_stored_histories",
+    "name_origins",
     "plan_history",
+    "plan_release_baselines",
+    "ride_release_baselines",
     "run_history",
 ]

@@ -40,12 +40,16 @@ class PlannedRide:
     engine, scenario : str
     key : str
         SHA-256 of all that determines its row.
+    ride, comparison : str
+        SHA-256 of two parts of it: the ride in the engine, and what results depend on beside ride and release.
     """
 
     release: Release
     engine: str
     scenario: str
     key: str
+    ride: str
+    comparison: str
 
 
 @dataclass(frozen=True)
@@ -137,7 +141,14 @@ def plan_history(
         rides[ride.scenario] = ride
     compared_with = describe_comparison(asked.package)
     planned = [
-        PlannedRide(release, engine, name, _identify(release, engine, ride, compared_with))
+        PlannedRide(
+            release,
+            engine,
+            name,
+            key=_identify(release, engine, ride, compared_with),
+            ride=ride.identify_for(engine),
+            comparison=digest_json(dict(compared_with)),
+        )
         for release in releases
         for name, ride in rides.items()
         for engine in names

@@ -50,6 +50,10 @@ class MeasuredRide:
         """Return the settings of an engine that are not its defaults."""
         return self.settings.get(engine, {})
 
+    def identify_for(self, engine: str) -> str:
+        """Return the SHA-256 of all that determines the ride in an engine, without its version."""
+        return digest_json([self.digest, self.settings_of(engine)])
+
 
 def prepare_ride(source: str) -> MeasuredRide:
     """Load a scenario with the duration and output rate of the gate, and compute its start and its exact ride.

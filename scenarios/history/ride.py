@@ -145,6 +145,7 @@ def ride_release(ride: MeasuredRide, name: str, own: list[Path]) -> dict[str, An
         "reason": None,
         "version": sample.version,
         "settings": sample.settings,
+        "step_noise": sample.step_noise,
         "bits": digest_ride(sample.trajectory),
         "quantities": _to_finite(quantities),
         "limits": _to_finite({name: limit for name, limit in sample.limits.items() if name not in SHOWN}),

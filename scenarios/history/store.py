@@ -10,6 +10,7 @@ import fcntl
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ...engines.files import write_whole
+from ...engines.format_version import read_version
 from ...engines.storage import versioned_metadata
 from ..error import ScenarioError
 from ..files import content_digest, make_folder, write_json, write_sealed, write_text
@@ -26,7 +28,7 @@ from .plan import PlannedRide
 from .ride import NOT_INSTALLABLE
 
 HISTORY_DOCUMENT, HISTORY_TABLE, HISTORY_PAGE = "history.json", "rides.parquet", "history.html"
-_ROWS = "rows"
+ROWS = "rows"
 _ROW_VERSION = 1
 
 
@@ -46,7 +48,7 @@ class HistoryFolder:
     """
 
     def __init__(self, out: Path, resume: bool) -> None:
-        self._out, self._rows = out, out / _ROWS
+        self._out, self._rows = out, out / ROWS
         if resume and not self._rows.is_dir():
             raise ScenarioError(f"--out {out}: there is no history to resume")
         if not resume and self._rows.exists():
@@ -87,7 +89,18 @@ class HistoryFolder:
 
     def write(self, ride: PlannedRide, row: Mapping[str, Any]) -> None:
         """Store the row of a ride."""
-        who = {"release": ride.release.label, "engine": ride.engine, "scenario": ride.scenario, "key": ride.key}
+        release = ride.release
+        who = {
+            "package": release.package,
+            "version": release.version,
+            "wheel_sha256": release.digest,
+            "release": release.label,
+            "engine": ride.engine,
+            "scenario": ride.scenario,
+            "key": ride.key,
+            "ride": ride.ride,
+            "comparison": ride.comparison,
+        }
         write_sealed(self._path(ride), who | {"row": dict(row)}, _ROW_VERSION)
 
     def finish(
@@ -127,6 +140,49 @@ class HistoryFolder:
 
     def _path(self, ride: PlannedRide) -> Path:
         return self._rows / f"{ride.key[:32]}.json"
+
+
+@dataclass(frozen=True)
+class StoredRow:
+    """A row in the folder of a history.
+
+    Attributes
+    ----------
+    package, version : str
+        The release.
+    wheel_sha256 : str or None
+        Digest of the wheel; None for a release of the registry.
+    engine, scenario : str
+    key, ride, comparison : str
+        As in `velodrome.scenarios.history.plan.PlannedRide`.
+    row : dict
+        By `velodrome.scenarios.history.ride.ride_release`.
+    """
+
+    package: str
+    version: str
+    wheel_sha256: str | None
+    engine: str
+    scenario: str
+    key: str
+    ride: str
+    comparison: str
+    row: dict[str, Any]
+
+
+def read_stored_rows(out: Path) -> list[StoredRow]:
+    """Return the rows in the folder of a history, without those that are damaged or of another format."""
+    found = []
+    names = [one.name for one in fields(StoredRow)]
+    for path in sorted((out / ROWS).glob("[!.]*.json")):
+        try:
+            stored = read_json(path)
+            read_version(stored, _ROW_VERSION)
+            if stored["sha256"] == content_digest(stored):
+                found.append(StoredRow(**{name: stored[name] for name in names}))
+        except (OSError, ValueError, KeyError, TypeError):
+            continue
+    return found
 
 
 def _write_table(path: Path, rows: Mapping[PlannedRide, Mapping[str, Any]]) -> None:

@@ -278,7 +278,8 @@ WORSE = Verdict("exudyn", "short_error", 2e-5, 1e-5, 1e-7, "worse", "1e-05 -> 2e
 
 
 @pytest.mark.parametrize(
-    ("status", "passes"), [("holds", True), ("better", True), ("changed", False), ("worse", False), ("missing", False)]
+    ("status", "passes"),
+    [("holds", True), ("better", True), ("new", False), ("changed", False), ("worse", False), ("missing", False)],
 )
 def test_check_is_status_1_when_a_verdict_fails(
     status: str, passes: bool, velodrome, monkeypatch: pytest.MonkeyPatch
@@ -359,7 +360,10 @@ def test_two_engines_of_one_name_get_one_line(velodrome, monkeypatch: pytest.Mon
 def test_check_judges_what_it_is_asked_for(velodrome, tmp_path: Path) -> None:
     arguments = ("check", "q2", "--engine", "mujoco-multipliers", "--baselines", str(tmp_path / "own"))
     (tmp_path / "own").mkdir()
-    assert "no baseline" in velodrome(*arguments).stdout
+    first = velodrome(*arguments)
+    assert first.status == 1
+    assert "mujoco-multipliers: run: new: no baseline yet" in first.stdout
+    assert first.stdout.endswith("no verdict, without a baseline yet: mujoco-multipliers\n")
     result = velodrome(*arguments, "--update", "--reason", "the first of its kind", "--json")
     assert (result.status, result.json()["updated"]) == (0, [str(tmp_path / "own" / "q2.json")])
     assert json.loads((tmp_path / "own" / "q2.json").read_text())["reason"] == "the first of its kind"

@@ -5,10 +5,13 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 from velodrome.scenarios.gate.ci_files import junit_xml, markdown_page
-from velodrome.scenarios.gate.verdict import Verdict, missing_verdict
+from velodrome.scenarios.gate.verdict import CHANGES, NEW, Verdict, missing_verdict
 
 HOLDS = Verdict("exudyn", "short_error", 1e-5, 1e-5, 1e-7, "holds", "1e-05 -> 1e-05, limit 1e-07")
 WORSE = Verdict("mujoco-native", "max_slip", 0.2, 0.1, 1e-3, "worse", "0.1 -> 0.2, limit 0.001; step 0.002 -> 0.004")
+BETTER = Verdict("mujoco-native", "max_slip", 0.1, 0.2, 1e-3, "better", "0.2 -> 0.1, limit 0.001")
+CHANGE = Verdict("mujoco-native", CHANGES, None, None, None, "holds", "since the baseline: version 1.0 -> 1.1")
+FIRST = Verdict("exudyn", "run", None, None, None, NEW, "no baseline yet; velodrome check --update writes one")
 GONE = missing_verdict("warp", "did not run: <no> \x07 *engine* | of that name")
 VERDICTS = [("q2", HOLDS), ("q2", WORSE), ("plane-circle", GONE)]
 
@@ -31,7 +34,7 @@ def test_markdown_puts_the_worst_first_and_shows_foreign_text_as_it_is() -> None
     page = markdown_page(VERDICTS)
     lines = page.splitlines()
     assert lines[0] == "# Drift gate: fails"
-    assert lines[2] == "1 of 3 quantities hold."
+    assert lines[2] == "1 of 3 quantities hold; 1 missing, 1 worse."
     assert lines[4].startswith("- **missing** plane-circle, warp, run: did not run: \\<no>   \\*engine\\* \\|")
     assert lines[5].startswith("- **worse** q2, mujoco-native, max_slip: 0.1 -> 0.2")
     rows = [line for line in lines if line.startswith("| ")][1:]
@@ -41,5 +44,17 @@ def test_markdown_puts_the_worst_first_and_shows_foreign_text_as_it_is() -> None
 def test_a_gate_that_holds_says_so() -> None:
     page = markdown_page([("q2", HOLDS)])
     assert page.startswith("# Drift gate: holds\n\n1 of 1 quantities hold.\n\n| scenario")
+    page = markdown_page([("q2", HOLDS), ("q2", BETTER), ("q2", CHANGE)])
+    assert page.startswith("# Drift gate: holds\n\n1 of 2 quantities hold; 1 improved.\n\n")
+    assert "- **improved** q2, mujoco-native, max_slip: 0.2 -> 0.1, limit 0.001\n" in page
+    assert "- q2, mujoco-native: since the baseline: version 1.0 -> 1.1\n" in page
     root = ElementTree.fromstring(junit_xml([("q2", HOLDS)]))
     assert root.attrib["failures"] == "0"
+
+
+def test_a_first_baseline_is_new_and_no_fault() -> None:
+    page = markdown_page([("q2", FIRST)])
+    assert page.startswith("# Drift gate: no baseline yet\n\n1 new.\n\n- **new** q2, exudyn, run: no baseline yet")
+    # Where something fails as well, the gate fails.
+    page = markdown_page([("q2", FIRST), ("q2", WORSE)])
+    assert page.startswith("# Drift gate: fails\n\n0 of 1 quantities hold; 1 worse, 1 new.")

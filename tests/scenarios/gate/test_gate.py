@@ -424,10 +424,11 @@ def test_an_engine_that_cannot_any_more_fails_where_it_could(tmp_path: Path) -> 
     assert "rolls on the level plane only" in verdict.reason
 
 
-def test_an_engine_without_a_baseline_fails(tmp_path: Path) -> None:
+def test_an_engine_without_a_baseline_is_new(tmp_path: Path) -> None:
     stored({}, tmp_path)
     ((_, verdict),) = gate.check_gate(lambda *_: None, ["q2"], ["reference"], tmp_path)[0]
-    assert (verdict.engine, verdict.status) == ("reference", "missing")
+    assert (verdict.engine, verdict.status) == ("reference", "new")
+    assert not verdict.passes
     assert "no baseline" in verdict.reason
 
 
@@ -449,7 +450,7 @@ def test_updated_baselines_hold_the_next_run(tmp_path: Path) -> None:
     (path,) = gate.update_baselines(fresh, verdicts, None, folder)
     document = json.loads(path.read_text())
     assert path == folder / "q2.json"
-    assert document["reason"] == "mujoco-native: run: missing"
+    assert document["reason"] == "mujoco-native: new"
     assert document["libraries"]["mujoco"] == document["engines"]["mujoco-native"]["version"]
     assert document["engines"]["mujoco-native"]["settings"]["step"] == 0.004
     assert {verdict.status for _, verdict in check(set_to(step=0.004))[0]} == {"holds", "shown"}

@@ -7,7 +7,18 @@ from typing import Any
 
 import pytest
 
-from velodrome.scenarios.gate.verdict import BELOW_NOISE, CHANGES, HELD_CPU, Verdict, judge_sample, missing_verdict
+from velodrome.scenarios.gate.verdict import (
+    BELOW_NOISE,
+    CHANGES,
+    HELD_CPU,
+    NEW,
+    Verdict,
+    count_held,
+    count_statuses,
+    find_outcome,
+    judge_sample,
+    missing_verdict,
+)
 
 SETTINGS = {"step": 0.001, "tolerance": 1e-10}
 ENTRY = {"version": "1.0", "settings": SETTINGS, "quantities": {"short_error": 1e-5, "max_slip": None}}
@@ -65,10 +76,34 @@ def test_what_an_engine_never_gave_is_not_judged_and_what_is_new_is_missing() ->
     ]
 
 
-def test_an_engine_without_a_baseline_fails() -> None:
+def test_an_engine_without_a_baseline_is_new_and_does_not_pass() -> None:
     (verdict,) = judged(1e-5, entry=None)
-    assert (verdict.engine, verdict.passes) == ("exudyn", False)
+    assert (verdict.engine, verdict.status, verdict.passes) == ("exudyn", NEW, False)
     assert "no baseline" in verdict.reason
+    # Where a release was to give one, it is missing.
+    (verdict,) = judge_sample("exudyn", {}, None, {}, SETTINGS, "1.0", absent="no baseline: it broke")
+    assert (verdict.status, verdict.passes, verdict.reason) == ("missing", False, "no baseline: it broke")
+
+
+def test_a_release_is_named_in_the_place_of_a_baseline() -> None:
+    (verdict,) = judged(2e-5, entry=ENTRY | {"release": "exudyn 1.0"})
+    assert verdict.reason.endswith("; same version and settings as exudyn 1.0")
+    (verdict,) = judged(2e-5, entry=ENTRY | {"release": "exudyn 1.0"}, version="1.1")
+    assert verdict.reason.endswith("; since exudyn 1.0: version 1.0 -> 1.1")
+
+
+def test_counts_say_what_does_not_hold_and_leave_out_what_is_not_judged() -> None:
+    def of(*statuses: str) -> list[Verdict]:
+        return [Verdict("exudyn", "max_slip", 1.0, 1.0, 1.0, status, "") for status in statuses]
+
+    change = Verdict("exudyn", CHANGES, None, None, None, "holds", "version 1.0 -> 1.1")
+    verdicts = [change, *of("holds", "shown", "better", "better")]
+    assert (count_held(verdicts), count_statuses(verdicts), find_outcome(verdicts)) == ("1 of 3", "2 improved", "holds")
+    verdicts += of("worse", NEW)
+    assert (count_held(verdicts), find_outcome(verdicts)) == ("1 of 4", "fails")
+    assert count_statuses(verdicts) == "1 worse, 1 new, 2 improved"
+    assert count_statuses(verdicts, failing=True) == "1 worse, 1 new"
+    assert (count_held(of(NEW)), find_outcome(of(NEW, "better", "holds"))) == ("", NEW)
 
 
 def test_a_failure_says_what_else_changed() -> None:

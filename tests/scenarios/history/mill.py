@@ -127,9 +127,9 @@ def make_wheel(
     return path
 
 
-def install_mill(folder: Path, monkeypatch: pytest.MonkeyPatch, version: str = "1.0") -> None:
+def install_mill(folder: Path, monkeypatch: pytest.MonkeyPatch, version: str = "1.0", stretch: float = SAME) -> None:
     """Install a release of the engine for this process and those it starts."""
-    with zipfile.ZipFile(make_wheel(folder / "wheel", version)) as wheel:
+    with zipfile.ZipFile(make_wheel(folder / "wheel", version, stretch)) as wheel:
         wheel.extractall(folder / "site")
     monkeypatch.syspath_prepend(str(folder / "site"))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder / "site"), os.environ.get("PYTHONPATH", "")]))

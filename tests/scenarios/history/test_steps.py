@@ -94,7 +94,7 @@ def test_a_release_that_does_not_ride(before: str, after: str, status: str | Non
 def plan_of(count: int, engines: tuple[str, ...] = ("one", "two")) -> HistoryPlan:
     releases = tuple(Release("mill", f"1.{place}") for place in range(count))
     scenarios: Any = {"circle": SimpleNamespace(title="A circle")}
-    rides = tuple(PlannedRide(release, engine, "circle", "") for release in releases for engine in engines)
+    rides = tuple(PlannedRide(release, engine, "circle", "", "", "") for release in releases for engine in engines)
     return HistoryPlan("mill", releases, engines, scenarios, rides)
 
 
