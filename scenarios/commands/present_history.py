@@ -5,13 +5,13 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 from rich import progress as bars
 from rich.console import Console
 
+from ...reports.page import group_releases
 from ..history import HistoryPlan, PlannedRide
 from .tables import Column, print_table
 
@@ -73,8 +73,7 @@ def show_history(console: Console, document: Mapping[str, Any]) -> None:
     for (scenario, engine), rows in by_pair.items():
         console.print()
         console.print(f"{scenario}: {engine}", style="bold", markup=False, soft_wrap=True)
-        groups = [list(group) for _, group in groupby(_number_groups(rows), key=lambda item: item[0])]
-        found = [[row for _, row in group] for group in groups]
+        found = group_releases(rows)
         columns = [
             Column("releases", [_name_releases(group) for group in found], right=False),
             Column("number", [str(len(group)) for group in found]),
@@ -88,18 +87,6 @@ def show_history(console: Console, document: Mapping[str, Any]) -> None:
     _show_turning_points(console, document["turning_points"])
     for line in document["remarks"]:
         console.print(line, style="yellow", markup=False, highlight=False, soft_wrap=True)
-
-
-def _number_groups(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, Mapping[str, Any]]]:
-    """Return rows with the number of their group: a group ends where something moved or a row has another status."""
-    found: list[tuple[int, Mapping[str, Any]]] = []
-    number, before = 0, None
-    for row in rows:
-        if before is not None and (row["changed"] or (row["status"], row["reason"]) != before):
-            number += 1
-        before = (row["status"], row["reason"])
-        found.append((number, row))
-    return found
 
 
 def _name_releases(group: Sequence[Mapping[str, Any]]) -> str:

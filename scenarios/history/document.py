@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from .pairs import PAIR_FOLDER, list_suite_versions
 from .plan import HistoryPlan, PlannedRide
 from .ride import NOT_INSTALLABLE, RODE
 from .verdicts import StepVerdict, judge_step
@@ -27,8 +28,11 @@ def make_history_document(
     bisected : bool
         Whether only some of the releases were ridden.
     """
+    from ...reports.page import AnchorNames  # here, so that the processes that ride do not load the pages
+
     entries: list[dict[str, Any]] = []
     turning_points: list[dict[str, Any]] = []
+    names = AnchorNames()
     last: dict[tuple[str, str], PlannedRide] = {}
     for ride in plan.rides:
         row = rows.get(ride)
@@ -38,17 +42,22 @@ def make_history_document(
         earlier = last.get(pair)
         verdict = None if earlier is None else judge_step(rows[earlier], row)
         since = None if earlier is None else earlier.release.label
-        entries.append(_describe_row(ride, row, verdict, since))
-        if verdict is not None and verdict.moved:
+        date = plan.find_date(ride.release)
+        entries.append(_describe_row(ride, row, date, verdict, since))
+        if earlier is not None and verdict is not None and verdict.moved:
+            both = rows[earlier]["status"] == row["status"] == RODE
+            name = names.choose(ride.engine, ride.scenario, earlier.release.label, ride.release.label) if both else None
             turning_points.append(
                 {
                     "version": ride.release.version,
                     "release": ride.release.label,
+                    "date": date,
                     "since": since,
                     "engine": ride.engine,
                     "scenario": ride.scenario,
                     "verdict": verdict.status,
                     "quantities": [move.as_json() for move in verdict.moves],
+                    "page": None if name is None else f"{PAIR_FOLDER}/{name}.html",
                 }
             )
         if row["status"] != NOT_INSTALLABLE:
@@ -62,15 +71,17 @@ def make_history_document(
         "remarks": list(plan.remarks),
         "releases": entries,
         "turning_points": turning_points,
+        "libraries": list_suite_versions(plan.package),
     }
 
 
 def _describe_row(
-    ride: PlannedRide, row: Mapping[str, Any], verdict: StepVerdict | None, since: str | None
+    ride: PlannedRide, row: Mapping[str, Any], date: str | None, verdict: StepVerdict | None, since: str | None
 ) -> dict[str, Any]:
     return {
         "version": ride.release.version,
         "release": ride.release.label,
+        "date": date,
         "wheel": None if ride.release.wheel is None else str(ride.release.wheel),
         "engine": ride.engine,
         "scenario": ride.scenario,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from ..error import ScenarioError
 from ..run import configure_engine, installed_engines
 from ..scenario import choose_engines, join_complaints, show_value
 from .children import Children
+from .dates import find_release_dates
 from .environments import list_cached_versions
 from .pip_calls import PipError, list_registry_versions
 from .problems import MeasuredRide, describe_comparison, digest_json, prepare_ride
@@ -64,6 +65,8 @@ class HistoryPlan:
         In the order of releases, scenarios and engines.
     remarks : tuple of str
         Lines for the user, such as that the registry could not be asked.
+    dates : dict
+        Day of upload by version, ISO 8601, where the registry gives it.
     """
 
     package: str
@@ -72,6 +75,11 @@ class HistoryPlan:
     scenarios: Mapping[str, MeasuredRide]
     rides: tuple[PlannedRide, ...]
     remarks: tuple[str, ...] = ()
+    dates: Mapping[str, str] = field(default_factory=dict)
+
+    def find_date(self, release: Release) -> str | None:
+        """Return the day on which a release was uploaded; None where it is unknown, and for a wheel."""
+        return self.dates.get(release.version) if release.wheel is None else None
 
     def rides_of(self, release: Release) -> list[PlannedRide]:
         """Return the rides of one release."""
@@ -134,7 +142,9 @@ def plan_history(
         for name, ride in rides.items()
         for engine in names
     ]
-    return HistoryPlan(asked.package, releases, tuple(names), rides, tuple(planned), tuple(remarks))
+    # Where the registry has not answered, it is not asked again.
+    dates = find_release_dates(asked.package, versions, cache, children, ask=not remarks)
+    return HistoryPlan(asked.package, releases, tuple(names), rides, tuple(planned), tuple(remarks), dates)
 
 
 def choose_package_engines(package: str, wanted: Sequence[str]) -> list[str]:

@@ -14,6 +14,7 @@ from .bisect import bisect_history
 from .children import Children, StoppedError
 from .document import make_history_document
 from .environments import NotInstallable, open_environment
+from .pairs import make_pair_documents
 from .plan import HistoryPlan, PlannedRide
 from .problems import store_rides
 from .process import RideFile, ride_tasks
@@ -51,7 +52,7 @@ class HistoryOptions:
 def run_history(
     plan: HistoryPlan, folder: HistoryFolder, options: HistoryOptions, watch: HistoryWatch, children: Children
 ) -> tuple[dict[str, Any], list[Path]]:
-    """Ride what is missing, and write the document and the table.
+    """Ride what is missing, and write the documents, the table and the pages.
 
     Ctrl-C ends the rides that run; the finished ones are in the document, which is then not complete.
 
@@ -86,7 +87,7 @@ def run_history(
             children.stop()
         found = {ride: rows[ride] for ride in plan.rides if ride in rows}
         document = make_history_document(plan, found, complete=complete, bisected=options.bisect)
-        return document, folder.finish(document, found)
+        return document, folder.finish(document, make_pair_documents(plan, found, document), found)
 
 
 def _ride_all(

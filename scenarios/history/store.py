@@ -1,4 +1,4 @@
-"""The folder of a history: a file for each finished row, and the table and the document that are made of them.
+"""The folder of a history: a file for each finished row, and the table, documents and pages that are made of them.
 
 A row is written under a temporary name and renamed, with a digest of its contents, before it is reported: whatever ends
 the process, a row is there whole or not at all.
@@ -19,12 +19,13 @@ import pyarrow.parquet as pq
 from ...engines.files import write_whole
 from ...engines.storage import versioned_metadata
 from ..error import ScenarioError
-from ..files import content_digest, make_folder, write_json, write_sealed
+from ..files import content_digest, make_folder, write_json, write_sealed, write_text
 from ..run import read_json
+from .pairs import PAIR_FOLDER
 from .plan import PlannedRide
 from .ride import NOT_INSTALLABLE
 
-HISTORY_DOCUMENT, HISTORY_TABLE = "history.json", "rides.parquet"
+HISTORY_DOCUMENT, HISTORY_TABLE, HISTORY_PAGE = "history.json", "rides.parquet", "history.html"
 _ROWS = "rows"
 _ROW_VERSION = 1
 
@@ -89,11 +90,39 @@ class HistoryFolder:
         who = {"release": ride.release.label, "engine": ride.engine, "scenario": ride.scenario, "key": ride.key}
         write_sealed(self._path(ride), who | {"row": dict(row)}, _ROW_VERSION)
 
-    def finish(self, document: Mapping[str, Any], rows: Mapping[PlannedRide, Mapping[str, Any]]) -> list[Path]:
-        """Write the document and the table, and return their paths."""
-        paths = [self._out / HISTORY_DOCUMENT, self._out / HISTORY_TABLE]
+    def finish(
+        self,
+        document: Mapping[str, Any],
+        pairs: Mapping[str, Mapping[str, Any]],
+        rows: Mapping[PlannedRide, Mapping[str, Any]],
+    ) -> list[Path]:
+        """Write the documents, the table and the pages, and return the paths of the document, the table and the page.
+
+        Pages of turning points that there are no more, since a release was added between, are removed.
+
+        Parameters
+        ----------
+        document : mapping
+            Of the history.
+        pairs : mapping
+            Documents of the rides of turning points, by name of the file.
+        rows : mapping
+            By ride.
+        """
+        from ...reports.page import make_history_page, make_ride_pair_page
+
+        paths = [self._out / HISTORY_DOCUMENT, self._out / HISTORY_TABLE, self._out / HISTORY_PAGE]
+        folder = self._out / PAIR_FOLDER
+        for name, pair in pairs.items():
+            make_folder(folder)
+            write_json(folder / f"{name}.json", pair)
+            write_text(folder / f"{name}.html", make_ride_pair_page(pair, f"../{HISTORY_PAGE}"))
         write_json(paths[0], document)
         _write_table(paths[1], rows)
+        write_text(paths[2], make_history_page(document))
+        for path in [*folder.glob("*.json"), *folder.glob("*.html")]:
+            if path.stem not in pairs:
+                path.unlink()
         return paths
 
     def _path(self, ride: PlannedRide) -> Path:

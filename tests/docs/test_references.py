@@ -114,6 +114,7 @@ def test_every_column_of_a_trajectory_is_in_the_reference() -> None:
 
 RUN = "run q2-plus --engine mujoco-multipliers --duration 0.5 --json --out"
 SWEEP = 'scenario = "q2"\n[grid]\nsimulation.duration = [1.0]\nperturbation.lean_rate = [0.0, 0.1]\n'
+HISTORY = "history wheelmill==1.0,1.1 circle.toml --cache cache --out history"
 DOCUMENTS = {
     "list": ["list --json"],
     "run": [f"{RUN} runs"],
@@ -130,7 +131,8 @@ DOCUMENTS = {
     ],
     "float32": ["float32 plane-circle --engine mujoco-native --duration 0.5 --starts 2 --json"],
     "league": ["league plane-circle --engine mujoco-native --duration 0.5 --json"],
-    "history": ["history wheelmill==1.0,1.1 circle.toml --cache cache --json"],
+    "history": [f"{HISTORY} --json"],
+    "history-rides": [HISTORY],
     "sweep": ["sweep sweep.toml --json"],
     "critical": ["critical --json"],
     "atlas": ["atlas --size 2000 --json"],
@@ -163,13 +165,16 @@ def test_every_key_of_a_document_is_in_the_reference(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "sweep.toml").write_text(SWEEP, encoding="utf-8")
-    if name == "history":
+    if name in ("history", "history-rides"):
         make_releases(tmp_path, monkeypatch)
     printed = ""
     for line in DOCUMENTS[name]:
         printed = typed(line, tmp_path)
     if name == "manifest":
         (path,) = tmp_path.glob("runs/*/manifest.json")
+        printed = path.read_text(encoding="utf-8")
+    if name == "history-rides":
+        (path,) = tmp_path.glob("history/rides/*.json")
         printed = path.read_text(encoding="utf-8")
     document: dict[str, Any] = json.loads(printed)
     keys = documented()[name]["keys"]

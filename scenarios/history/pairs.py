@@ -1,0 +1,113 @@
+"""The documents of pairs of rides: what the two releases of a turning point ride, side by side."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from pathlib import PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from ..run import library_versions
+from .plan import HistoryPlan, PlannedRide
+from .releases import Release
+
+PAIR_FOLDER = "rides"  # of the documents and pages, beside the document of the history
+
+Row = Mapping[str, Any]
+
+
+def make_pair_documents(
+    plan: HistoryPlan, rows: Mapping[PlannedRide, Row], document: Mapping[str, Any]
+) -> dict[str, dict[str, Any]]:
+    """Return the documents of the turning points whose two releases both ride.
+
+    Parameters
+    ----------
+    plan : HistoryPlan
+    rows : mapping
+        By ride.
+    document : mapping
+        Of the history, by `velodrome.scenarios.history.document.make_history_document`.
+
+    Returns
+    -------
+    dict
+        By name of the file, without its suffix, as the turning points have it in ``page``.
+    """
+    rides = {(ride.release.label, ride.engine, ride.scenario): ride for ride in rows}
+    found = {}
+    for point in document["turning_points"]:
+        if point["page"] is not None:
+            before, after = (rides[point[key], point["engine"], point["scenario"]] for key in ("since", "release"))
+            found[PurePosixPath(point["page"]).stem] = _describe_pair(
+                plan, (before, after), (rows[before], rows[after]), point
+            )
+    return found
+
+
+def _describe_pair(
+    plan: HistoryPlan, rides: tuple[PlannedRide, PlannedRide], rows: tuple[Row, Row], point: Mapping[str, Any]
+) -> dict[str, Any]:
+    before, after = (
+        {
+            "release": ride.release.label,
+            "date": plan.find_date(ride.release),
+            "bits": row["bits"],
+            "settings": row["settings"],
+            "quantities": row["quantities"],
+            "time": row["samples"]["time"],
+            "position": [sample[:3] for sample in row["samples"]["q"]],
+        }
+        for ride, row in zip(rides, rows, strict=True)
+    )
+    first, second = rides[0].release, rides[1].release
+    return {
+        "package": plan.package,
+        "engine": rides[1].engine,
+        "scenario": rides[1].scenario,
+        "title": plan.scenarios[rides[1].scenario].title,
+        "verdict": point["verdict"],
+        "moved": point["quantities"],
+        "limits": rows[0]["limits"] | rows[1]["limits"],
+        "before": before,
+        "after": after,
+        "distance": measure_separation(before, after),
+        "libraries": list_suite_versions(plan.package),
+        "command": write_pair_command(first, second, rides[1].engine, rides[1].scenario),
+    }
+
+
+def list_suite_versions(package: str) -> dict[str, str]:
+    """Return the versions of the suite's environment, without the package whose releases ride."""
+    return {name: version for name, version in library_versions().items() if name != package}
+
+
+def measure_separation(before: Row, after: Row) -> dict[str, list[float]]:
+    """Return the distance of the points D of two rides at the samples that both have.
+
+    Parameters
+    ----------
+    before, after : mapping
+        With ``time`` and ``position``.
+
+    Returns
+    -------
+    dict
+        ``time`` [s] and ``distance`` [m], of equal length.
+    """
+    time, first, second = np.intersect1d(before["time"], after["time"], return_indices=True)
+    if not time.size:
+        return {"time": [], "distance": []}
+    apart = np.array(after["position"])[second] - np.array(before["position"])[first]
+    return {"time": time.tolist(), "distance": np.linalg.norm(apart, axis=1).tolist()}
+
+
+def write_pair_command(before: Release, after: Release, engine: str, scenario: str) -> str:
+    """Return the command that rides two releases again, for the shell; wheels are named as the user did."""
+    versions = [release.version for release in (before, after) if release.wheel is None]
+    wheels = [str(release.wheel) for release in (before, after) if release.wheel is not None]
+    wanted = before.package + ("==" + ",".join(versions) if versions else "")
+    named = [part for wheel in wheels for part in ("--wheel", wheel)]
+    return shlex.join(["velodrome", "history", wanted, scenario, "--engine", engine, *named, "--out", "two-releases"])
