@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import prod
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,9 @@ from velodrome.engines.engine import REQUIRED, SHAPES, Trajectory
 from velodrome.scenarios.history.ride import digest_ride
 
 COUNT = 3
+SAMPLES: dict[str, Any] = {
+    name: np.linspace(0.1, 0.9, COUNT * prod(SHAPES[name])).reshape(COUNT, *SHAPES[name]) for name in REQUIRED
+}
 RIDE = Trajectory(
     engine="mill",
     version="1.0",
@@ -19,7 +23,7 @@ RIDE = Trajectory(
     steps=500,
     cpu_time=0.25,
     ended=None,
-    **{name: np.linspace(0.1, 0.9, COUNT * prod(SHAPES[name])).reshape(COUNT, *SHAPES[name]) for name in REQUIRED},
+    **SAMPLES,
 )
 
 
@@ -33,7 +37,7 @@ RIDE = Trajectory(
     ],
     ids=lambda told: "-".join(told),
 )
-def test_what_is_told_about_a_ride_is_no_part_of_it(told: dict[str, object]) -> None:
+def test_what_is_told_about_a_ride_is_no_part_of_it(told: dict[str, Any]) -> None:
     assert digest_ride(replace(RIDE, **told)) == digest_ride(RIDE)
 
 
@@ -45,5 +49,5 @@ def test_a_last_bit_of_a_sample_is_a_part_of_it(name: str) -> None:
 
 
 @pytest.mark.parametrize("ridden", [{"steps": 501}, {"ended": "fell"}], ids=lambda ridden: "-".join(ridden))
-def test_the_steps_and_the_end_are_parts_of_it(ridden: dict[str, object]) -> None:
+def test_the_steps_and_the_end_are_parts_of_it(ridden: dict[str, Any]) -> None:
     assert digest_ride(replace(RIDE, **ridden)) != digest_ride(RIDE)
