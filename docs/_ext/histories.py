@@ -46,7 +46,7 @@ def describe_history(package: str) -> str:
     for scenario in document["scenarios"]:
         for engine in document["engines"]:
             own = [row for row in rows if (row["scenario"], row["engine"]) == (scenario, engine)]
-            lines += [f"| {scenario} | `{engine}` | {_describe_group(group)} |" for group in group_releases(own)]
+            lines += [f"| `{scenario}` | `{engine}` | {_describe_group(group)} |" for group in group_releases(own)]
     return "\n".join(lines)
 
 
@@ -56,7 +56,8 @@ def _describe_group(group: Sequence[Mapping[str, Any]]) -> str:
     name = first["release"] if len(group) == 1 else f"{first['release']} to {last['release']} ({len(group)})"
     inside = {row["since_previous"] for row in group[1:]}
     if first["status"] != "rode":
-        how = f"{first['status']}: {first['reason'].partition(', this is ')[0]}"
+        reason = first["reason"].partition(", this is ")[0].removeprefix(f"{first['engine']} ")
+        how = f"{first['status']}: {reason}"
     elif not inside:
         how = "rode"
     else:
@@ -67,7 +68,7 @@ def _describe_group(group: Sequence[Mapping[str, Any]]) -> str:
     elif not count:
         step = _INSIDE[since]
     elif first["changed"] == ["run"]:
-        step = f"{since}: it {'rides, and the one before did not' if since == 'better' else 'does not ride any more'}"
+        step = f"{since}: it rides" if since == "better" else f"{since}: it does not ride"
     else:
         step = f"{since}: {count} {'quantities' if count > 1 else 'quantity'}"
     return f"{name} | {how} | {step}"
@@ -82,21 +83,18 @@ def describe_turning_point(package: str, release: str) -> str:
         + ("rides, and did not before" if point["verdict"] == "better" else "does not ride any more")
         for point in starts
     ]
-    if points:
-        since = points[0]["since"]
-        lines += ["", f"| engine | scenario | quantity | {since} | {release} | limit | |"]
-        lines += ["| --- | --- | --- | ---: | ---: | ---: | --- |"]
     for point in points:
         moves = rank_moves(point["quantities"])
-        for number, move in enumerate(moves[:MOST_QUANTITIES]):
-            who = f"`{point['engine']}` | {point['scenario']}" if number == 0 else " | "
+        lines += ["", f"`{point['engine']}` on {point['scenario']}: {point['verdict']}", ""]
+        lines += [f"| quantity | {point['since']} | {release} | limit | |", "| --- | ---: | ---: | ---: | --- |"]
+        for move in moves[:MOST_QUANTITIES]:
             unit = describe_unit(move["quantity"])
             title = format_title(move["quantity"]) + (f" [{unit}]" if unit else "")
             before, after = format_numbers(move["before"], move["after"])
-            lines.append(f"| {who} | {title} | {before} | {after} | {format_limit(move['limit'])} | {move['status']} |")
+            lines.append(f"| {title} | {before} | {after} | {format_limit(move['limit'])} | {move['status']} |")
         others = ", ".join(format_title(move["quantity"]) for move in moves[MOST_QUANTITIES:])
         if others:
-            lines.append(f"| | | and {others} | | | | |")
+            lines += ["", f"And {others}."]
     return "\n".join(lines)
 
 
