@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from velodrome.reports.page import group_releases
-from velodrome.reports.page.history import describe_unit, format_limit, format_numbers, rank_moves
+from velodrome.reports.page.history import describe_unit, format_figures, format_limit, rank_moves
 from velodrome.reports.page.judged_quantities import format_title
 
 HISTORIES = Path(__file__).parents[1] / "histories"
@@ -90,7 +90,7 @@ def describe_turning_point(package: str, release: str) -> str:
         for move in moves[:MOST_QUANTITIES]:
             unit = describe_unit(move["quantity"])
             title = format_title(move["quantity"]) + (f" [{unit}]" if unit else "")
-            before, after = format_numbers(move["before"], move["after"])
+            before, after = format_figures(move["before"], move["after"])
             lines.append(f"| {title} | {before} | {after} | {format_limit(move['limit'])} | {move['status']} |")
         others = ", ".join(format_title(move["quantity"]) for move in moves[MOST_QUANTITIES:])
         if others:
