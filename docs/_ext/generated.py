@@ -18,6 +18,7 @@ from command_pages import describe_commands
 from documents import describe_columns_of_trajectories, describe_documents
 from engine_settings import describe_engines
 from faces import describe_module
+from histories import describe_history, describe_turning_point
 from metric_tables import describe_columns, describe_metrics
 from scenario_files import describe_scenario_file, describe_sweep_file
 
@@ -27,10 +28,12 @@ GENERATORS: dict[str, Callable[..., str]] = {
     "commands": describe_commands,
     "documents": describe_documents,
     "engines": describe_engines,
+    "history": describe_history,
     "metrics": describe_metrics,
     "scenario-file": describe_scenario_file,
     "sweep-file": describe_sweep_file,
     "trajectory-columns": describe_columns_of_trajectories,
+    "turning-point": describe_turning_point,
 }
 MARK = re.compile(r"^<!-- generated: ([a-z-]+)((?: [\w.]+)*) -->$", re.MULTILINE)
 _MADE_BY_THE_BUILD = re.compile(rf"{MARK.pattern}|^```\{{(drawn|typed)\}}", re.MULTILINE)

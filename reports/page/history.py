@@ -100,7 +100,7 @@ def make_history_page(document: Mapping[str, Any]) -> str:
     )
 
 
-def format_numbers(*values: float | None) -> list[str]:
+def format_figures(*values: float | None) -> list[str]:
     """Return numbers as text, different where the numbers are; a dash for None."""
     there = [value for value in values if value is not None]
     texts = iter(format_distinct(there, _DIGITS))
@@ -129,7 +129,7 @@ def _describe_move(move: Mapping[str, Any]) -> tuple[str, str]:
         return {"better": "it rides, and the one before did not", "worse": "it does not ride any more"}[
             move["status"]
         ], ""
-    before, after = format_numbers(move["before"], move["after"])
+    before, after = format_figures(move["before"], move["after"])
     return format_title(move["quantity"]), f"{before} → {after}"
 
 
@@ -267,7 +267,7 @@ def _describe_point(point: Mapping[str, Any] | None) -> dict[str, Any] | None:
             {
                 "title": format_title(move["quantity"]),
                 "unit": describe_unit(move["quantity"]),
-                "cells": [*format_numbers(move["before"], move["after"]), format_limit(move["limit"])],
+                "cells": [*format_figures(move["before"], move["after"]), format_limit(move["limit"])],
                 "kind": find_moved_kind(move["status"]),
             }
             for move in rank_moves(point["quantities"])
@@ -285,7 +285,7 @@ def _make_figure(rows: Sequence[Row], name: str) -> dict[str, Any] | None:
     moved = [row["release"] for row in rows if name in row["changed"]]
     values = [(row["release"], row["quantities"].get(name)) for row in rows]
     there = [(release, value) for release, value in values if value is not None]
-    texts = format_numbers(*(value for _, value in there))
+    texts = format_figures(*(value for _, value in there))
     spoken = f"{format_title(name)}: {texts[0]} in {there[0][0]}"
     if len(there) > 1:
         spoken += f", {texts[-1]} in {there[-1][0]}"
@@ -305,7 +305,7 @@ def _make_figure(rows: Sequence[Row], name: str) -> dict[str, Any] | None:
 
 def _make_table(rows: Sequence[Row], quantities: Sequence[str]) -> list[tuple[Row, CellKind, list[tuple[str, bool]]]]:
     """Return rows with their kind and, for every quantity, its figure and whether it moved."""
-    columns = {name: format_numbers(*(row["quantities"].get(name) for row in rows)) for name in quantities}
+    columns = {name: format_figures(*(row["quantities"].get(name) for row in rows)) for name in quantities}
     return [
         (row, find_cell_kind(row), [(columns[name][number], name in row["changed"]) for name in quantities])
         for number, row in enumerate(rows)

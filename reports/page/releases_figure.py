@@ -17,6 +17,7 @@ _PADDING = 0.06  # of the axis, beyond the smallest and the largest value
 LABEL_SPACING = 15.0  # least distance of two labels [percent of the figure's height]
 _LOG_FROM = 10.0  # ratio of the largest to the smallest value from which the axis is logarithmic
 _LABEL_ROOM = 24.0  # least distance of two labels of releases [percent of the figure's width]
+_DATE_WIDTH = 30.0  # of a release's date [percent of the figure's width]
 _MOST_DIGITS = 17
 _MOST_LABEL_DIGITS = 7  # of a label beside the figure, which has no room for more
 
@@ -76,8 +77,8 @@ def draw_releases(rows: Sequence[Row], name: str, absolute: bool = False) -> dic
     dict or None
         ``log``; ``line``, an SVG path; ``marks`` with ``at``, ``up``, ``row`` (index) and ``moved``; ``bands`` with
         ``at``, ``width``, ``top`` and ``height`` of what the limit allows; ``gaps`` with ``at`` and ``width`` of
-        releases that did not ride; ``labels`` of values with ``up`` and ``text``; ``releases`` with ``at``, ``row`` and
-        ``side``. None where no release has a value.
+        releases that did not ride; ``labels`` of values with ``up`` and ``text``; ``releases`` with ``at``, ``row``,
+        ``side`` and ``dated``, whether there is room for the date. None where no release has a value.
     """
     values = [row["quantities"].get(name) for row in rows]
     there = [value for value in values if value is not None]
@@ -175,13 +176,16 @@ def _label_releases(
 ) -> list[dict[str, Any]]:
     """Return the releases named at the axis: the first, the last, and those between that moved the quantity."""
     last = len(rows) - 1
-    found = [{"at": 0.0, "row": 0, "side": "left"}]
+    found: list[dict[str, Any]] = [{"at": 0.0, "row": 0, "side": "left", "dated": True}]
     if last > 0:
-        found.append({"at": 100.0, "row": last, "side": "right"})
+        found.append({"at": 100.0, "row": last, "side": "right", "dated": True})
     for number, value in enumerate(values):
         at = centre(number)
         if value is None or name not in rows[number]["changed"] or number in (0, last):
             continue
         if all(abs(at - other["at"]) >= _LABEL_ROOM for other in found):
-            found.append({"at": at, "row": number, "side": "middle"})
+            # The dates of the ends are beside the ends, those between are about their places.
+            shares = ((other, 0.5 if other["side"] == "middle" else 1.0) for other in found if other["dated"])
+            dated = all(abs(at - other["at"]) >= (share + 0.5) * _DATE_WIDTH for other, share in shares)
+            found.append({"at": at, "row": number, "side": "middle", "dated": dated})
     return found

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from .curves import round_values
 from .document import list_engine_styles, load_template, read_part
-from .history import describe_unit, find_moved_kind, format_limit, format_numbers, rank_moves
+from .history import describe_unit, find_moved_kind, format_figures, format_limit, rank_moves
 from .judged_quantities import format_title
 from .loglog import fit_axis
 from .releases_figure import LABEL_SPACING
@@ -133,7 +133,7 @@ def _make_rows(document: Mapping[str, Any]) -> list[dict[str, Any]]:
         {
             "title": format_title(name),
             "unit": describe_unit(name),
-            "cells": [*format_numbers(before.get(name), after.get(name)), format_limit(document["limits"].get(name))],
+            "cells": [*format_figures(before.get(name), after.get(name)), format_limit(document["limits"].get(name))],
             "kind": find_moved_kind(moved[name]["status"]) if name in moved else None,
             "judged": name in document["limits"],
         }

@@ -155,8 +155,13 @@ def ride_release(ride: MeasuredRide, name: str, own: list[Path]) -> dict[str, An
 
 
 def digest_ride(trajectory: Trajectory) -> str:
-    """Return the SHA-256 of all that an engine computed: samples, steps and its end, but neither version nor clock."""
-    return digest(trajectory_table(replace(trajectory, version="", cpu_time=0.0))).decode()
+    """Return the SHA-256 of what an engine rode: samples, steps and end, but neither version, settings nor clock.
+
+    The settings say what the model leaves out or replaces in a release, which need not change a bit of the ride. Nor
+    need what the solver leaves, which is not known in every release.
+    """
+    ridden = replace(trajectory, version="", settings={}, cpu_time=0.0, unconverged_steps=None, largest_residual=None)
+    return digest(trajectory_table(ridden)).decode()
 
 
 def thin_ride(trajectory: Trajectory) -> dict[str, Any]:

@@ -269,6 +269,18 @@ def test_values_of_both_signs_have_a_linear_axis_and_gaps_break_the_line() -> No
     assert draw_releases(rows, "other") is None
 
 
+@pytest.mark.parametrize(("count", "turned", "dated"), [(4, 2, False), (9, 4, True), (9, 5, False), (9, 1, None)])
+def test_a_date_at_the_axis_is_left_out_where_it_would_lie_on_another(
+    count: int, turned: int, dated: bool | None
+) -> None:
+    rows = [row(str(k), "worse" if k else None, quantities={"e": 1.0 + k}) for k in range(count)]
+    rows[turned]["changed"] = ["e"]
+    drawn = draw_releases(rows, "e")
+    assert drawn is not None
+    assert [label["dated"] for label in drawn["releases"][:2]] == [True, True]
+    assert [label["dated"] for label in drawn["releases"][2:]] == ([] if dated is None else [dated])
+
+
 def test_a_limit_of_its_own_is_a_band_from_zero() -> None:
     rows = [row("1", quantities={"e": 0.25}, limits={"e": 1.0})]
     drawn = draw_releases(rows, "e", absolute=True)
@@ -314,7 +326,7 @@ def test_anchors_are_safe_and_differ() -> None:
     chosen = [
         names.choose(*parts) for parts in (("a/../b", "1.0"), ("a b", "1.0"), ("A b", "1.0"), ("", ""), ("x" * 999,))
     ]
-    assert chosen[:4] == ["a-b-1.0" if False else chosen[0], "a-b-1.0", "A-b-1.0-2", "x-x"]
+    assert chosen[:4] == ["a-..-b-1.0", "a-b-1.0", "A-b-1.0-2", "x-x"]
     assert len({name.lower() for name in chosen}) == len(chosen)
     assert all(re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9.-]{0,125}", name) for name in chosen)
 
