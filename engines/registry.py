@@ -85,8 +85,14 @@ def uninstalled_engines() -> dict[str, str]:
     return {name: install_command(point) for name, point in points if list_missing(point)}
 
 
-def load_engine(name: str) -> GuardedEngine:
+def load_engine(name: str, any_release: bool = False) -> GuardedEngine:
     """Load an engine by name.
+
+    Parameters
+    ----------
+    name : str
+    any_release : bool
+        Whether it is loaded with releases of its library that its extra excludes; its ``check`` may refuse them.
 
     Raises
     ------
@@ -97,7 +103,7 @@ def load_engine(name: str) -> GuardedEngine:
     points = _find_entry_points()
     if name not in points:
         raise ValueError(f"engine {name!r} is not installed ({suggest_name(name, engine_names())})")
-    missing = list_missing(points[name])
+    missing = list_missing(points[name], any_release)
     if missing:
         raise ValueError(
             f"engine {name!r} needs {' and '.join(missing)}, not installed; install: {install_command(points[name])}"
