@@ -99,7 +99,7 @@ def configure_engine(name: str, values: Mapping[str, Any], any_release: bool = F
     name : str
     values : mapping
     any_release : bool
-        Whether releases of its library that its extra excludes are loaded too.
+        Whether releases of its library that its extra excludes are loaded too; see `load_engine`.
 
     Raises
     ------

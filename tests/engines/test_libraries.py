@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from importlib.metadata import Distribution, EntryPoint
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from velodrome.engines.registry import (
     preview_engine,
     uninstalled_engines,
 )
+from velodrome.engines.releases import LibraryReach
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run import plan_run
 from velodrome.scenarios.scenario import choose_engines, configure_engine, list_engine_faults, load_scenario
@@ -76,7 +78,13 @@ def test_an_engine_without_its_library_is_refused_with_the_command(package: None
     assert load_engine("flywheel-present").name == "flywheel-present"
 
 
-def test_an_engine_is_loaded_with_a_release_that_its_extra_excludes_if_asked_to(package: None) -> None:
+def test_an_engine_that_knows_its_releases_is_loaded_with_those_that_its_extra_excludes_if_asked_to(
+    package: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(ScenarioError, match=r"needs numpy>=1000, not installed"):
+        configure_engine("flywheel-older", {}, any_release=True)
+    reach = LibraryReach("numpy", "numpy", oldest="1.0.0", needs="arrays")
+    monkeypatch.setattr(import_module("flywheel").Named, "reach", reach, raising=False)
     assert load_engine("flywheel-older", any_release=True).name == "flywheel-older"
     assert configure_engine("flywheel-older", {}, any_release=True)[0].name == "flywheel-older"
     with pytest.raises(ScenarioError, match=r"needs numpy>=1000, not installed"):
