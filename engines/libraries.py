@@ -13,12 +13,14 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 
-def list_missing(point: EntryPoint) -> list[str]:
+def list_missing(point: EntryPoint, any_release: bool = False) -> list[str]:
     """Return the requirements of an engine's extras that are not installed, or only in an unsuitable version.
 
     Parameters
     ----------
     point : EntryPoint
+    any_release : bool
+        Whether every installed version counts as suitable.
 
     Returns
     -------
@@ -28,7 +30,7 @@ def list_missing(point: EntryPoint) -> list[str]:
     if not point.extras or point.dist is None:
         return []
     needed = _list_extra_requirements(point)
-    return [f"{found.name}{found.specifier}" for found in needed if not _is_installed(found)]
+    return [f"{found.name}{found.specifier}" for found in needed if not _is_installed(found, any_release)]
 
 
 def list_extra_packages(point: EntryPoint) -> list[str]:
@@ -54,9 +56,9 @@ def install_command(point: EntryPoint) -> str:
     return f"pip install '{package}[{','.join(point.extras)}]'"
 
 
-def _is_installed(requirement: Requirement) -> bool:
+def _is_installed(requirement: Requirement, any_release: bool) -> bool:
     try:
         found = version(requirement.name)
     except PackageNotFoundError:
         return False
-    return requirement.specifier.contains(found, prereleases=True)
+    return any_release or requirement.specifier.contains(found, prereleases=True)

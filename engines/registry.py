@@ -17,6 +17,7 @@ from .format_version import VERSION_KEY
 from .guard import GuardedEngine, call_engine, where_raised
 from .libraries import install_command, list_extra_packages, list_missing
 from .names import suggest_name
+from .releases import find_reach
 
 ENTRY_POINT_GROUP = "velodrome.engines"
 _FACTS = ("name", "version", "gives", "settings")
@@ -85,8 +86,15 @@ def uninstalled_engines() -> dict[str, str]:
     return {name: install_command(point) for name, point in points if list_missing(point)}
 
 
-def load_engine(name: str) -> GuardedEngine:
+def load_engine(name: str, any_release: bool = False) -> GuardedEngine:
     """Load an engine by name.
+
+    Parameters
+    ----------
+    name : str
+    any_release : bool
+        Whether an engine that declares a `LibraryReach` is loaded with releases of its library that its extra excludes
+        as well; its ``check`` refuses those with which it cannot ride.
 
     Raises
     ------
@@ -98,6 +106,10 @@ def load_engine(name: str) -> GuardedEngine:
     if name not in points:
         raise ValueError(f"engine {name!r} is not installed ({suggest_name(name, engine_names())})")
     missing = list_missing(points[name])
+    if any_release and missing and not list_missing(points[name], any_release=True):
+        engine = _read_engine(points[name], _MEMBERS)
+        if find_reach(engine) is not None:
+            return engine
     if missing:
         raise ValueError(
             f"engine {name!r} needs {' and '.join(missing)}, not installed; install: {install_command(points[name])}"

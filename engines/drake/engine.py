@@ -11,7 +11,9 @@ from ...reference.kinematics import WHEELS
 from ...reference.simulate import steps_per_output
 from ..contact_fields import observe_contact_fields
 from ..coordinates import coordinates_from_bodies, quaternions, start_on_turn
-from ..engine import Problem, Progress, Settings, Trajectory, UnsuitableProblem, package_version
+from ..engine import Problem, Progress, Settings, Trajectory, UnsuitableProblem
+from ..releases import LibraryReach
+from .releases import DRAKE
 from .settings import DrakeContactSettings, DrakeMultiplierSettings
 
 if TYPE_CHECKING:
@@ -36,6 +38,8 @@ class DrakeEngine(Generic[S]):
     settings_source : str
         Whose choice its default settings are.
     gives : tuple of str
+    reach : LibraryReach
+        The releases of Drake with which it rides.
     """
 
     name: str
@@ -44,18 +48,22 @@ class DrakeEngine(Generic[S]):
     description: str
     settings_source: str
     gives: tuple[str, ...] = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
+    reach: LibraryReach = DRAKE
     takes_inputs = True
 
     @property
     def version(self) -> str:
         """Version of Drake."""
-        return package_version("drake")
+        return self.reach.version
 
     def check(self, problem: Problem, settings: Any) -> None:
-        """Refuse output times that are not multiples of the step, and wheels without inertia about their axles.
+        """Refuse untried releases, output times between two steps, and wheels without inertia about their axles.
 
         See `velodrome.engines.engine.Engine`.
         """
+        refusal = self.reach.find_refusal(self.name, settings)
+        if refusal is not None:
+            raise UnsuitableProblem(refusal)
         steps_per_output(problem.times, settings.step)
         for wheel in WHEELS:
             if not getattr(problem.bicycle, f"{wheel}_wheel_Iyy") > 0:
@@ -87,7 +95,8 @@ class DrakeEngine(Generic[S]):
         Raises
         ------
         ValueError
-            If an output time lies between two steps, or a wheel has no inertia about its axle.
+            If this release of Drake is too old, an output time lies between two steps, or a wheel has no inertia about
+            its axle.
         EngineError
             If Drake refuses the bicycle, or a wheel has no contact point at the start.
         """

@@ -11,6 +11,8 @@ from typing import Any
 
 from ..engine import Problem, Progress, Trajectory, package_version
 from ..mujoco.engine import GIVES, assemble_trajectory, step_counts
+from ..mujoco.state import to_mujoco
+from ..single_precision import SinglePrecision, SinglePrecisionVariant
 from .settings import WarpSettings
 
 
@@ -27,6 +29,8 @@ class WarpEngine:
     settings_source : str
         Whose choice its default settings are.
     gives : tuple of str
+    single_precision : SinglePrecision or None
+        What it rides in float32 of another engine's rides in float64.
     """
 
     name: str
@@ -34,6 +38,7 @@ class WarpEngine:
     description: str
     settings_source: str
     gives: tuple[str, ...] = GIVES
+    single_precision: SinglePrecision | None = None
     takes_inputs = True
 
     @property
@@ -100,4 +105,11 @@ ENGINE = WarpEngine(
     description="MuJoCo Warp, MuJoCo's port to Warp in single precision, with the model of mujoco-native",
     settings_source="those of mujoco-native, whose model it rides: the suite's own choice within MuJoCo's limits; the "
     "tolerance is MuJoCo Warp's least",
+    single_precision=SinglePrecision(
+        counterpart="mujoco-native",
+        variants=(SinglePrecisionVariant("float32"),),
+        # A tolerance tighter than its own it does not know; Newton's method stops far below it in double precision too.
+        common={},
+        store=to_mujoco,
+    ),
 )

@@ -132,7 +132,7 @@ def _warm_up(ride: MeasuredRide) -> None:
 def ride_release(ride: MeasuredRide, name: str, own: list[Path]) -> dict[str, Any]:
     """Ride an engine with the laid-over release, and return the row of its result."""
     try:
-        engine, settings = configure_engine(name, ride.settings_of(name))
+        engine, settings = configure_engine(name, ride.settings_of(name), any_release=True)
         sample = call_engine(take_sample, ride.start, ride.exact, ride.gate, engine, settings, watch=lambda _: None)
         require_loaded_from(own)
     except (UnsuitableProblem, ScenarioError) as error:

@@ -91,8 +91,15 @@ def choose_engines(wanted: Iterable[str] | None) -> tuple[EngineChoice, dict[str
     return EngineChoice(names, frozenset(name for name in asked if name in installed)), faults
 
 
-def configure_engine(name: str, values: Mapping[str, Any]) -> tuple[Engine, Settings]:
+def configure_engine(name: str, values: Mapping[str, Any], any_release: bool = False) -> tuple[Engine, Settings]:
     """Load an engine and validate its settings.
+
+    Parameters
+    ----------
+    name : str
+    values : mapping
+    any_release : bool
+        Whether releases of its library that its extra excludes are loaded too; see `load_engine`.
 
     Raises
     ------
@@ -100,7 +107,7 @@ def configure_engine(name: str, values: Mapping[str, Any]) -> tuple[Engine, Sett
         If there is no such engine, or settings are unknown or out of range. The message lists all faults in one line.
     """
     try:
-        engine = load_engine(name)
+        engine = load_engine(name, any_release)
     except ValueError as error:
         raise ScenarioError(" ".join(str(error).split())) from error
     where = f"engines.{name}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from importlib.metadata import Distribution, EntryPoint
 from pathlib import Path
 
@@ -16,9 +17,10 @@ from velodrome.engines.registry import (
     preview_engine,
     uninstalled_engines,
 )
+from velodrome.engines.releases import LibraryReach
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run import plan_run
-from velodrome.scenarios.scenario import choose_engines, list_engine_faults, load_scenario
+from velodrome.scenarios.scenario import choose_engines, configure_engine, list_engine_faults, load_scenario
 from velodrome.scenarios.show import make_document, make_schema
 from velodrome.scenarios.sweep.file import SweepFile
 
@@ -74,6 +76,21 @@ def test_an_engine_without_its_library_is_refused_with_the_command(package: None
     ):
         plan_run(*load_scenario("q2"), ["flywheel-older"])
     assert load_engine("flywheel-present").name == "flywheel-present"
+
+
+def test_an_engine_that_knows_its_releases_is_loaded_with_those_that_its_extra_excludes_if_asked_to(
+    package: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(ScenarioError, match=r"needs numpy>=1000, not installed"):
+        configure_engine("flywheel-older", {}, any_release=True)
+    reach = LibraryReach("numpy", "numpy", oldest="1.0.0", needs="arrays")
+    monkeypatch.setattr(import_module("flywheel").Named, "reach", reach, raising=False)
+    assert load_engine("flywheel-older", any_release=True).name == "flywheel-older"
+    assert configure_engine("flywheel-older", {}, any_release=True)[0].name == "flywheel-older"
+    with pytest.raises(ScenarioError, match=r"needs numpy>=1000, not installed"):
+        configure_engine("flywheel-older", {})
+    with pytest.raises(ValueError, match=r"needs no-such-library>=2\.0, not installed"):
+        load_engine("flywheel-absent", any_release=True)
 
 
 def test_the_settings_of_an_engine_are_read_without_its_library(package: None) -> None:
