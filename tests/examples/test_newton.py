@@ -25,11 +25,12 @@ pytestmark = pytest.mark.engines
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FRICTION = EXAMPLES / "defects" / "newton_solreffriction.py"
 COLLISIONS = EXAMPLES / "defects" / "newton_self_collisions.py"
+GRAVITY = EXAMPLES / "defects" / "newton_ignored_gravity.py"
 IMPORT = EXAMPLES / "newton_import.py"
 FIXED = f"Newton {newton.__version__} has mended this"
 
 
-@pytest.mark.parametrize("script", [FRICTION, COLLISIONS], ids=lambda script: script.stem)
+@pytest.mark.parametrize("script", [FRICTION, COLLISIONS, GRAVITY], ids=lambda script: script.stem)
 def test_the_script_shows_the_defect(script: Path, tmp_path: Path) -> None:
     """Alone, without the suite, and by its exit status."""
     done = subprocess.run(
@@ -70,6 +71,28 @@ def test_a_cure_of_the_lost_ground_is_seen(monkeypatch: pytest.MonkeyPatch, caps
     monkeypatch.setattr(newton.ModelBuilder, "add_mjcf", add_mended)
     assert runpy.run_path(str(COLLISIONS), run_name="example")["main"]() == 0
     assert "cured: " in capsys.readouterr().out
+
+
+def test_a_ball_of_the_moon_falls_as_on_earth() -> None:
+    script = runpy.run_path(str(GRAVITY), run_name="example")
+    right = script["measure_fall"](mujoco.MjModel.from_xml_string(script["BALL"]))
+    np.testing.assert_allclose(right, script["GRAVITY"], rtol=1e-9)
+    np.testing.assert_allclose(script["measure_fall"](script["import_model"]()), 9.81, rtol=script["ACCURACY"])
+
+
+def test_a_cure_of_the_ignored_options_is_seen(capsys: pytest.CaptureFixture[str]) -> None:
+    main = runpy.run_path(str(GRAVITY), run_name="example")["main"]
+    load = main.__globals__["import_model"]
+
+    def load_mended(gravity: float, step: float) -> Any:
+        model = load()
+        model.opt.gravity[:], model.opt.timestep = (0, 0, -gravity), step
+        return model
+
+    for gravity, step, lost in ((1.62, 0.002, "timestep"), (9.81, 0.0005, "gravity"), (1.62, 0.0005, None)):
+        main.__globals__["import_model"] = lambda gravity=gravity, step=step: load_mended(gravity, step)
+        assert main() == (lost is not None)
+        assert (f"the file's {lost} is not read" if lost else "cured: ") in capsys.readouterr().out
 
 
 def test_every_change_of_the_bicycle_is_known() -> None:
