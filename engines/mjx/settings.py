@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from ..mujoco.ports import BatchSettings, PortSolverSettings
+from ..mujoco.ports import LEAST_SINGLE_STEP, BatchSettings, PortSolverSettings
 from ..mujoco.settings import MultiplierSettings
 
 Precision = Literal["float64", "float32"]
@@ -27,6 +27,15 @@ class ArraySettings(BatchSettings):
         description="number of equal rides that are computed at once; the last bits depend on it",
         json_schema_extra={"unit": "1"},
     )
+
+    @model_validator(mode="after")
+    def _step_suits_precision(self) -> Self:
+        if self.precision == "float32" and self.step < LEAST_SINGLE_STEP:
+            raise ValueError(
+                f"step is {self.step!r}; with precision float32 it must be at least {LEAST_SINGLE_STEP!r} s, since "
+                "rounded positions leave nothing of shorter ones"
+            )
+        return self
 
     @property
     def round_off(self) -> float:

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from ..mujoco.ports import BatchSettings, PortSolverSettings
+from ..mujoco.ports import LEAST_SINGLE_STEP, BatchSettings, PortSolverSettings
 from ..mujoco.settings import ContactSettings
 
 SINGLE = 2.0**-23  # distance of 1 from the next larger number in single precision
@@ -21,6 +21,13 @@ class WarpSettings(BatchSettings, PortSolverSettings, ContactSettings):
         default="implicitfast",
         description="MuJoCo Warp's integrator; all are of order 1 with contacts, and on a curved surface RK4's "
         "stages see the ground as at the start of the step",
+    )
+    step: float = Field(
+        default=0.002,
+        ge=LEAST_SINGLE_STEP,
+        le=0.02,
+        description="time step [s]; must divide the output interval; of shorter ones single precision leaves nothing",
+        json_schema_extra={"unit": "s"},
     )
     tolerance: float = Field(
         default=LEAST_TOLERANCE,

@@ -207,10 +207,12 @@ def _choose_engines(wanted: list[str] | None) -> tuple[dict[str, SinglePrecision
     lacking = [name for name in choice.names if name in choice.named and name not in found and name != REFERENCE]
     if lacking or not found:
         able = [name for name in installed_engines() if _is_able(name)]
-        what = (
-            f"{' and '.join(lacking)} compute{'s' if len(lacking) == 1 else ''}" if lacking else "these engines compute"
+        does = "does" if len(lacking) == 1 else "do"
+        what = f"{' and '.join(lacking)} {does}" if lacking else "these engines do"
+        raise ScenarioError(
+            f"--engine: {what} not say with which engine in float64 to compare a float32; those that do are "
+            f"{', '.join(able)}"
         )
-        raise ScenarioError(f"--engine: {what} in float64 alone; engines with a float32 are {', '.join(able)}")
     return found, choice.named
 
 

@@ -122,6 +122,7 @@ def test_ground_without_a_closed_form_is_refused_by_name() -> None:
     ("settings", "message"),
     [
         ({"batch_size": 4, "batch_place": 4}, "batch_place is 4; in a batch of 4 it must be at most 3"),
+        ({"precision": "float32", "step": 5e-5}, "with precision float32 it must be at least 0.0001 s"),
         ({"integrator": "implicit"}, "integrator"),
         ({"noslip_iterations": 1}, "noslip_iterations"),
         ({"precision": "float16"}, "precision"),

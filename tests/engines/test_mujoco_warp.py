@@ -84,6 +84,7 @@ def test_library_is_loaded_when_something_runs() -> None:
     ("settings", "message"),
     [
         ({"batch_size": 4, "batch_place": 4}, "batch_place is 4; in a batch of 4 it must be at most 3"),
+        ({"step": 5e-5}, "greater than or equal to 0.0001"),
         ({"tolerance": 1e-8}, "tolerance"),
         ({"integrator": "discrete"}, "integrator"),
         ({"device": "gpu"}, "device"),
