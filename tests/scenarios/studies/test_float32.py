@@ -93,7 +93,7 @@ def test_the_document_and_the_figure_are_written(tmp_path: Path) -> None:
     [
         (
             ["exudyn"],
-            "exudyn does not say with which engine in float64 to compare a float32; those that do are mujoco-native",
+            "exudyn does not say with which engine in float64 to compare a float32; those that do are",
         ),
         (["exudyn", "mujoco-default"], "exudyn and mujoco-default do not say with which"),
         (["exudyn*"], "these engines do not say with which"),
