@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from importlib.metadata import PackageNotFoundError
 from typing import TYPE_CHECKING, Any, Literal
 
 from packaging.version import InvalidVersion, Version
@@ -67,7 +68,7 @@ class LibraryReach:
     oldest: str
     needs: str
     adaptations: tuple[Adaptation, ...] = ()
-    values: Mapping[tuple[str, str], str] = field(default_factory=dict[tuple[str, str], str])
+    values: Mapping[tuple[str, str], str] = field(default_factory=dict[tuple[str, str], str], hash=False)
 
     def find_refusal(self, engine: str, settings: Settings | None = None) -> str | None:
         """Return why an engine cannot ride with the installed release; None if it can.
@@ -102,7 +103,7 @@ class LibraryReach:
             "package": self.package,
             "oldest": self.oldest,
             "needs": self.needs,
-            "installed": self.version,
+            "installed": self.installed,
             "refusal": self.find_refusal(engine),
             "adaptations": [asdict(each) for each in self.adaptations],
             **{key: {} for key in ADAPTATION_KEYS},
@@ -112,19 +113,36 @@ class LibraryReach:
     def has(self, since: str) -> bool:
         """Return whether the installed release is ``since`` or newer; previews count as the release that they precede.
 
-        A build whose version cannot be read counts as newer than all releases.
+        A build whose version cannot be read counts as newer than all releases, and so does a library that is not
+        installed: what is wrong then is not its release.
         """
+        if self.installed is None:
+            return True
         try:
-            return Version(Version(self.version).base_version) >= Version(since)
+            return Version(Version(self.installed).base_version) >= Version(since)
         except InvalidVersion:
             return True
 
     @property
     def version(self) -> str:
-        """The installed release."""
+        """The installed release.
+
+        Raises
+        ------
+        PackageNotFoundError
+            If the library is not installed.
+        """
         from .engine import package_version  # that module imports this one
 
         return package_version(self.package)
+
+    @property
+    def installed(self) -> str | None:
+        """The installed release; None if the library is not installed."""
+        try:
+            return self.version
+        except PackageNotFoundError:
+            return None
 
     def name_need(self, subject: str, since: str, needs: str) -> str:
         """Return one line that says which release something needs and for what, and which one is installed."""

@@ -46,10 +46,11 @@ def rank_engines(measured: Mapping[str, Mapping[str, Any]]) -> list[str]:
         values = measured[name]
         if name == REFERENCE:
             return 0, 0.0
-        if values["fell_at"] is not None:
+        # Folders of earlier versions do not have every metric.
+        if values.get("fell_at") is not None:
             return 2, -values["fell_at"]
-        error = (values["position_error"] or {}).get("max")
-        return (1 if values["ended"] is None else 2), math.inf if error is None else error
+        error = (values.get("position_error") or {}).get("max")
+        return (1 if values.get("ended") is None else 2), math.inf if error is None else error
 
     return sorted(measured, key=rank)
 

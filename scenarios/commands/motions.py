@@ -95,14 +95,18 @@ def families_command(
 
 def critical_command(bicycle: BicycleOption = None, as_json: JsonOption = False) -> None:
     """The critical α: cusps collide, families merge, their last stable sections vanish."""
-    from ..motions import find_critical_shapes
+    from ..motions import MERGING, find_critical_shapes
     from .present_motions import show_critical
     from .progress import ProgressBars
     from .terminal import make_console
 
     source = load_bicycle(bicycle)
     with ProgressBars() as progress:
-        document = find_critical_shapes(source.bicycle, progress.watch).as_json(source.name)
+
+        def watch(stage: str, done: float, total: float) -> None:
+            progress.watch(stage, done, total, "1/m" if stage == MERGING else "families")
+
+        document = find_critical_shapes(source.bicycle, watch).as_json(source.name)
     with ending_with(0):
         if as_json:
             print_json(document)

@@ -3,6 +3,7 @@
 from .atlas import make_atlas
 from .circular import CircularSolution, solve_circular
 from .families import (
+    MERGING,
     CriticalShapes,
     FamilyCurve,
     SolutionFamilies,
@@ -13,6 +14,7 @@ from .families import (
 )
 
 __all__ = [
+    "MERGING",
     "CircularSolution",
     "CriticalShapes",
     "FamilyCurve",

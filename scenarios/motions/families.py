@@ -29,6 +29,7 @@ from ..scenario import describe_missing_motion, make_bowl, name_bicycle, name_su
 
 # Longest step along the arc: 100 to 300 points per family. No known stable section is shorter than three steps.
 LONGEST_DRAWN_STEP = 0.05
+MERGING = "merging"  # stage of the search for critical shapes whose progress is an alpha [1/m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -295,27 +296,26 @@ def families_document(ground: Surface | float, inputs: Inputs = NO_INPUTS) -> di
     return follow_families(Bicycle(), make_bowl(ground), inputs).as_json()
 
 
-def find_critical_shapes(bicycle: Bicycle, watch: Callable[[str, float, float, str], None]) -> CriticalShapes:
+def find_critical_shapes(bicycle: Bicycle, watch: Callable[[str, float, float], None]) -> CriticalShapes:
     """Compute the critical values of alpha for a bicycle.
 
     Parameters
     ----------
     bicycle : Bicycle
     watch : callable
-        Called with the name of the stage, the value reached, the largest value and its unit.
+        Called with the name of the stage, the value reached and the largest value: an alpha [1/m], or a family.
 
     Returns
     -------
     CriticalShapes
     """
     check_inertia(bicycle)
-    largest = 1.0
-    watch("merging", 0.0, largest, "1/m")
-    merging = reconnections(bicycle, lambda alpha: watch("merging", alpha, largest, "1/m"), largest)
+    watch(MERGING, 0.0, 1.0)
+    merging = reconnections(bicycle, lambda alpha: watch(MERGING, alpha, 1.0))
     stable: dict[int, CriticalPoint | None] = {}
     not_found: dict[int, str] = {}
     for number in FAMILIES:
-        watch("last stable", float(number - 1), float(len(FAMILIES)), "families")
+        watch("last stable", float(number - 1), float(len(FAMILIES)))
         reasons = []
         try:
             stable[number] = last_stable(bicycle, number)

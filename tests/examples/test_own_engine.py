@@ -106,7 +106,7 @@ def test_the_guides_smallest_engine_is_gated(own: str, tmp_path: Path, monkeypat
             gate.update_baselines(found[1], found[0], "first", tmp_path)
         return [verdict for _, verdict in found[0]]
 
-    assert [verdict.status for verdict in check()] == ["missing"]
+    assert [verdict.status for verdict in check()] == ["new"]
     again = check()
     assert all(verdict.passes for verdict in again)
     # What it does not give is not judged; gaps, slip and energies follow from its coordinates.

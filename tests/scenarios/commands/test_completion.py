@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from velodrome.engines.registry import ENTRY_POINT_GROUP, engine_names
+from velodrome.engines.registry import ENTRY_POINT_GROUP, engine_names, uninstalled_engines
 from velodrome.scenarios import names
 from velodrome.scenarios.scenario.schema import library_names
 
@@ -42,7 +42,8 @@ def test_commands_scenarios_engines_and_files_are_completed(tmp_path: Path) -> N
     q2 = [name for name in library_names() if name.startswith("q2")]
     assert completed("velodrome run q2", tmp_path) == q2
     assert completed("velodrome run q2 m", tmp_path) == ["mine.toml", "myfolder/"]
-    mujoco = [name for name in engine_names() if name.startswith("mujoco-")]
+    announced = sorted([*engine_names(), *uninstalled_engines()])
+    mujoco = [name for name in announced if name.startswith("mujoco-")]
     assert len(mujoco) >= 4
     for command in ("run q2", "check", "precision q2", "diff a b"):
         assert completed(f"velodrome {command} --engine mujoco-", tmp_path) == mujoco
