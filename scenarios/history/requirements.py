@@ -95,6 +95,12 @@ def list_top_modules(folder: Path) -> set[str]:
     return found
 
 
+def list_regular_modules(folder: Path) -> set[str]:
+    """Return the modules in a folder without namespace packages, which several packages may share."""
+    tops = list_top_modules(folder)
+    return {top for top in tops if not (folder / top).is_dir() or (folder / top / "__init__.py").exists()}
+
+
 def _list_needs(found: Distribution, extras: Iterable[str]) -> Iterator[Requirement]:
     """Yield what a package needs on this platform, with what these of its extras need."""
     for line in found.requires or []:

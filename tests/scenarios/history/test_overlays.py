@@ -114,6 +114,24 @@ def test_another_release_than_the_one_asked_for_is_seen(tmp_path: Path) -> None:
     assert probe(tmp_path, "import mill").startswith("WrongRelease: mill 2.0 was asked for, and 2.1 in")
 
 
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        # Several packages share a namespace: what this release does not have of it is the others'.
+        ("import shared.part, shared.other", "right"),
+        (
+            "import importlib.util as u; s = u.spec_from_file_location('shared.part', OTHER / 'shared/part.py'); "
+            "sys.modules['shared.part'] = u.module_from_spec(s)",
+            "WrongRelease: module shared.part was loaded from",
+        ),
+    ],
+)
+def test_of_a_namespace_only_what_the_release_has_must_be_its_own(body: str, told: str, tmp_path: Path) -> None:
+    write_package(tmp_path / "suite", "other", "1.0", "", {"shared/other.py": "", "shared/part.py": ""})
+    write_package(tmp_path / "own", "mill", "2.0", "", {"shared/part.py": ""})
+    assert probe(tmp_path, body).startswith(told)
+
+
 def test_path_files_of_the_environment_come_first(tmp_path: Path) -> None:
     write_package(tmp_path / "suite", "mill", "1.0", "", {"mill.py": "WHERE = 'suite'"})
     write_package(tmp_path / "own", "mill", "2.0", "", {"prefix/mill.py": "WHERE = 'own'"})
