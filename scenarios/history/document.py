@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from .companions import name_registry_companions
 from .pairs import PAIR_FOLDER, list_suite_versions
 from .plan import HistoryPlan, PlannedRide
 from .ride import NOT_INSTALLABLE, RODE
@@ -68,7 +69,7 @@ def make_history_document(
         "engines": list(plan.engines),
         "complete": complete,
         "bisected": bisected,
-        "remarks": list(plan.remarks),
+        "remarks": [*plan.remarks, *name_registry_companions(rows)],
         "releases": entries,
         "turning_points": turning_points,
         "libraries": list_suite_versions(plan.package),
@@ -87,6 +88,8 @@ def _describe_row(
         "scenario": ride.scenario,
         "status": row["status"],
         "reason": row["reason"],
+        "packages": row.get("packages", {}),
+        "installed": row.get("installed"),
         "bits": row.get("bits"),
         "quantities": row.get("quantities", {}) if row["status"] == RODE else {},
         "limits": row.get("limits", {}) if row["status"] == RODE else {},

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -116,13 +117,20 @@ def make_pip_environment(children: Children) -> dict[str, str]:
         If pip does not tell its configuration.
     """
     bare = {name: value for name, value in os.environ.items() if not name.startswith("PIP_")}
-    own = {"PIP_NO_INPUT": "1", "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
     kept = {f"PIP_{name.upper().replace('-', '_')}" for name in _KEPT} | {"PIP_CONFIG_FILE"}
-    given = {name: value for name, value in os.environ.items() if name in kept}
+    given = tuple(sorted((name, value) for name, value in os.environ.items() if name in kept))
+    own = {"PIP_NO_INPUT": "1", "PIP_DISABLE_PIP_VERSION_CHECK": "1", "PIP_CONFIG_FILE": os.devnull}
+    return bare | _read_pip_settings(given, children) | own
+
+
+@lru_cache(maxsize=4)  # asked for once by all calls of a history
+def _read_pip_settings(given: tuple[tuple[str, str], ...], children: Children) -> dict[str, str]:
+    bare = {name: value for name, value in os.environ.items() if not name.startswith("PIP_")}
     # Settings of its configuration files could silence the listing itself.
-    loud = {"PIP_QUIET": "0", "PIP_VERBOSE": "0"}
-    listed = _run_pip(["config", "list"], bare | given | loud | own, _LISTING_LIMIT, children)
-    return bare | select_pip_settings(listed.splitlines()) | own | {"PIP_CONFIG_FILE": os.devnull}
+    loud = {"PIP_QUIET": "0", "PIP_VERBOSE": "0", "PIP_NO_INPUT": "1"}
+    return select_pip_settings(
+        _run_pip(["config", "list"], bare | dict(given) | loud, _LISTING_LIMIT, children).splitlines()
+    )
 
 
 def _call_pip(arguments: Sequence[str], limit: float, children: Children) -> str:

@@ -97,26 +97,28 @@ def ride_release_baselines(
     """
     (release,) = plan.releases
     name = f"{release.package} {release.label}"
-    try:
-        environment = open_environment(release, cache, children)
-    except NotInstallable as error:
-        raise ScenarioError(f"{_OPTION}: {name} cannot be installed here: {error}") from error
     rides = [one for one in plan.rides if all_rides or _is_ridden_unnamed(one)]
     entries: dict[str, dict[str, Any]] = {}
     reasons: dict[str, dict[str, str]] = {}
-    with tempfile.TemporaryDirectory(prefix="velodrome-baselines-") as own:
-        path = Path(own) / "rides.pickle"
-        file = RideFile(path, store_rides(plan.scenarios, path))
-        tasks = [(ride.scenario, ride.engine) for ride in rides]
-        watch(0, len(rides))
-        arriving = ride_tasks(release, environment, tasks, file, time_limit, children)
-        for done, (ride, row) in enumerate(zip(rides, arriving, strict=True), 1):
-            if row["status"] == RODE:
-                entries.setdefault(ride.scenario, {})[ride.engine] = _make_entry(release, name, ride.engine, row)
-            else:
-                why = f"no baseline: with {name} it did not ride ({row['status']}): {row['reason']}"
-                reasons.setdefault(ride.scenario, {})[ride.engine] = why
-            watch(done, len(rides))
+    try:
+        with (
+            open_environment(release, cache, children) as environment,
+            tempfile.TemporaryDirectory(prefix="velodrome-baselines-") as own,
+        ):
+            path = Path(own) / "rides.pickle"
+            file = RideFile(path, store_rides(plan.scenarios, path))
+            tasks = [(ride.scenario, ride.engine) for ride in rides]
+            watch(0, len(rides))
+            arriving = ride_tasks(release, environment, tasks, file, time_limit, children)
+            for done, (ride, row) in enumerate(zip(rides, arriving, strict=True), 1):
+                if row["status"] == RODE:
+                    entries.setdefault(ride.scenario, {})[ride.engine] = _make_entry(release, name, ride.engine, row)
+                else:
+                    why = f"no baseline: with {name} it did not ride ({row['status']}): {row['reason']}"
+                    reasons.setdefault(ride.scenario, {})[ride.engine] = why
+                watch(done, len(rides))
+    except NotInstallable as error:
+        raise ScenarioError(f"{_OPTION}: {name} cannot be installed here: {error}") from error
     if not entries:
         scenario, found = next(iter(reasons.items()))
         engine, why = next(iter(found.items()))

@@ -7,6 +7,7 @@ import random
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import pytest
 from mill import CIRCLE, FAULT, PACKAGE, ROUND_OFF, install_mill, make_wheel, use_registry
 
 from velodrome.scenarios.files import file_digest
-from velodrome.scenarios.history.environments import open_environment
+from velodrome.scenarios.history.environments import ReleaseEnvironment, open_environment
 from velodrome.scenarios.history.releases import Release
 
 KILLS = 10
@@ -211,19 +212,24 @@ def test_a_damaged_environment_is_made_again_and_the_suites_own_is_untouched(reg
     make_wheel(registry, "1.0")
     cache, children = tmp_path / "cache" / "releases", Children()
     installed = sorted((path, path.stat().st_mtime_ns) for path in (tmp_path / "installed").rglob("*.py"))
-    made = open_environment(Release(PACKAGE, "1.0"), cache, children)
-    assert made.packages == {PACKAGE: "1.0"}
+
+    def open_release() -> ReleaseEnvironment:
+        with open_environment(Release(PACKAGE, "1.0"), cache, children) as found:
+            return found
+
+    made = open_release()
+    wheel = registry / f"{PACKAGE}-1.0-py3-none-any.whl"
+    assert made.packages == {PACKAGE: {"version": "1.0", "sha256": file_digest(wheel), "wheel": None}}
     module = made.folder / f"{PACKAGE}.py"
     whole = module.read_bytes()
-    again = open_environment(Release(PACKAGE, "1.0"), cache, children)
-    assert again == made
+    assert open_release() == made
     module.write_bytes(whole + b"# changed\n")
-    assert open_environment(Release(PACKAGE, "1.0"), cache, children) == made
+    assert replace(open_release(), installed=made.installed) == made
     assert module.read_bytes() == whole
     # What a killed process left behind is no environment, and is removed.
     (cache / f".making-{made.folder.name}-left").mkdir()
     module.unlink()
-    open_environment(Release(PACKAGE, "1.0"), cache, children)
+    open_release()
     assert [path.name for path in cache.iterdir() if not path.name.endswith(".lock")] == [made.folder.name]
     assert sorted((path, path.stat().st_mtime_ns) for path in (tmp_path / "installed").rglob("*.py")) == installed
 
