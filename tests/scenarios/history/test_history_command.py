@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import shutil
 import subprocess
 import sys
 import time
@@ -13,7 +14,7 @@ from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
-from mill import CIRCLE, FAULT, PACKAGE, ROUND_OFF, install_mill, make_wheel, use_registry
+from mill import CIRCLE, FAULT, PACKAGE, ROUND_OFF, install_mill, make_package_wheel, make_wheel, use_registry
 
 from velodrome.scenarios.files import file_digest
 from velodrome.scenarios.history.environments import ReleaseEnvironment, open_environment
@@ -232,6 +233,34 @@ def test_a_damaged_environment_is_made_again_and_the_suites_own_is_untouched(reg
     open_release()
     assert [path.name for path in cache.iterdir() if not path.name.endswith(".lock")] == [made.folder.name]
     assert sorted((path, path.stat().st_mtime_ns) for path in (tmp_path / "installed").rglob("*.py")) == installed
+
+
+@pytest.mark.slow
+def test_a_row_counts_for_the_files_that_ride(velodrome, registry: Path, tmp_path: Path) -> None:
+    make_package_wheel(registry, "wheelmill-core", "2.0", {"wheelmill_core.py": ""})
+    wheel = make_wheel(registry, "1.0")
+    build = make_wheel(tmp_path / "build", "1.1", requires="wheelmill-core")
+    words = ("history", f"{PACKAGE}==1.0", "circle.toml", "--wheel", str(build), "--json")
+    first = velodrome(*words).json()
+    label = f"1.1 wheel {file_digest(build)[:8]}"
+    assert [line for line in first["remarks"] if line.startswith(f"{label}: not of the given wheels")]
+    rows = {row["version"]: row for row in first["releases"]}
+    assert rows["1.0"]["packages"] == {PACKAGE: {"version": "1.0", "sha256": file_digest(wheel), "wheel": None}}
+    assert {name: package["wheel"] for name, package in rows["1.1"]["packages"].items()} == {
+        PACKAGE: build.name,
+        "wheelmill-core": None,
+    }
+    # Other bytes of the same version ride when the cache has them, and not before.
+    make_wheel(registry, "1.0", stretch=FAULT)
+    assert velodrome(*words, "--resume").json() == first
+    (environment,) = (path for path in cached(tmp_path) if "-wheel-" not in path.name)
+    shutil.rmtree(environment)
+    assert velodrome(*words, "--resume").json() == first  # what was ridden remains while nobody installs it again
+    assert velodrome("history", f"{PACKAGE}==1.0", "circle.toml", "--out", "other").status == 0
+    again = {row["version"]: row for row in velodrome(*words, "--resume").json()["releases"]}
+    assert again["1.0"]["packages"][PACKAGE]["sha256"] == file_digest(wheel)
+    assert again["1.0"]["bits"] != rows["1.0"]["bits"]
+    assert again["1.1"]["bits"] == rows["1.1"]["bits"]
 
 
 def test_bad_input_is_one_line(velodrome, registry: Path, tmp_path: Path) -> None:

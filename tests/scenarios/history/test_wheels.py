@@ -10,7 +10,8 @@ import pytest
 from mill import PACKAGE, make_package_wheel, make_wheel
 
 from velodrome.scenarios.error import ScenarioError
-from velodrome.scenarios.history.releases import read_wheel_releases
+from velodrome.scenarios.history.companions import describe_registry_companions
+from velodrome.scenarios.history.releases import Release, read_wheel_releases
 
 CORE = "wheelmill-core"
 
@@ -83,3 +84,14 @@ def test_companions_that_are_of_no_release_or_of_the_same_are_refused(tmp_path: 
     cores = [make_core(tmp_path / name, text=name) for name in ("a", "b")]
     with pytest.raises(ScenarioError, match="put each into the folder of its own wheel"):
         read_wheel_releases([own, *cores], PACKAGE)
+
+
+def test_a_remark_tells_what_of_a_builds_release_is_the_registrys(tmp_path: Path) -> None:
+    (build,) = read_wheel_releases([make_wheel(tmp_path, "2.0", requires=CORE)], PACKAGE)
+    own = {"version": "2.0", "sha256": None, "wheel": "own.whl"}
+    core = {"version": "2.1", "sha256": None, "wheel": None}
+    told = describe_registry_companions(build, {PACKAGE: own, CORE: core})
+    assert told is not None
+    assert told.startswith(f"{build.label}: not of the given wheels but of the registry: {CORE} 2.1; ")
+    assert describe_registry_companions(build, {PACKAGE: own, CORE: own}) is None
+    assert describe_registry_companions(Release(PACKAGE, "2.0"), {PACKAGE: core, CORE: core}) is None
