@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
+from .plan import PlannedRide
 from .releases import Release
 
 
@@ -25,3 +27,15 @@ def describe_registry_companions(release: Release, packages: Mapping[str, Mappin
         f"{release.label}: not of the given wheels but of the registry: {', '.join(taken)}; if it is of the build too, "
         "give its wheel by a further --wheel"
     )
+
+
+def list_registry_companions(rows: Mapping[PlannedRide, Mapping[str, Any]]) -> list[str]:
+    """Return such a line for every build among the rows of a history.
+
+    Parameters
+    ----------
+    rows : mapping
+        By ride.
+    """
+    told = [describe_registry_companions(ride.release, row.get("packages", {})) for ride, row in rows.items()]
+    return list(dict.fromkeys(line for line in told if line is not None))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .companions import describe_registry_companions
+from .companions import list_registry_companions
 from .pairs import PAIR_FOLDER, list_suite_versions
 from .plan import HistoryPlan, PlannedRide
 from .ride import NOT_INSTALLABLE, RODE
@@ -69,16 +69,11 @@ def make_history_document(
         "engines": list(plan.engines),
         "complete": complete,
         "bisected": bisected,
-        "remarks": [*plan.remarks, *_list_registry_companions(rows)],
+        "remarks": [*plan.remarks, *list_registry_companions(rows)],
         "releases": entries,
         "turning_points": turning_points,
         "libraries": list_suite_versions(plan.package),
     }
-
-
-def _list_registry_companions(rows: Mapping[PlannedRide, Mapping[str, Any]]) -> list[str]:
-    told = [describe_registry_companions(ride.release, row.get("packages", {})) for ride, row in rows.items()]
-    return list(dict.fromkeys(line for line in told if line is not None))
 
 
 def _describe_row(
