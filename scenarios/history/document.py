@@ -84,6 +84,7 @@ def _describe_row(
         "release": ride.release.label,
         "date": date,
         "wheel": None if ride.release.wheel is None else str(ride.release.wheel),
+        "companions": [str(file.path) for file in ride.release.files[1:]],
         "engine": ride.engine,
         "scenario": ride.scenario,
         "status": row["status"],

@@ -53,7 +53,7 @@ def test_a_planted_fault_in_a_wheel_is_the_turning_point(velodrome, registry: Pa
     moved = {move["quantity"]: move for move in point["quantities"]}
     assert moved["position_error"]["status"] == "worse"
     assert moved["position_error"]["after"] > moved["position_error"]["before"] + moved["position_error"]["limit"]
-    assert [row["wheel"] for row in document["releases"]] == [None, str(build)]
+    assert [(row["wheel"], row["companions"]) for row in document["releases"]] == [(None, []), (str(build), [])]
     # The table has what the document has.
     table = pq.ParquetFile(tmp_path / "history" / PACKAGE / "rides.parquet").read().to_pylist()
     assert [row["bits"] for row in table] == [row["bits"] for row in document["releases"]]
