@@ -53,6 +53,10 @@ class ReleaseEnvironment:
     installed: str
     digest: str
 
+    def is_there(self) -> bool:
+        """Whether nobody has removed it meanwhile."""
+        return (self.folder / MARKER).is_file()
+
 
 def find_cache_folder(own: Path | None = None) -> Path:
     """Return the folder of all environments: ``releases`` in a given folder, or in the user's cache folder.

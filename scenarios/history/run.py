@@ -19,7 +19,7 @@ from .plan import HistoryPlan, PlannedRide
 from .problems import store_rides
 from .process import RideFile, ride_tasks
 from .releases import Release
-from .ride import NOT_INSTALLABLE
+from .ride import NOT_INSTALLABLE, RODE
 from .store import HistoryFolder
 
 # (ride, row, whether it was ridden in this session)
@@ -152,6 +152,9 @@ def _ride_release(
             for ride, row in zip(rides, arriving, strict=True):
                 if children.stopped:
                     return
+                if row["status"] != RODE and not environment.is_there():
+                    # A row that --resume tries again: what the ride says was the removal's fault.
+                    row = {"status": NOT_INSTALLABLE, "reason": f"{environment.folder} was removed while it rode"}
                 keep(ride, row | about)
     except NotInstallable as error:
         if children.stopped:

@@ -263,6 +263,20 @@ def test_a_row_counts_for_the_files_that_ride(velodrome, registry: Path, tmp_pat
     assert again["1.1"]["bits"] == rows["1.1"]["bits"]
 
 
+@pytest.mark.slow
+def test_a_release_whose_environment_is_removed_is_tried_again(velodrome, registry: Path, tmp_path: Path) -> None:
+    removing = "import shutil; shutil.rmtree(os.path.dirname(__file__)); import wheelmill_late"
+    make_wheel(registry, "1.0", before=f"if not os.path.exists({str(tmp_path / 'once')!r}): {removing}")
+    words = ("history", f"{PACKAGE}==1.0", "circle.toml", "--json")
+    found = velodrome(*words)
+    assert found.status == 1
+    (row,) = found.json()["releases"]
+    assert row["status"] == "not-installable"
+    assert row["reason"].endswith("was removed while it rode")
+    (tmp_path / "once").touch()
+    assert [row["status"] for row in velodrome(*words, "--resume").json()["releases"]] == ["rode"]
+
+
 def test_bad_input_is_one_line(velodrome, registry: Path, tmp_path: Path) -> None:
     make_wheel(registry, "1.0")
     make_wheel(registry, "1.5")
