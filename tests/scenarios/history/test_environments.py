@@ -54,6 +54,7 @@ def test_a_wheel_that_is_overwritten_is_not_ridden_as_the_one_it_was(tmp_path: P
     assert "STRETCH = 1.0\n" in (open_once(release, cache).folder / f"{PACKAGE}.py").read_text()
 
 
+@pytest.mark.slow
 def test_companions_are_of_the_build_and_not_of_the_registry(tmp_path: Path, registry: Path, cache: Path) -> None:
     make_helper(registry, "2.0")
     wheels = [make_wheel(tmp_path / "build", "1.0", requires=HELPER), make_helper(tmp_path / "build", "1.5")]
@@ -67,6 +68,7 @@ def test_companions_are_of_the_build_and_not_of_the_registry(tmp_path: Path, reg
     assert (found["version"], found["wheel"]) == ("2.0", None)
 
 
+@pytest.mark.slow
 def test_a_version_with_a_local_part_is_another_release(registry: Path, cache: Path) -> None:
     make_wheel(registry, "1.0")
     make_wheel(registry, "1.0+fault", stretch=FAULT)
@@ -94,6 +96,7 @@ def test_suites_that_have_other_packages_have_environments_of_their_own(
     assert open_once(release, cache) == without
 
 
+@pytest.mark.slow
 def test_no_environment_is_replaced_while_it_is_ridden(
     registry: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
