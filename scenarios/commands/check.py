@@ -56,7 +56,11 @@ def check_command(
         ),
     ] = None,
     wheel: Annotated[
-        Path | None, typer.Option(metavar="FILE.whl", help="A build as the release of --baseline-of.")
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE.whl",
+            help="A build as the release of --baseline-of; given again for wheels of packages that it requires.",
+        ),
     ] = None,
     cache: CacheOption = None,
     history: Annotated[
@@ -184,11 +188,11 @@ def check_command(
 
 
 def _check_baseline_options(
-    baseline_of: str | None, wheel: Path | None, baselines: Path | None, update: bool, hold_cpu: bool
+    baseline_of: str | None, wheel: list[Path] | None, baselines: Path | None, update: bool, hold_cpu: bool
 ) -> None:
     """Raise a ScenarioError if options do not go together."""
     if baseline_of is None:
-        if wheel is not None:
+        if wheel:
             raise ScenarioError("--wheel: it belongs to --baseline-of, e.g. --baseline-of mujoco --wheel FILE.whl")
         return
     if update:
@@ -207,7 +211,7 @@ def _ride_baselines(
     wanted: str,
     scenarios: list[str] | None,
     engines: list[str] | None,
-    wheel: Path | None,
+    wheels: list[Path] | None,
     cache: Path | None,
 ) -> GivenBaselines:
     """Install a release, ride it, and return its baselines."""
@@ -216,7 +220,7 @@ def _ride_baselines(
     children, environments = Children(), find_cache_folder(cache)
     try:
         plan = plan_release_baselines(
-            wanted, scenarios or (), engines or (), wheel, cache=environments, children=children
+            wanted, scenarios or (), engines or (), wheels or (), cache=environments, children=children
         )
         for line in plan.remarks:
             progress.note(line)
@@ -224,6 +228,7 @@ def _ride_baselines(
         return ride_release_baselines(
             plan,
             lambda done, total: progress.watch(name, done, total, "rides"),
+            progress.note,
             all_rides=bool(scenarios),
             cache=environments,
             time_limit=LONGEST_RIDE,

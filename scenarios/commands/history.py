@@ -54,7 +54,7 @@ def history_command(
         typer.Option(
             metavar="FILE.whl",
             help="A build of your own as one release among the others, after that of its version; may be given several "
-            "times.",
+            "times. A wheel of another package belongs to the release of the wheels that require it.",
         ),
     ] = None,
     bisect: Annotated[

@@ -82,8 +82,9 @@ def show_history(console: Console, document: Mapping[str, Any]) -> None:
         ]
         print_table(console, columns)
     console.print()
-    for release, wheel in {row["release"]: row["wheel"] for row in document["releases"] if row["wheel"]}.items():
-        console.print(f"{release}: {wheel}", style="dim", markup=False, highlight=False, soft_wrap=True)
+    builds = {row["release"]: [row["wheel"], *row["companions"]] for row in document["releases"] if row["wheel"]}
+    for release, wheels in builds.items():
+        console.print(f"{release}: {', '.join(wheels)}", style="dim", markup=False, highlight=False, soft_wrap=True)
     _show_turning_points(console, document["turning_points"])
     for line in document["remarks"]:
         console.print(line, style="yellow", markup=False, highlight=False, soft_wrap=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from collections.abc import Collection, Mapping
@@ -16,6 +15,7 @@ from packaging.version import InvalidVersion
 from ..files import write_json
 from ..run import read_json
 from .children import Children, StoppedError
+from .pip_calls import PipError, make_pip_environment
 
 _PROGRAM = Path(__file__).with_name("ask_upload_times.py")
 _LIMIT = 60.0  # [s]
@@ -90,9 +90,12 @@ def _ask_upload_times(package: str, children: Children) -> dict[str, str] | None
     """Return upload times by file name, or None if they cannot be asked for."""
     try:
         process = children.start(
-            [sys.executable, "-P", str(_PROGRAM), package], os.environ, with_input=False, with_errors=False
+            [sys.executable, "-P", str(_PROGRAM), package],
+            make_pip_environment(children),
+            with_input=False,
+            with_errors=False,
         )
-    except StoppedError:
+    except (StoppedError, PipError):
         return None
     try:
         output, _ = process.communicate(timeout=_LIMIT)

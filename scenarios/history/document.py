@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from .companions import list_registry_companions
 from .pairs import PAIR_FOLDER, list_suite_versions
 from .plan import HistoryPlan, PlannedRide
 from .ride import NOT_INSTALLABLE, RODE
@@ -68,7 +69,7 @@ def make_history_document(
         "engines": list(plan.engines),
         "complete": complete,
         "bisected": bisected,
-        "remarks": list(plan.remarks),
+        "remarks": [*plan.remarks, *list_registry_companions(rows)],
         "releases": entries,
         "turning_points": turning_points,
         "libraries": list_suite_versions(plan.package),
@@ -83,10 +84,13 @@ def _describe_row(
         "release": ride.release.label,
         "date": date,
         "wheel": None if ride.release.wheel is None else str(ride.release.wheel),
+        "companions": [str(file.path) for file in ride.release.files[1:]],
         "engine": ride.engine,
         "scenario": ride.scenario,
         "status": row["status"],
         "reason": row["reason"],
+        "packages": row.get("packages", {}),
+        "installed": row.get("installed"),
         "bits": row.get("bits"),
         "quantities": row.get("quantities", {}) if row["status"] == RODE else {},
         "limits": row.get("limits", {}) if row["status"] == RODE else {},

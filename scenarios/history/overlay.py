@@ -14,7 +14,7 @@ from types import ModuleType
 
 from packaging.version import Version
 
-from .requirements import list_top_modules
+from .requirements import list_regular_modules, list_top_modules
 
 _MAPS = Path("/proc/self/maps")
 
@@ -55,7 +55,7 @@ class _OwnModulesOnly(MetaPathFinder):
 
     def __init__(self, own: list[Path]) -> None:
         self._own = own
-        self._tops = {top for folder in own if folder.is_dir() for top in _list_regular_modules(folder)}
+        self._tops = {top for folder in own if folder.is_dir() for top in list_regular_modules(folder)}
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
@@ -80,12 +80,6 @@ class _OwnModulesOnly(MetaPathFinder):
         return found
 
 
-def _list_regular_modules(folder: Path) -> set[str]:
-    """Return the modules in a folder without namespace packages, which several packages may share."""
-    tops = list_top_modules(folder)
-    return {top for top in tops if not (folder / top).is_dir() or (folder / top / "__init__.py").exists()}
-
-
 def require_release(folder: Path, package: str, version: str) -> None:
     """Make sure that a package's metadata are those of the release in the folder.
 
@@ -106,6 +100,8 @@ def require_release(folder: Path, package: str, version: str) -> None:
 def require_loaded_from(own: list[Path]) -> None:
     """Make sure that modules of the laid-over packages come from their environment, compiled libraries too.
 
+    Of a namespace package, which several packages may share, only what the environment has must come from there.
+
     Parameters
     ----------
     own : list of Path
@@ -116,10 +112,13 @@ def require_loaded_from(own: list[Path]) -> None:
     WrongRelease
         If a module or a compiled library of the same name comes from elsewhere, or nothing of them is loaded.
     """
-    tops = {top for folder in own if folder.is_dir() for top in list_top_modules(folder)}
+    there = [folder for folder in own if folder.is_dir()]
+    tops = {top for folder in there for top in list_top_modules(folder)}
+    regular = {top for folder in there for top in list_regular_modules(folder)}
     loaded = 0
     for name, module in list(sys.modules.items()):
-        if name.partition(".")[0] not in tops:
+        top = name.partition(".")[0]
+        if top not in tops or (top not in regular and not _has_module(there, name)):
             continue
         places = _find_places(module)
         if places and not any(place.is_relative_to(folder.resolve()) for place in places for folder in own):
@@ -127,10 +126,28 @@ def require_loaded_from(own: list[Path]) -> None:
         loaded += bool(places)
     if not loaded:
         raise WrongRelease("the engine loaded nothing of the release, so that the ride says nothing about it")
-    others = [Path(entry).resolve() / top for entry in sys.path if Path(entry) not in own for top in tops]
+    elsewhere = [Path(entry).resolve() for entry in sys.path if Path(entry) not in own]
     for path in _list_mapped_files():
-        if any(path.is_relative_to(other) for other in others):
-            raise WrongRelease(f"{path} was loaded, which is not of the release's environment")
+        for other in elsewhere:
+            if not path.is_relative_to(other):
+                continue
+            inside = path.relative_to(other)
+            top = path.name if path == other else inside.parts[0]
+            shared = any((folder / inside).exists() for folder in there)
+            if {top, top.partition(".")[0]} & regular or (top in tops and shared):
+                raise WrongRelease(f"{path} was loaded, which is not of the release's environment")
+
+
+def _has_module(folders: list[Path], name: str) -> bool:
+    """Whether a module of a namespace package, which several packages may share, lies in one of these folders."""
+    *parents, last = name.split(".")
+    return any(
+        entry.name.partition(".")[0] == last
+        for folder in folders
+        if folder.joinpath(*parents).is_dir()
+        for entry in folder.joinpath(*parents).iterdir()
+        if entry.is_dir() or entry.suffix in (".py", ".so", ".pyd")
+    )
 
 
 def _find_places(module: ModuleType) -> list[Path]:

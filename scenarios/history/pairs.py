@@ -107,7 +107,7 @@ def measure_separation(before: Row, after: Row) -> dict[str, list[float]]:
 def write_pair_command(before: Release, after: Release, engine: str, scenario: str) -> str:
     """Return the command that rides two releases again, for the shell; wheels are named as the user did."""
     versions = [release.version for release in (before, after) if release.wheel is None]
-    wheels = [str(release.wheel) for release in (before, after) if release.wheel is not None]
+    wheels = dict.fromkeys(str(file.path) for release in (before, after) for file in release.files)
     wanted = before.package + ("==" + ",".join(versions) if versions else "")
     named = [part for wheel in wheels for part in ("--wheel", wheel)]
     return shlex.join(["velodrome", "history", wanted, scenario, "--engine", engine, *named, "--out", "two-releases"])

@@ -24,7 +24,7 @@ from .releases import (
     nearest_version,
     order_releases,
     parse_release_range,
-    read_wheel,
+    read_wheel_releases,
 )
 
 HISTORY_SCENARIOS = ("plane-circle", "q2-plus")  # a circle and a disturbed one; both measure the order
@@ -110,7 +110,7 @@ def plan_history(
     engines : sequence of str
         Engines of the package by name or pattern; all installed ones without any.
     wheels : sequence of Path
-        Further releases.
+        Further releases, with companions that they require.
     cache : Path
         Folder of environments.
     children : Children
@@ -122,7 +122,7 @@ def plan_history(
     """
     asked = parse_release_range(wanted)
     names = choose_package_engines(asked.package, engines)
-    own = [read_wheel(path, asked.package) for path in wheels]
+    own = read_wheel_releases(wheels, asked.package)
     if not asked.alternatives and not own:
         raise ScenarioError(
             f"{show_value(repr(wanted))}: name the releases too, e.g. '{asked.package}>=1.0', or give wheels by --wheel"

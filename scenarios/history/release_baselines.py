@@ -15,6 +15,7 @@ from ..error import ScenarioError
 from ..gate import GivenBaselines, gate_scenarios, gated_names
 from ..scenario import show_value
 from .children import Children
+from .companions import describe_registry_companions
 from .environments import NotInstallable, open_environment
 from .plan import HistoryPlan, PlannedRide, plan_history
 from .problems import store_rides
@@ -29,7 +30,7 @@ def plan_release_baselines(
     wanted: str,
     sources: Sequence[str] = (),
     engines: Sequence[str] = (),
-    wheel: Path | None = None,
+    wheels: Sequence[Path] = (),
     *,
     cache: Path,
     children: Children,
@@ -44,8 +45,8 @@ def plan_release_baselines(
         Scenarios by library name or path; the library's gated ones without any.
     engines : sequence of str
         Engines of the package by name or pattern; all installed ones without any.
-    wheel : Path, optional
-        The release, if it is a build.
+    wheels : sequence of Path
+        The release, if it is a build: its wheel and those of its companions.
     cache : Path
         Folder of environments.
     children : Children
@@ -57,17 +58,21 @@ def plan_release_baselines(
     """
     asked = parse_release_range(wanted)
     where = f"{_OPTION} {show_value(repr(wanted))}"
-    if wheel is not None and asked.alternatives:
+    if wheels and asked.alternatives:
         raise ScenarioError(f"{where}: with --wheel the build is the release; name the package alone, {asked.package}")
-    if wheel is None and len(asked.exact or ()) != 1:
+    if not wheels and len(asked.exact or ()) != 1:
         raise ScenarioError(f"{where}: must be one release, such as '{asked.package}==1.0', or a package with --wheel")
-    wheels = [] if wheel is None else [wheel]
-    return plan_history(wanted, sources or gated_names(), engines, wheels, cache=cache, children=children)
+    plan = plan_history(wanted, sources or gated_names(), engines, wheels, cache=cache, children=children)
+    if len(plan.releases) != 1:
+        named = ", ".join(release.label for release in plan.releases)
+        raise ScenarioError(f"{where}: must be one release, but --wheel gives {len(plan.releases)}: {named}")
+    return plan
 
 
 def ride_release_baselines(
     plan: HistoryPlan,
     watch: Callable[[int, int], None],
+    note: Callable[[str], None],
     *,
     all_rides: bool,
     cache: Path,
@@ -82,6 +87,8 @@ def ride_release_baselines(
         By `plan_release_baselines`.
     watch : callable
         Called with the number of rides that are done and that of all.
+    note : callable
+        Called with lines for the user.
     all_rides : bool
         Whether engines with long rides ride every scenario, as they do where scenarios are named.
     cache : Path
@@ -97,26 +104,31 @@ def ride_release_baselines(
     """
     (release,) = plan.releases
     name = f"{release.package} {release.label}"
-    try:
-        environment = open_environment(release, cache, children)
-    except NotInstallable as error:
-        raise ScenarioError(f"{_OPTION}: {name} cannot be installed here: {error}") from error
     rides = [one for one in plan.rides if all_rides or _is_ridden_unnamed(one)]
     entries: dict[str, dict[str, Any]] = {}
     reasons: dict[str, dict[str, str]] = {}
-    with tempfile.TemporaryDirectory(prefix="velodrome-baselines-") as own:
-        path = Path(own) / "rides.pickle"
-        file = RideFile(path, store_rides(plan.scenarios, path))
-        tasks = [(ride.scenario, ride.engine) for ride in rides]
-        watch(0, len(rides))
-        arriving = ride_tasks(release, environment, tasks, file, time_limit, children)
-        for done, (ride, row) in enumerate(zip(rides, arriving, strict=True), 1):
-            if row["status"] == RODE:
-                entries.setdefault(ride.scenario, {})[ride.engine] = _make_entry(release, name, ride.engine, row)
-            else:
-                why = f"no baseline: with {name} it did not ride ({row['status']}): {row['reason']}"
-                reasons.setdefault(ride.scenario, {})[ride.engine] = why
-            watch(done, len(rides))
+    try:
+        with (
+            open_environment(release, cache, children) as environment,
+            tempfile.TemporaryDirectory(prefix="velodrome-baselines-") as own,
+        ):
+            remark = describe_registry_companions(release, environment.packages)
+            if remark is not None:
+                note(remark)
+            path = Path(own) / "rides.pickle"
+            file = RideFile(path, store_rides(plan.scenarios, path))
+            tasks = [(ride.scenario, ride.engine) for ride in rides]
+            watch(0, len(rides))
+            arriving = ride_tasks(release, environment, tasks, file, time_limit, children)
+            for done, (ride, row) in enumerate(zip(rides, arriving, strict=True), 1):
+                if row["status"] == RODE:
+                    entries.setdefault(ride.scenario, {})[ride.engine] = _make_entry(release, name, ride.engine, row)
+                else:
+                    why = f"no baseline: with {name} it did not ride ({row['status']}): {row['reason']}"
+                    reasons.setdefault(ride.scenario, {})[ride.engine] = why
+                watch(done, len(rides))
+    except NotInstallable as error:
+        raise ScenarioError(f"{_OPTION}: {name} cannot be installed here: {error}") from error
     if not entries:
         scenario, found = next(iter(reasons.items()))
         engine, why = next(iter(found.items()))

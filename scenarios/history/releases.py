@@ -2,44 +2,52 @@
 
 from __future__ import annotations
 
-import zipfile
+import hashlib
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from packaging.requirements import InvalidRequirement, Requirement
 from packaging.specifiers import InvalidSpecifier, SpecifierSet
-from packaging.utils import InvalidWheelFilename, canonicalize_name, parse_wheel_filename
+from packaging.utils import canonicalize_name
 from packaging.version import InvalidVersion, Version
 
 from ..error import ScenarioError
-from ..files import file_digest
 from ..scenario import show_value
+from .wheels import WheelFile, group_wheels, read_wheel
 
 _OPERATORS = ("==", "!=", "<=", ">=", "<", ">", "~=")
-_WHEEL_SUFFIX = ".whl"
 _EXAMPLE = "e.g. 'mujoco==3.9.0,4.0.0' or 'mujoco>=3.3,<4.1'"
 
 
 @dataclass(frozen=True)
 class Release:
-    """One release of a package: of the registry, or a wheel.
+    """One release of a package: of the registry, or of wheels.
 
     Attributes
     ----------
     package : str
         Canonical name of the package.
     version : str
-    wheel : Path or None
-        File of a wheel, as the user named it; None for a release of the registry.
-    digest : str or None
-        SHA-256 of the wheel in hexadecimal digits.
+    files : tuple of WheelFile
+        The package's wheel and then those of its companions; empty for a release of the registry.
     """
 
     package: str
     version: str
-    wheel: Path | None = None
-    digest: str | None = None
+    files: tuple[WheelFile, ...] = ()
+
+    @property
+    def wheel(self) -> Path | None:
+        """The package's wheel, as the user named it; None for a release of the registry."""
+        return self.files[0].path if self.files else None
+
+    @property
+    def digest(self) -> str | None:
+        """SHA-256 of the wheel in hexadecimal digits; with companions, of the digests of all, one a line."""
+        if len(self.files) <= 1:
+            return self.files[0].digest if self.files else None
+        return hashlib.sha256("".join(f"{file.digest}\n" for file in self.files).encode()).hexdigest()
 
     @property
     def label(self) -> str:
@@ -48,7 +56,7 @@ class Release:
 
     @property
     def key(self) -> str:
-        """Text that identifies the release and, for a wheel, its contents."""
+        """Text that identifies the release and, for wheels, their contents."""
         return f"{self.package}-{self.version}" + ("" if self.digest is None else f"-wheel-{self.digest[:16]}")
 
 
@@ -117,26 +125,16 @@ def parse_release_range(text: str) -> ReleaseRange:
         ) from error
 
 
-def read_wheel(path: Path, package: str) -> Release:
-    """Return the release that a wheel is.
+def read_wheel_releases(paths: Sequence[Path], package: str) -> list[Release]:
+    """Return the releases that wheels are, see `velodrome.scenarios.history.wheels.group_wheels`.
 
     Raises
     ------
     ScenarioError
-        If the file is missing, no wheel, or one of another package.
+        If a file is missing, no wheel, or belongs to no release of the package.
     """
-    where = f"--wheel {show_value(str(path))}"
-    if not path.is_file():
-        raise ScenarioError(f"{where}: there is no such file; name a {_WHEEL_SUFFIX} file of {package}")
-    try:
-        name, version, _, _ = parse_wheel_filename(path.name)
-    except (InvalidWheelFilename, InvalidVersion) as error:
-        raise ScenarioError(f"{where}: is not a wheel by its name; name a {_WHEEL_SUFFIX} file of {package}") from error
-    if canonicalize_name(name) != package:
-        raise ScenarioError(f"{where}: is a wheel of {name}, not of {package}")
-    if not zipfile.is_zipfile(path):
-        raise ScenarioError(f"{where}: is damaged or no wheel: it is no zip file")
-    return Release(package, str(version), path, file_digest(path))
+    groups = group_wheels([read_wheel(path, package) for path in paths], package)
+    return [Release(package, files[0].version, files) for files in groups]
 
 
 def order_releases(package: str, versions: Collection[str], wheels: Sequence[Release]) -> tuple[Release, ...]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from importlib.metadata import Distribution, PackageNotFoundError, distribution, distributions
 from pathlib import Path
 
@@ -26,15 +27,32 @@ def find_suite_packages(package: str) -> set[str]:
             continue
         found.add(name)
         try:
-            needed = _list_needs(distribution(name), ())
+            needed = list_needs(distribution(name), ())
         except PackageNotFoundError:
             continue
         left += [canonicalize_name(requirement.name) for requirement in needed]
     return found
 
 
-def list_unmet(folder: Path, package: str) -> list[str]:
-    """Return requirements of the packages in a folder that have to be installed into it as well.
+@dataclass(frozen=True)
+class ResolvedNeeds:
+    """What the packages in a folder need, as the suite's present environment meets it.
+
+    Attributes
+    ----------
+    unmet : tuple of str
+        Requirements of packages that have to be installed into the folder as well.
+    suite : dict
+        By canonical name of every package that is needed, without those of the suite itself: its version in the suite's
+        environment, None where that does not have it. What is laid over depends on nothing else of that environment.
+    """
+
+    unmet: tuple[str, ...]
+    suite: Mapping[str, str | None]
+
+
+def resolve_needs(folder: Path, package: str) -> ResolvedNeeds:
+    """Find which needs of the packages in a folder are not met.
 
     A requirement is met by a package in the folder, or by the suite's environment. The latter does not help where both
     would share a module: Python takes a whole module from the folder that comes first, so that a release's companion
@@ -56,12 +74,16 @@ def list_unmet(folder: Path, package: str) -> list[str]:
     own_modules = list_top_modules(folder)
     suite = find_suite_packages(package)
     unmet: dict[str, str] = {}
+    versions: dict[str, str | None] = {}
     extras: dict[str, set[str]] = {name: set() for name in here}
     left = list(here)
     while left:
         name = left.pop()
-        for requirement in _list_needs(here[name], extras[name]):
+        for requirement in list_needs(here[name], extras[name]):
             needed = canonicalize_name(requirement.name)
+            installed = _find_installed(needed)
+            if needed not in suite and needed != package:
+                versions[needed] = None if installed is None else installed.version
             if needed in here:
                 new = requirement.extras - extras[needed]
                 if new:
@@ -70,7 +92,6 @@ def list_unmet(folder: Path, package: str) -> list[str]:
                 if not _fits(requirement, here[needed]):
                     raise RequirementConflict(f"{name} needs {requirement}, but {here[needed].version} is beside it")
                 continue
-            installed = _find_installed(needed)
             fits = installed is not None and _fits(requirement, installed)
             if needed in suite:
                 if not fits:
@@ -79,7 +100,7 @@ def list_unmet(folder: Path, package: str) -> list[str]:
             elif not fits or (installed is not None and _share_modules(installed, own_modules)):
                 extra = f"[{','.join(sorted(requirement.extras))}]" if requirement.extras else ""
                 unmet[needed] = f"{requirement.name}{extra}{requirement.specifier}"
-    return [unmet[name] for name in sorted(unmet)]
+    return ResolvedNeeds(tuple(unmet[name] for name in sorted(unmet)), dict(sorted(versions.items())))
 
 
 def list_top_modules(folder: Path) -> set[str]:
@@ -95,7 +116,13 @@ def list_top_modules(folder: Path) -> set[str]:
     return found
 
 
-def _list_needs(found: Distribution, extras: Iterable[str]) -> Iterator[Requirement]:
+def list_regular_modules(folder: Path) -> set[str]:
+    """Return the modules in a folder without namespace packages, which several packages may share."""
+    tops = list_top_modules(folder)
+    return {top for top in tops if not (folder / top).is_dir() or (folder / top / "__init__.py").exists()}
+
+
+def list_needs(found: Distribution, extras: Iterable[str]) -> Iterator[Requirement]:
     """Yield what a package needs on this platform, with what these of its extras need."""
     for line in found.requires or []:
         requirement = Requirement(line)

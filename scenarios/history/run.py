@@ -13,13 +13,13 @@ from typing import Any
 from .bisect import bisect_history
 from .children import Children, StoppedError
 from .document import make_history_document
-from .environments import NotInstallable, open_environment
+from .environments import NotInstallable, open_environment, read_cached_packages
 from .pairs import make_pair_documents
 from .plan import HistoryPlan, PlannedRide
 from .problems import store_rides
 from .process import RideFile, ride_tasks
 from .releases import Release
-from .ride import NOT_INSTALLABLE
+from .ride import NOT_INSTALLABLE, RODE
 from .store import HistoryFolder
 
 # (ride, row, whether it was ridden in this session)
@@ -66,9 +66,11 @@ def run_history(
 
     def ride_missing(rides: Sequence[PlannedRide]) -> dict[PlannedRide, Mapping[str, Any]]:
         found: dict[PlannedRide, Mapping[str, Any]] = {}
+        cached = {release: read_cached_packages(release, options.cache) for release in {ride.release for ride in rides}}
         for ride in rides:
             row = folder.read(ride)
-            if row is not None:
+            # The same version may have other bytes by now: a row counts for those that would ride.
+            if row is not None and cached[ride.release] in (None, row["packages"]):
                 rows[ride] = found[ride] = row
                 watch(ride, row, False)
         missing = [ride for ride in rides if ride not in found]
@@ -142,22 +144,22 @@ def _ride_release(
     keep: Callable[[PlannedRide, Mapping[str, Any]], None],
     children: Children,
 ) -> None:
+    tasks = [(ride.scenario, ride.engine) for ride in rides]
     try:
-        environment = open_environment(release, options.cache, children)
+        with open_environment(release, options.cache, children) as environment:
+            about = {"packages": environment.packages, "installed": environment.installed}
+            arriving = ride_tasks(release, environment, tasks, file, options.time_limit, children)
+            for ride, row in zip(rides, arriving, strict=True):
+                if children.stopped:
+                    return
+                if row["status"] != RODE and not environment.is_there():
+                    # A row that --resume tries again: what the ride says was the removal's fault.
+                    row = {"status": NOT_INSTALLABLE, "reason": f"{environment.folder} was removed while it rode"}
+                keep(ride, row | about)
     except NotInstallable as error:
         if children.stopped:
             return  # pip was ended, and says nothing about the release
         for ride in rides:
             keep(ride, {"status": NOT_INSTALLABLE, "reason": str(error)})
-        return
-    except StoppedError:
-        return
-    tasks = [(ride.scenario, ride.engine) for ride in rides]
-    try:
-        arriving = ride_tasks(release, environment, tasks, file, options.time_limit, children)
-        for ride, row in zip(rides, arriving, strict=True):
-            if children.stopped:
-                return
-            keep(ride, row | {"packages": environment.packages})
     except StoppedError:
         return

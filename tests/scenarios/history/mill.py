@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -110,20 +111,32 @@ def make_wheel(
     requires : str, optional
         What the package needs.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     info = f"{PACKAGE}-{version}.dist-info"
-    needs = "" if requires is None else f"Requires-Dist: {requires}\n"
     files = {
         f"{PACKAGE}.py": _SOURCE.format(version=version, stretch=stretch, before=before or "pass"),
-        f"{info}/METADATA": f"Metadata-Version: 2.1\nName: {PACKAGE}\nVersion: {version}\n{needs}",
-        f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: mill\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
         f"{info}/entry_points.txt": f"[velodrome.engines]\n{PACKAGE} = {PACKAGE}:ENGINE\n",
     }
-    record = "".join(f"{name},,\n" for name in [*files, f"{info}/RECORD"])
-    path = folder / f"{PACKAGE}-{version}-py3-none-any.whl"
+    return make_package_wheel(folder, PACKAGE, version, files, requires)
+
+
+def make_package_wheel(
+    folder: Path, name: str, version: str, files: Mapping[str, str], requires: str | None = None
+) -> Path:
+    """Write a wheel of any package with these files, by their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    stem = f"{name.replace('-', '_')}-{version}"
+    needs = "" if requires is None else f"Requires-Dist: {requires}\n"
+    described = {
+        f"{stem}.dist-info/METADATA": f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n{needs}",
+        f"{stem}.dist-info/WHEEL": "Wheel-Version: 1.0\nGenerator: mill\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+    }
+    record = f"{stem}.dist-info/RECORD"
+    every = {**files, **described}
+    every[record] = "".join(f"{path},,\n" for path in [*every, record])
+    path = folder / f"{stem}-py3-none-any.whl"
     with zipfile.ZipFile(path, "w") as wheel:
-        for name, text in {**files, f"{info}/RECORD": record}.items():
-            wheel.writestr(name, text)
+        for inside, text in every.items():
+            wheel.writestr(inside, text)
     return path
 
 

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import json
 import random
+import shutil
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
-from mill import CIRCLE, FAULT, PACKAGE, ROUND_OFF, install_mill, make_wheel, use_registry
+from mill import CIRCLE, FAULT, PACKAGE, ROUND_OFF, install_mill, make_package_wheel, make_wheel, use_registry
 
 from velodrome.scenarios.files import file_digest
-from velodrome.scenarios.history.environments import open_environment
+from velodrome.scenarios.history.environments import ReleaseEnvironment, open_environment
 from velodrome.scenarios.history.releases import Release
 
 KILLS = 10
@@ -51,7 +53,7 @@ def test_a_planted_fault_in_a_wheel_is_the_turning_point(velodrome, registry: Pa
     moved = {move["quantity"]: move for move in point["quantities"]}
     assert moved["position_error"]["status"] == "worse"
     assert moved["position_error"]["after"] > moved["position_error"]["before"] + moved["position_error"]["limit"]
-    assert [row["wheel"] for row in document["releases"]] == [None, str(build)]
+    assert [(row["wheel"], row["companions"]) for row in document["releases"]] == [(None, []), (str(build), [])]
     # The table has what the document has.
     table = pq.ParquetFile(tmp_path / "history" / PACKAGE / "rides.parquet").read().to_pylist()
     assert [row["bits"] for row in table] == [row["bits"] for row in document["releases"]]
@@ -211,21 +213,68 @@ def test_a_damaged_environment_is_made_again_and_the_suites_own_is_untouched(reg
     make_wheel(registry, "1.0")
     cache, children = tmp_path / "cache" / "releases", Children()
     installed = sorted((path, path.stat().st_mtime_ns) for path in (tmp_path / "installed").rglob("*.py"))
-    made = open_environment(Release(PACKAGE, "1.0"), cache, children)
-    assert made.packages == {PACKAGE: "1.0"}
+
+    def open_release() -> ReleaseEnvironment:
+        with open_environment(Release(PACKAGE, "1.0"), cache, children) as found:
+            return found
+
+    made = open_release()
+    wheel = registry / f"{PACKAGE}-1.0-py3-none-any.whl"
+    assert made.packages == {PACKAGE: {"version": "1.0", "sha256": file_digest(wheel), "wheel": None}}
     module = made.folder / f"{PACKAGE}.py"
     whole = module.read_bytes()
-    again = open_environment(Release(PACKAGE, "1.0"), cache, children)
-    assert again == made
+    assert open_release() == made
     module.write_bytes(whole + b"# changed\n")
-    assert open_environment(Release(PACKAGE, "1.0"), cache, children) == made
+    assert replace(open_release(), installed=made.installed) == made
     assert module.read_bytes() == whole
     # What a killed process left behind is no environment, and is removed.
     (cache / f".making-{made.folder.name}-left").mkdir()
     module.unlink()
-    open_environment(Release(PACKAGE, "1.0"), cache, children)
+    open_release()
     assert [path.name for path in cache.iterdir() if not path.name.endswith(".lock")] == [made.folder.name]
     assert sorted((path, path.stat().st_mtime_ns) for path in (tmp_path / "installed").rglob("*.py")) == installed
+
+
+@pytest.mark.slow
+def test_a_row_counts_for_the_files_that_ride(velodrome, registry: Path, tmp_path: Path) -> None:
+    make_package_wheel(registry, "wheelmill-core", "2.0", {"wheelmill_core.py": ""})
+    wheel = make_wheel(registry, "1.0")
+    build = make_wheel(tmp_path / "build", "1.1", requires="wheelmill-core")
+    words = ("history", f"{PACKAGE}==1.0", "circle.toml", "--wheel", str(build), "--json")
+    first = velodrome(*words).json()
+    label = f"1.1 wheel {file_digest(build)[:8]}"
+    assert [line for line in first["remarks"] if line.startswith(f"{label}: not of the given wheels")]
+    rows = {row["version"]: row for row in first["releases"]}
+    assert rows["1.0"]["packages"] == {PACKAGE: {"version": "1.0", "sha256": file_digest(wheel), "wheel": None}}
+    assert {name: package["wheel"] for name, package in rows["1.1"]["packages"].items()} == {
+        PACKAGE: build.name,
+        "wheelmill-core": None,
+    }
+    # Other bytes of the same version ride when the cache has them, and not before.
+    make_wheel(registry, "1.0", stretch=FAULT)
+    assert velodrome(*words, "--resume").json() == first
+    (environment,) = (path for path in cached(tmp_path) if "-wheel-" not in path.name)
+    shutil.rmtree(environment)
+    assert velodrome(*words, "--resume").json() == first  # what was ridden remains while nobody installs it again
+    assert velodrome("history", f"{PACKAGE}==1.0", "circle.toml", "--out", "other").status == 0
+    again = {row["version"]: row for row in velodrome(*words, "--resume").json()["releases"]}
+    assert again["1.0"]["packages"][PACKAGE]["sha256"] == file_digest(wheel)
+    assert again["1.0"]["bits"] != rows["1.0"]["bits"]
+    assert again["1.1"]["bits"] == rows["1.1"]["bits"]
+
+
+@pytest.mark.slow
+def test_a_release_whose_environment_is_removed_is_tried_again(velodrome, registry: Path, tmp_path: Path) -> None:
+    removing = "import shutil; shutil.rmtree(os.path.dirname(__file__)); import wheelmill_late"
+    make_wheel(registry, "1.0", before=f"if not os.path.exists({str(tmp_path / 'once')!r}): {removing}")
+    words = ("history", f"{PACKAGE}==1.0", "circle.toml", "--json")
+    found = velodrome(*words)
+    assert found.status == 1
+    (row,) = found.json()["releases"]
+    assert row["status"] == "not-installable"
+    assert row["reason"].endswith("was removed while it rode")
+    (tmp_path / "once").touch()
+    assert [row["status"] for row in velodrome(*words, "--resume").json()["releases"]] == ["rode"]
 
 
 def test_bad_input_is_one_line(velodrome, registry: Path, tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from mill import CIRCLE, FAULT, PACKAGE, install_mill, make_wheel, use_registry
 
 from velodrome.scenarios.history.pairs import measure_separation, write_pair_command
 from velodrome.scenarios.history.releases import Release
+from velodrome.scenarios.history.wheels import WheelFile
 
 
 @pytest.mark.slow
@@ -72,10 +73,13 @@ def test_distances_are_those_of_samples_that_both_have() -> None:
 
 
 def test_the_command_names_both_releases() -> None:
-    released, build = Release("mujoco", "3.9.0"), Release("mujoco", "4.0.0", Path("my builds/mujoco.whl"), "ab")
+    wheel = WheelFile("mujoco", "4.0.0", Path("my builds/mujoco.whl"), "ab")
+    core = WheelFile("mujoco-core", "4.0.0", Path("my builds/mujoco_core.whl"), "cd")
+    released, build = Release("mujoco", "3.9.0"), Release("mujoco", "4.0.0", (wheel, core))
     command = shlex.split(write_pair_command(released, Release("mujoco", "4.0.0"), "mujoco-native", "q2-plus"))
     assert command[:5] == ["velodrome", "history", "mujoco==3.9.0,4.0.0", "q2-plus", "--engine"]
     command = shlex.split(write_pair_command(released, build, "mujoco-native", "q2-plus"))
     assert command[2] == "mujoco==3.9.0"
-    assert command[command.index("--wheel") + 1] == "my builds/mujoco.whl"
+    given = [command[place + 1] for place, word in enumerate(command) if word == "--wheel"]
+    assert given == ["my builds/mujoco.whl", "my builds/mujoco_core.whl"]
     assert shlex.split(write_pair_command(build, build, "mujoco-native", "q2-plus"))[2] == "mujoco"

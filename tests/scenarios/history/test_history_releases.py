@@ -13,7 +13,7 @@ from velodrome.scenarios.history.releases import (
     nearest_version,
     order_releases,
     parse_release_range,
-    read_wheel,
+    read_wheel_releases,
 )
 
 THERE = ["4.0.0", "3.10.0", "3.9.0", "3.3.7", "3.3.0", "3.2.7", "4.1.0rc1"]
@@ -51,8 +51,8 @@ def test_what_is_no_range_is_refused_with_an_example(text: str) -> None:
 
 
 def test_wheels_stand_after_the_release_of_their_version_and_once(tmp_path: Path) -> None:
-    local = read_wheel(make_wheel(tmp_path, "1.1+fault"), "wheelmill")
-    twin = read_wheel(make_wheel(tmp_path / "again", "1.0"), "wheelmill")
+    paths = [make_wheel(tmp_path, "1.1+fault"), make_wheel(tmp_path / "again", "1.0")]
+    local, twin = read_wheel_releases(paths, "wheelmill")
     found = order_releases("wheelmill", ["1.10", "1.1", "1.0"], [local, twin, twin])
     assert [release.label for release in found] == [
         "1.0",
@@ -65,26 +65,10 @@ def test_wheels_stand_after_the_release_of_their_version_and_once(tmp_path: Path
 
 
 def test_a_wheel_of_another_content_is_another_release(tmp_path: Path) -> None:
-    one = read_wheel(make_wheel(tmp_path / "a", "1.0"), "wheelmill")
-    other = read_wheel(make_wheel(tmp_path / "b", "1.0", stretch=1.1), "wheelmill")
+    paths = [make_wheel(tmp_path / "a", "1.0"), make_wheel(tmp_path / "b", "1.0", stretch=1.1)]
+    one, other = read_wheel_releases(paths, "wheelmill")
     assert one.key != other.key
     assert one.key != Release("wheelmill", "1.0").key
-
-
-def test_a_file_that_is_no_wheel_of_the_package_is_refused(tmp_path: Path) -> None:
-    wheel = make_wheel(tmp_path, "1.0")
-    for path, words in (
-        (tmp_path / "absent.whl", "there is no such file"),
-        (tmp_path, "there is no such file"),
-        (wheel.rename(tmp_path / "wheelmill.zip"), "is not a wheel by its name"),
-    ):
-        with pytest.raises(ScenarioError, match=words):
-            read_wheel(path, "wheelmill")
-    with pytest.raises(ScenarioError, match="is a wheel of wheelmill, not of mujoco"):
-        read_wheel(make_wheel(tmp_path, "1.0"), "mujoco")
-    (tmp_path / "wheelmill-2.0-py3-none-any.whl").write_text("no zip")
-    with pytest.raises(ScenarioError, match="damaged or no wheel"):
-        read_wheel(tmp_path / "wheelmill-2.0-py3-none-any.whl", "wheelmill")
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from velodrome.scenarios.gate import Verdict
 from velodrome.scenarios.history import HistoryFolder, PlannedRide, find_stored_histories, name_origins
 from velodrome.scenarios.history.problems import prepare_ride
 from velodrome.scenarios.history.releases import Release
+from velodrome.scenarios.history.wheels import WheelFile
 
 ENGINE, LIMIT = "mill", 0.1
 # Errors of the releases: it moves with 1.2, by less than the limit with 1.1 and 1.3.
@@ -44,7 +45,8 @@ class Told:
         wheel = planned.pop("wheel")
         history = HistoryFolder(self.folder / "history" / name, resume=False)
         for number, (version, found) in enumerate(rows.items()):
-            release = Release("mill", version, wheel, None if wheel is None else "0" * 64)
+            files = () if wheel is None else (WheelFile("mill", version, wheel, "0" * 64),)
+            release = Release("mill", version, files)
             key = f"{number:032d}"
             history.write(PlannedRide(release, ENGINE, "circle", key, **planned), found)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from velodrome.scenarios.history.requirements import RequirementConflict, find_suite_packages, list_unmet
+from velodrome.scenarios.history.requirements import RequirementConflict, find_suite_packages, resolve_needs
 
 _PROBE = """
 import sys
@@ -48,12 +48,12 @@ def write_package(
 @pytest.mark.parametrize("needs", ["numpy", "numpy>=1", "numpy; python_version < '3'", "absent; extra == 'all'"])
 def test_what_the_suite_has_is_not_laid_over(needs: str, tmp_path: Path) -> None:
     write_package(tmp_path, "mill", "2.0", needs, {"mill.py": ""})
-    assert list_unmet(tmp_path, "mill") == []
+    assert resolve_needs(tmp_path, "mill").unmet == ()
 
 
 def test_what_the_suite_has_not_is_laid_over(tmp_path: Path) -> None:
     write_package(tmp_path, "mill", "2.0", "mill-companion[fine]>=1.0", {"mill.py": ""})
-    assert list_unmet(tmp_path, "mill") == ["mill-companion[fine]>=1.0"]
+    assert resolve_needs(tmp_path, "mill").unmet == ("mill-companion[fine]>=1.0",)
 
 
 def test_a_companion_of_the_same_module_is_laid_over_although_the_suite_has_it(
@@ -62,7 +62,7 @@ def test_a_companion_of_the_same_module_is_laid_over_although_the_suite_has_it(
     write_package(tmp_path / "suite", "mill-core", "2.0", "", {"mill/core.py": ""})
     write_package(tmp_path / "own", "mill", "2.0", "mill-core==2.0", {"mill/face.py": ""})
     monkeypatch.syspath_prepend(str(tmp_path / "suite"))
-    assert list_unmet(tmp_path / "own", "mill") == ["mill-core==2.0"]
+    assert resolve_needs(tmp_path / "own", "mill").unmet == ("mill-core==2.0",)
 
 
 def test_what_the_reference_needs_is_never_replaced(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_what_the_reference_needs_is_never_replaced(tmp_path: Path) -> None:
     assert "mujoco-core" not in find_suite_packages("mujoco")
     write_package(tmp_path, "mill", "2.0", "numpy<1", {"mill.py": ""})
     with pytest.raises(RequirementConflict, match=r"mill needs numpy<1, and numpy is .* in the suite's environment"):
-        list_unmet(tmp_path, "mill")
+        resolve_needs(tmp_path, "mill")
 
 
 @pytest.mark.parametrize(
@@ -112,6 +112,24 @@ def test_another_release_than_the_one_asked_for_is_seen(tmp_path: Path) -> None:
     write_package(tmp_path / "suite", "mill", "2.0", "", {"mill.py": ""})
     write_package(tmp_path / "own", "mill", "2.1", "", {"mill.py": ""})
     assert probe(tmp_path, "import mill").startswith("WrongRelease: mill 2.0 was asked for, and 2.1 in")
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        # Several packages share a namespace: what this release does not have of it is the others'.
+        ("import shared.part, shared.other", "right"),
+        (
+            "import importlib.util as u; s = u.spec_from_file_location('shared.part', OTHER / 'shared/part.py'); "
+            "sys.modules['shared.part'] = u.module_from_spec(s)",
+            "WrongRelease: module shared.part was loaded from",
+        ),
+    ],
+)
+def test_of_a_namespace_only_what_the_release_has_must_be_its_own(body: str, told: str, tmp_path: Path) -> None:
+    write_package(tmp_path / "suite", "other", "1.0", "", {"shared/other.py": "", "shared/part.py": ""})
+    write_package(tmp_path / "own", "mill", "2.0", "", {"shared/part.py": ""})
+    assert probe(tmp_path, body).startswith(told)
 
 
 def test_path_files_of_the_environment_come_first(tmp_path: Path) -> None:
