@@ -70,8 +70,8 @@ def history_command(
         bool,
         typer.Option(
             "--resume",
-            help="Go on with what the folder has: ride what is missing, and again what a limit or a signal ended. Releases, "
-            "engines and scenarios may be added.",
+            help="Go on with what the folder has: ride what is missing, and again what a limit or a signal ended. "
+            "Releases, engines and scenarios may be added.",
         ),
     ] = False,
     cache: CacheOption = None,

@@ -68,6 +68,8 @@ def test_what_a_process_has_loaded_is_told_by_its_versions(tmp_path: Path, monke
 
 def test_the_code_of_an_adapter_is_part_of_its_digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     install_mill(tmp_path, monkeypatch)
+    # The module of the test before may be loaded still.
+    monkeypatch.delitem(sys.modules, PACKAGE, raising=False)
     module = tmp_path / "site" / f"{PACKAGE}.py"
     digest_adapter.cache_clear()
     assert digest_adapter(PACKAGE, PACKAGE) is None, "the code of the releases themselves is no adapter"
