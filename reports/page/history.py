@@ -200,7 +200,7 @@ def _make_pair(
         {
             "anchor": anchors.choose(scenario, engine, group[0]["version"]),
             "rows": group,
-            "text": _describe_group(group, points.get(group[0]["release"])),
+            "text": _describe_group(group, points.get(group[0]["release"]), {move["release"] for move in gradual}),
             "point": _describe_point(points.get(group[0]["release"])),
             "gradual": [
                 {"release": row["release"]} | (_describe_point(move) or {})
@@ -268,8 +268,17 @@ def _describe_row(row: Row) -> str:
     return f"{again}{row['since_previous']} since {row['compared_with']}: {moved}"
 
 
-def _describe_group(group: Sequence[Row], point: Mapping[str, Any] | None) -> str | None:
-    """Return what the releases of a group have in common; None where the turning point alone says all."""
+def _describe_group(group: Sequence[Row], point: Mapping[str, Any] | None, slow: set[str]) -> str | None:
+    """Return what the releases of a group have in common; None where the turning point alone says all.
+
+    Parameters
+    ----------
+    group : sequence of mapping
+    point : mapping or None
+        Turning point of its first release.
+    slow : set of str
+        Releases until which something moved gradually.
+    """
     if len(group) == 1 and point is not None and group[0]["status"] == "rode":
         return None
     if group[0]["status"] != "rode":
@@ -277,6 +286,8 @@ def _describe_group(group: Sequence[Row], point: Mapping[str, Any] | None) -> st
     inside = {row["since_previous"] for row in group[1:]}
     if not inside:
         return "rode"
+    if any(row["release"] in slow for row in group[1:]):
+        return "rode, each the same as the one before within round-off"
     return "rode, the same to the bit" if inside == {"same-bits"} else "rode, the same within round-off"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +71,7 @@ def show_history(console: Console, document: Mapping[str, Any]) -> None:
     by_pair: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for row in document["releases"]:
         by_pair.setdefault((row["scenario"], row["engine"]), []).append(row)
+    slow = {(move["scenario"], move["engine"], move["release"]) for move in document["gradual_moves"]}
     for (scenario, engine), rows in by_pair.items():
         console.print()
         console.print(f"{scenario}: {engine}", style="bold", markup=False, soft_wrap=True)
@@ -78,7 +79,7 @@ def show_history(console: Console, document: Mapping[str, Any]) -> None:
         columns = [
             Column("releases", [_name_releases(group) for group in found], right=False),
             Column("number", [str(len(group)) for group in found]),
-            Column("among them", [_describe_inside(group) for group in found], right=False),
+            Column("among them", [_describe_inside(group, slow) for group in found], right=False),
             Column("since the release before", [_describe_step(group[0]) for group in found], right=False),
         ]
         print_table(console, columns)
@@ -95,12 +96,15 @@ def _name_releases(group: Sequence[Mapping[str, Any]]) -> str:
     return first if len(group) == 1 else f"{first} to {last}"
 
 
-def _describe_inside(group: Sequence[Mapping[str, Any]]) -> str:
+def _describe_inside(group: Sequence[Mapping[str, Any]], slow: Collection[tuple[str, str, str]]) -> str:
+    """Return what releases have in common; ``slow`` are those until which something moved gradually."""
     if group[0]["status"] != "rode":
         return group[0]["status"]
     inside = {row["since_previous"] for row in group[1:]}
     if not inside:
         return "rode"
+    if any((row["scenario"], row["engine"], row["release"]) in slow for row in group[1:]):
+        return "each within round-off of the one before, moved gradually"
     return "same to the bit" if inside == {"same-bits"} else "same within round-off"
 
 
