@@ -1,7 +1,7 @@
 """The histories of releases that the documentation shows: `python -m benchmarks.release_history history/mujoco`.
 
 Condenses what `velodrome history` has written into ``docs/histories``: every row without its figures, and the turning
-points with theirs.
+points and gradual moves with theirs.
 """
 
 from __future__ import annotations
@@ -14,8 +14,11 @@ from pathlib import Path
 from typing import Any
 
 FOLDER = Path(__file__).parents[1] / "docs" / "histories"
-_ROW = ("version", "release", "date", "engine", "scenario", "status", "reason", "since_previous", "changed")
-_WHOLE = ("package", "scenarios", "engines", "remarks", "turning_points", "libraries")
+_ROW = (
+    *("version", "release", "date", "engine", "scenario"),
+    *("status", "reason", "compared_with", "since_previous", "changed"),
+)
+_WHOLE = ("package", "scenarios", "engines", "remarks", "turning_points", "gradual_moves", "libraries")
 
 
 def condense_history(document: Mapping[str, Any], command: str, day: str) -> dict[str, Any]:

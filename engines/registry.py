@@ -156,6 +156,17 @@ def _read_engine(point: EntryPoint, required: tuple[str, ...]) -> GuardedEngine:
     return GuardedEngine(engine, **facts, takes_inputs=takes)
 
 
+def find_announcement(name: str) -> EntryPoint:
+    """Return the entry point that announces an engine.
+
+    Raises
+    ------
+    KeyError
+        If no engine with that name is announced.
+    """
+    return _find_entry_points()[name]
+
+
 def package_of(name: str) -> str | None:
     """Return the name of the distribution that announces an engine, or None if it is unknown.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from packaging.version import InvalidVersion, Version
 
@@ -161,6 +161,19 @@ def split_adaptations(stated: Mapping[str, Any], own: Mapping[str, Any]) -> tupl
     """
     adapted = {key: stated[key] for key in ADAPTATION_KEYS if key in stated and key not in own}
     return {key: value for key, value in stated.items() if key not in adapted}, adapted
+
+
+def list_stated_adaptations(stated: Mapping[str, Any]) -> list[str]:
+    """Return the lines by which the settings of a trajectory say what was left out and replaced.
+
+    Parameters
+    ----------
+    stated : mapping
+        Settings of a trajectory.
+    """
+    found = [stated.get(key) for key in ADAPTATION_KEYS]
+    lines = [cast("Mapping[str, object]", each).values() for each in found if isinstance(each, Mapping)]
+    return [text for each in lines for text in each if isinstance(text, str)]
 
 
 def find_reach(engine: object) -> LibraryReach | None:

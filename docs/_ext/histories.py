@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from velodrome.reports.page import group_releases
+from velodrome.reports.page import describe_run, group_releases
 from velodrome.reports.page.history import describe_unit, format_figures, format_limit, rank_moves
 from velodrome.reports.page.judged_quantities import format_title
 
@@ -67,8 +67,14 @@ def _describe_group(group: Sequence[Mapping[str, Any]]) -> str:
         step = "–"
     elif not count:
         step = _INSIDE[since]
+    elif first["status"] != "rode":
+        step = "does not ride any more"
     elif first["changed"] == ["run"]:
-        step = f"{since}: it rides" if since == "better" else f"{since}: it does not ride"
+        step = (
+            "the first that rides"
+            if since == "changed"
+            else f"rides again, {_INSIDE[since]} as {first['compared_with']}"
+        )
     else:
         step = f"{since}: {count} {'quantities' if count > 1 else 'quantity'}"
     return f"{name} | {how} | {step}"
@@ -76,15 +82,15 @@ def _describe_group(group: Sequence[Mapping[str, Any]]) -> str:
 
 def describe_turning_point(package: str, release: str) -> str:
     """Markdown of what a release moved, in every engine and scenario."""
-    points = [point for point in list_turning_points(package)[release] if not _is_run(point)]
-    starts = [point for point in list_turning_points(package)[release] if _is_run(point)]
+    points = [point for point in list_turning_points(package)[release] if set(_list_moved(point)) != {"run"}]
+    starts = [point for point in list_turning_points(package)[release] if "run" in _list_moved(point)]
     lines = [
         f"- `{point['engine']}` on {point['scenario']}: "
-        + ("rides, and did not before" if point["verdict"] == "better" else "does not ride any more")
+        + describe_run(next(move["status"] for move in point["quantities"] if move["quantity"] == "run"))
         for point in starts
     ]
     for point in points:
-        moves = rank_moves(point["quantities"])
+        moves = [move for move in rank_moves(point["quantities"]) if move["quantity"] != "run"]
         lines += ["", f"`{point['engine']}` on {point['scenario']}: {point['verdict']}", ""]
         lines += [f"| quantity | {point['since']} | {release} | limit | |", "| --- | ---: | ---: | ---: | --- |"]
         for move in moves[:MOST_QUANTITIES]:
@@ -98,5 +104,5 @@ def describe_turning_point(package: str, release: str) -> str:
     return "\n".join(lines)
 
 
-def _is_run(point: Mapping[str, Any]) -> bool:
-    return [move["quantity"] for move in point["quantities"]] == ["run"]
+def _list_moved(point: Mapping[str, Any]) -> list[str]:
+    return [move["quantity"] for move in point["quantities"]]

@@ -17,7 +17,8 @@ _FIRST_FORCE = Adaptation(
     name="first_force",
     since="1.11.0",
     how="left_out",
-    text="Exudyn keeps no Lagrange multipliers of the start: the contact forces of the first sample are zero",
+    text="Exudyn keeps no Lagrange multipliers of the start: the contact forces of the first sample are unknown, and "
+    "count as zero in the force error",
 )
 JOINT = LibraryReach(
     "exudyn",

@@ -105,6 +105,8 @@ def make_remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list
             f"{name}: its energy drift is no more than {metrics['energy_drift']:.2g}, the error of the damping's work "
             "between samples; a higher output rate shows more"
         )
+    # Before the errors that may come of it. Folders of earlier versions do not have this metric.
+    lines += [f"{name}, for this release: {text}" for text in metrics.get("adaptations") or ()]
     if metrics["contact_force_error_at"] == 0:
         later = metrics["settled_force_error"]
         rest = "" if later is None else f"; once settled it is {later:.2g}"

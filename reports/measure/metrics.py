@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...engines.engine import Trajectory
+from ...engines.releases import list_stated_adaptations
 from ...reference.bicycle import Bicycle
 from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.kinematics import REAR_ANGLE, YAW
@@ -79,6 +80,7 @@ def compute_metrics(
     result |= _drift_metrics(trajectory, reference, circular)
     result |= _energy_metrics(trajectory, inputs)
     result |= _constraint_metrics(trajectory)
+    result["adaptations"] = list_stated_adaptations(reported.settings)
     result["not_finite"] = reported.not_finite()
     found = find_mismatches(reported, trajectory, reference, size, step_noise)
     result["inconsistent_reports"] = [mismatch.as_json() for mismatch in found if not mismatch.holds]

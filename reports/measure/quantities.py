@@ -103,6 +103,11 @@ QUANTITIES: dict[str, Quantity] = {
         "Largest speed of a wheel's material at its contact point: zero for a wheel that rolls.", "m/s"
     ),
     "mean_slip": Quantity("That speed, averaged over both wheels and all samples.", "m/s"),
+    "adaptations": Quantity(
+        "What the engine left out or replaced, as the release of its library lacks something; text, see "
+        "`velodrome show`.",
+        "",
+    ),
     "not_finite": Quantity("Names of the fields of the trajectory that are not finite in some samples.", ""),
     "inconsistent_reports": Quantity(
         "What the engine reports and its own coordinates contradict: field, part, difference, limit, unit, time.", ""

@@ -17,7 +17,8 @@ from .releases_figure import draw_releases, format_distinct
 
 Row = Mapping[str, Any]
 _ABSOLUTE = "report_mismatch"  # its limit is one of the value itself
-_RUN = "run"  # the quantity that moved where only one of two releases rides
+_RUN = "run"  # the quantity that moved where a release rides and the one before it did not, or the opposite
+_UNMOVED = {"same-bits": "same to the bit", "round-off": "same within round-off"}
 _DIGITS = 4  # of figures in tables
 _CODE = re.compile(r"`([^`]*)`")
 
@@ -33,11 +34,11 @@ class CellKind:
 
 CELL_KINDS = (
     CellKind("first", "•", "rode, with nothing before to compare with"),
-    CellKind("same-bits", "=", "same to the bit as the release before"),
+    CellKind("same-bits", "=", "same to the bit as the last one before that rode"),
     CellKind("round-off", "≈", "the same within round-off"),
     CellKind("better", "+", "better beyond a limit"),
     CellKind("worse", "−", "worse beyond a limit"),
-    CellKind("changed", "≠", "changed beyond a limit, both ways or in no direction"),
+    CellKind("changed", "≠", "changed beyond a limit, both ways or in no direction; or the first that rides"),
     CellKind("refused", "R", "refused the ride"),
     CellKind("failed", "F", "failed: an error, a crash, or no end"),
     CellKind("not-installable", "N", "could not be installed"),
@@ -94,7 +95,9 @@ def make_history_page(document: Mapping[str, Any]) -> str:
         engines=list_engine_styles(names),
         kinds=CELL_KINDS,
         sections=[section for section in sections if section["pairs"]],
-        turns=_list_turns(document, sections),
+        turns=_list_turns(document["turning_points"], document, sections),
+        gradual=_list_turns(document["gradual_moves"], document, sections),
+        compared=any(row["since_previous"] is not None for row in document["releases"]),
         meanings=_list_meanings(document),
         style=Markup(read_part("page.css") + read_part("history.css")),
     )
@@ -123,21 +126,28 @@ def find_moved_kind(verdict: str) -> CellKind:
     return _KINDS[verdict]
 
 
+def describe_run(status: str) -> str:
+    """Return the words for a release that rides where the one before did not, or the opposite, by the move's status."""
+    return {
+        "changed": "it rides, and none before it did",
+        "better": "it rides again, and the one before it did not",
+        "worse": "it does not ride any more",
+    }[status]
+
+
 def _describe_move(move: Mapping[str, Any]) -> tuple[str, str]:
     """Return a quantity and how it moved; the latter is empty where there are no numbers."""
     if move["quantity"] == _RUN:
-        return {"better": "it rides, and the one before did not", "worse": "it does not ride any more"}[
-            move["status"]
-        ], ""
+        return describe_run(move["status"]), ""
     before, after = format_figures(move["before"], move["after"])
     return format_title(move["quantity"]), f"{before} → {after}"
 
 
 def rank_moves(moves: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Return moves with the observed order first, then by their size against their limit, the largest first."""
+    """Return moves with the ride and the observed order first, then the largest first, against their limits."""
 
     def rank(move: Mapping[str, Any]) -> float:
-        if move["quantity"] == "observed_order":
+        if move["quantity"] in ("observed_order", _RUN):
             return -float("inf")
         if move["before"] is None or move["after"] is None or not move["limit"]:
             return 0.0
@@ -185,17 +195,25 @@ def _make_pair(
         for point in document["turning_points"]
         if point["scenario"] == scenario and point["engine"] == engine
     }
+    gradual = [move for move in document["gradual_moves"] if move["scenario"] == scenario and move["engine"] == engine]
     groups: list[dict[str, Any]] = [
         {
             "anchor": anchors.choose(scenario, engine, group[0]["version"]),
             "rows": group,
-            "text": _describe_group(group, points.get(group[0]["release"])),
+            "text": _describe_group(group, points.get(group[0]["release"]), {move["release"] for move in gradual}),
             "point": _describe_point(points.get(group[0]["release"])),
+            "gradual": [
+                {"release": row["release"]} | (_describe_point(move) or {})
+                for row in group
+                for move in gradual
+                if move["release"] == row["release"]
+            ],
         }
         for group in group_releases(rows)
     ]
     quantities = list(dict.fromkeys(name for row in rows for name in row["quantities"]))
-    figures = [_make_figure(rows, name) for name in quantities]
+    slow = {move["quantity"]: each["release"] for each in gradual for move in each["quantities"]}
+    figures = [_make_figure(rows, name, slow.get(name)) for name in quantities]
     drawn = [figure for figure in figures if figure is not None]
     return {
         "engine": engine,
@@ -235,17 +253,32 @@ def _describe_row(row: Row) -> str:
         return f"{row['status']}: {row['reason']}{since}"
     if row["since_previous"] is None:
         return "rode, with nothing before to compare with"
-    if not row["changed"]:
-        return {
-            "same-bits": f"same to the bit as {row['compared_with']}",
-            "round-off": f"the same as {row['compared_with']} within round-off",
-        }[row["since_previous"]]
-    moved = ", ".join("rides at all" if name == _RUN else format_title(name) for name in row["changed"])
-    return f"{row['since_previous']} since {row['compared_with']}: {moved}"
+    moved = ", ".join(format_title(name) for name in row["changed"] if name != _RUN)
+    if _RUN in row["changed"] and row["since_previous"] == "changed" and not moved:
+        return "rides, and none before it did"
+    again = "rides again; " if _RUN in row["changed"] else ""
+    if not moved:
+        return (
+            again
+            + {
+                "same-bits": f"same to the bit as {row['compared_with']}",
+                "round-off": f"the same as {row['compared_with']} within round-off",
+            }[row["since_previous"]]
+        )
+    return f"{again}{row['since_previous']} since {row['compared_with']}: {moved}"
 
 
-def _describe_group(group: Sequence[Row], point: Mapping[str, Any] | None) -> str | None:
-    """Return what the releases of a group have in common; None where the turning point alone says all."""
+def _describe_group(group: Sequence[Row], point: Mapping[str, Any] | None, slow: set[str]) -> str | None:
+    """Return what the releases of a group have in common; None where the turning point alone says all.
+
+    Parameters
+    ----------
+    group : sequence of mapping
+    point : mapping or None
+        Turning point of its first release.
+    slow : set of str
+        Releases until which something moved gradually.
+    """
     if len(group) == 1 and point is not None and group[0]["status"] == "rode":
         return None
     if group[0]["status"] != "rode":
@@ -253,6 +286,8 @@ def _describe_group(group: Sequence[Row], point: Mapping[str, Any] | None) -> st
     inside = {row["since_previous"] for row in group[1:]}
     if not inside:
         return "rode"
+    if any(row["release"] in slow for row in group[1:]):
+        return "rode, each the same as the one before within round-off"
     return "rode, the same to the bit" if inside == {"same-bits"} else "rode, the same within round-off"
 
 
@@ -261,8 +296,9 @@ def _describe_point(point: Mapping[str, Any] | None) -> dict[str, Any] | None:
         return None
     return {
         "since": point["since"],
-        "verdict": point["verdict"],
+        "verdict": _UNMOVED.get(point["verdict"], point["verdict"]),
         "kind": find_moved_kind(point["verdict"]),
+        "run": next((describe_run(move["status"]) for move in point["quantities"] if move["quantity"] == _RUN), None),
         "moves": [
             {
                 "title": format_title(move["quantity"]),
@@ -273,12 +309,21 @@ def _describe_point(point: Mapping[str, Any] | None) -> dict[str, Any] | None:
             for move in rank_moves(point["quantities"])
             if move["quantity"] != _RUN
         ],
-        "page": point["page"],
+        "page": point.get("page"),
     }
 
 
-def _make_figure(rows: Sequence[Row], name: str) -> dict[str, Any] | None:
-    """Return the figure of a quantity with the texts about it; None where no release has a value."""
+def _make_figure(rows: Sequence[Row], name: str, slow: str | None) -> dict[str, Any] | None:
+    """Return the figure of a quantity with the texts about it; None where no release has a value.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+    name : str
+        Quantity.
+    slow : str or None
+        Last release until which it moved gradually beyond its limit.
+    """
     drawn = draw_releases(rows, name, name == _ABSOLUTE)
     if drawn is None:
         return None
@@ -290,11 +335,12 @@ def _make_figure(rows: Sequence[Row], name: str) -> dict[str, Any] | None:
     if len(there) > 1:
         spoken += f", {texts[-1]} in {there[-1][0]}"
     spoken += f"; moved beyond its limit in {', '.join(moved)}" if moved else "; no release moved it beyond its limit"
+    spoken += f"; moved gradually until {slow}" if slow is not None else ""
     titles = {release: f"{release}: {text}" for (release, _), text in zip(there, texts, strict=True)}
     return drawn | {
         "title": format_title(name),
         "unit": describe_unit(name),
-        "moved": bool(moved),
+        "moved": bool(moved) or slow is not None,
         "spoken": spoken,
         "judged": any(name in row["limits"] for row in rows),
         "titles": [titles.get(row["release"], "") for row in rows],
@@ -312,16 +358,19 @@ def _make_table(rows: Sequence[Row], quantities: Sequence[str]) -> list[tuple[Ro
     ]
 
 
-def _list_turns(document: Mapping[str, Any], sections: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return the turning points by release, with the anchors of their places on the page."""
+def _list_turns(
+    moves: Sequence[dict[str, Any]], document: Mapping[str, Any], sections: Sequence[Mapping[str, Any]]
+) -> list[dict[str, Any]]:
+    """Return turning points, or gradual moves, by release, with the anchors of their places on the page."""
     anchors = {
-        (section["name"], pair["engine"], group["rows"][0]["release"]): group["anchor"]
+        (section["name"], pair["engine"], row["release"]): group["anchor"]
         for section in sections
         for pair in section["pairs"]
         for group in pair["groups"]
+        for row in group["rows"]
     }
     order = {row["release"]: number for number, row in enumerate(document["releases"])}
-    points = sorted(document["turning_points"], key=lambda point: order[point["release"]])
+    points = sorted(moves, key=lambda point: order[point["release"]])
     return [
         {
             "name": release,
@@ -330,6 +379,7 @@ def _list_turns(document: Mapping[str, Any], sections: Sequence[Mapping[str, Any
                 | {
                     "anchor": anchors[point["scenario"], point["engine"], point["release"]],
                     "kind": find_moved_kind(point["verdict"]),
+                    "verdict": _UNMOVED.get(point["verdict"], point["verdict"]),
                     "first": _describe_move(rank_moves(point["quantities"])[0]),
                     "others": [format_title(move["quantity"]) for move in rank_moves(point["quantities"])[1:]],
                 }

@@ -124,7 +124,7 @@ def draw_releases(rows: Sequence[Row], name: str, absolute: bool = False) -> dic
 def _find_bands(
     rows: Sequence[Row], values: Sequence[float | None], name: str, absolute: bool
 ) -> list[tuple[int, float, float]]:
-    """Return (number of the row, low, high): within these a value counts as that of the release before."""
+    """Return (number of the row, low, high): within these a value counts as that of the last release that rode."""
     found = []
     before: float | None = None
     for number, (row, value) in enumerate(zip(rows, values, strict=True)):
@@ -133,7 +133,7 @@ def _find_bands(
             found.append((number, 0.0, limit))
         elif value is not None and limit is not None and before is not None and row["since_previous"] is not None:
             found.append((number, before - limit, before + limit))
-        if row["status"] != "not-installable":  # such a release is passed over
+        if row["status"] == "rode":  # others are passed over
             before = value
     return found
 

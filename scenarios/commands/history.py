@@ -70,7 +70,8 @@ def history_command(
         bool,
         typer.Option(
             "--resume",
-            help="Go on with what the folder has: ride what is missing. Releases, engines and scenarios may be added.",
+            help="Go on with what the folder has: ride what is missing, and again what a limit or a signal ended. "
+            "Releases, engines and scenarios may be added.",
         ),
     ] = False,
     cache: CacheOption = None,
@@ -78,7 +79,8 @@ def history_command(
         int | None, typer.Option(min=1, max=64, help="Number of releases that ride at once; two if not given.")
     ] = None,
     time_limit: Annotated[
-        float, typer.Option(min=1.0, help="Time after which a ride with its measurements counts as hung [s].")
+        float,
+        typer.Option(min=1.0, help="Time after which a ride with its measurements counts as hung [s]; inf for none."),
     ] = LONGEST_RIDE,
     traceback: TracebackOption = False,
     as_json: JsonOption = False,

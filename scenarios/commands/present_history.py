@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rich import progress as bars
 from rich.console import Console
 
-from ...reports.page import group_releases
+from ...reports.page import describe_run, group_releases
 from ..history import HistoryPlan, PlannedRide
 from .tables import Column, print_table
 
 _MOST_QUANTITIES = 4  # of a turning point, in the table; the document has all of them
+_UNMOVED = {"same-bits": "same to the bit", "round-off": "same within round-off"}
 _STYLES = {"worse": "red", "changed": "yellow", "better": "cyan"}
 
 
@@ -70,6 +71,7 @@ def show_history(console: Console, document: Mapping[str, Any]) -> None:
     by_pair: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for row in document["releases"]:
         by_pair.setdefault((row["scenario"], row["engine"]), []).append(row)
+    slow = {(move["scenario"], move["engine"], move["release"]) for move in document["gradual_moves"]}
     for (scenario, engine), rows in by_pair.items():
         console.print()
         console.print(f"{scenario}: {engine}", style="bold", markup=False, soft_wrap=True)
@@ -77,7 +79,7 @@ def show_history(console: Console, document: Mapping[str, Any]) -> None:
         columns = [
             Column("releases", [_name_releases(group) for group in found], right=False),
             Column("number", [str(len(group)) for group in found]),
-            Column("among them", [_describe_inside(group) for group in found], right=False),
+            Column("among them", [_describe_inside(group, slow) for group in found], right=False),
             Column("since the release before", [_describe_step(group[0]) for group in found], right=False),
         ]
         print_table(console, columns)
@@ -85,7 +87,7 @@ def show_history(console: Console, document: Mapping[str, Any]) -> None:
     builds = {row["release"]: [row["wheel"], *row["companions"]] for row in document["releases"] if row["wheel"]}
     for release, wheels in builds.items():
         console.print(f"{release}: {', '.join(wheels)}", style="dim", markup=False, highlight=False, soft_wrap=True)
-    _show_turning_points(console, document["turning_points"])
+    _show_turning_points(console, document)
     for line in document["remarks"]:
         console.print(line, style="yellow", markup=False, highlight=False, soft_wrap=True)
 
@@ -95,43 +97,69 @@ def _name_releases(group: Sequence[Mapping[str, Any]]) -> str:
     return first if len(group) == 1 else f"{first} to {last}"
 
 
-def _describe_inside(group: Sequence[Mapping[str, Any]]) -> str:
+def _describe_inside(group: Sequence[Mapping[str, Any]], slow: Collection[tuple[str, str, str]]) -> str:
+    """Return what releases have in common; ``slow`` are those until which something moved gradually."""
     if group[0]["status"] != "rode":
         return group[0]["status"]
     inside = {row["since_previous"] for row in group[1:]}
     if not inside:
         return "rode"
+    if any((row["scenario"], row["engine"], row["release"]) in slow for row in group[1:]):
+        return "each within round-off of the one before, moved gradually"
     return "same to the bit" if inside == {"same-bits"} else "same within round-off"
 
 
 def _describe_step(row: Mapping[str, Any]) -> str:
-    since = row["since_previous"]
+    since, moved = row["since_previous"], [name for name in row["changed"] if name != "run"]
     if since is None:
         return "–"
-    if not row["changed"]:
-        return {"same-bits": "same to the bit", "round-off": "same within round-off"}[since]
-    return f"{since}: {len(row['changed'])} quantities" if len(row["changed"]) > 1 else f"{since}: {row['changed'][0]}"
+    if row["status"] != "rode":
+        return "does not ride any more"
+    rides = ""
+    if len(moved) < len(row["changed"]):
+        if since == "changed" and not moved:
+            return "rides, and none before did"
+        rides = f"rides again; against {row['compared_with']} "
+    if not moved:
+        return rides + _UNMOVED[since]
+    return rides + (f"{since}: {len(moved)} quantities" if len(moved) > 1 else f"{since}: {moved[0]}")
 
 
-def _show_turning_points(console: Console, points: Sequence[Mapping[str, Any]]) -> None:
-    if not points:
-        console.print("no release moved a quantity beyond its limit", style="bold green")
-        return
-    console.print("turning points", style="bold")
+def _show_turning_points(console: Console, document: Mapping[str, Any]) -> None:
+    points, gradual = document["turning_points"], document["gradual_moves"]
+    if points:
+        console.print("turning points", style="bold")
     for point in points:
-        line = f"{point['release']}, since {point['since']}: {point['scenario']}: {point['engine']}: {point['verdict']}"
-        console.print(line, style=_STYLES[point["verdict"]], markup=False, highlight=False, soft_wrap=True)
-        moved = sorted(point["quantities"], key=_rank_move)
-        for move in moved[:_MOST_QUANTITIES]:
-            console.print(f"  {_describe_move(move)}", markup=False, highlight=False, soft_wrap=True)
-        if len(moved) > _MOST_QUANTITIES:
-            more = ", ".join(move["quantity"] for move in moved[_MOST_QUANTITIES:])
-            console.print(f"  and {more}", markup=False, highlight=False, soft_wrap=True)
+        verdict = _UNMOVED.get(point["verdict"], point["verdict"])
+        line = f"{point['release']}, since {point['since']}: {point['scenario']}: {point['engine']}: {verdict}"
+        _show_moves(console, line, point)
+    if gradual:
+        console.print("moved gradually, in no single release beyond a limit", style="bold")
+    for move in gradual:
+        line = f"between {move['since']} and {move['release']}: {move['scenario']}: {move['engine']}: {move['verdict']}"
+        _show_moves(console, line, move)
+    if not points and not gradual:
+        compared = any(row["since_previous"] is not None for row in document["releases"])
+        if compared:
+            console.print("no release moved a quantity beyond its limit", style="bold green")
+        else:
+            console.print("nothing to compare: of no engine and scenario two releases rode", style="yellow")
+
+
+def _show_moves(console: Console, line: str, point: Mapping[str, Any]) -> None:
+    """Print a line, and below it what moved most."""
+    console.print(line, style=_STYLES.get(point["verdict"]), markup=False, highlight=False, soft_wrap=True)
+    moved = sorted(point["quantities"], key=_rank_move)
+    for move in moved[:_MOST_QUANTITIES]:
+        console.print(f"  {_describe_move(move)}", markup=False, highlight=False, soft_wrap=True)
+    if len(moved) > _MOST_QUANTITIES:
+        more = ", ".join(move["quantity"] for move in moved[_MOST_QUANTITIES:])
+        console.print(f"  and {more}", markup=False, highlight=False, soft_wrap=True)
 
 
 def _rank_move(move: Mapping[str, Any]) -> float:
     """Return a number by which the observed order comes first, and then what moved most against its limit."""
-    if move["quantity"] == "observed_order":
+    if move["quantity"] in ("observed_order", "run"):
         return -float("inf")
     if move["before"] is None or move["after"] is None or not move["limit"]:
         return 0.0
@@ -140,7 +168,7 @@ def _rank_move(move: Mapping[str, Any]) -> float:
 
 def _describe_move(move: Mapping[str, Any]) -> str:
     if move["quantity"] == "run":
-        return {"better": "it rides, and the one before did not", "worse": "it does not ride any more"}[move["status"]]
+        return describe_run(move["status"])
     before, after = ("none" if move[part] is None else f"{move[part]:.6g}" for part in ("before", "after"))
     limit = "" if move["limit"] is None else f", limit {move['limit']:.2g}"
     return f"{move['quantity']}: {move['status']}: {before} -> {after}{limit}"

@@ -35,6 +35,7 @@ def list_command(as_json: JsonOption = False) -> None:
     """Scenarios of the library, and engines with the commands that install those that are not there."""
     from ...engines.engine import describe_engine
     from ...engines.registry import load_engine, uninstalled_engines
+    from ...engines.releases import find_reach
     from ..run import installed_engines
     from ..scenario import library_names, load_scenario
 
@@ -48,7 +49,9 @@ def list_command(as_json: JsonOption = False) -> None:
             engine = load_engine(name)
             given = {"gives": list(engine.gives), "takes_inputs": engine.takes_inputs}
             described = {"version": engine.version, "description": describe_engine(engine)}
-            engines.append({"name": name, **described, **given})
+            reach = find_reach(engine)
+            refusal = None if reach is None else reach.find_refusal(name)
+            engines.append({"name": name, **described, **given, **({} if refusal is None else {"error": refusal})})
         except ValueError as error:
             engines.append({"name": name, "version": None, "gives": [], "error": " ".join(str(error).split())})
     engines += [

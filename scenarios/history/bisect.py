@@ -18,7 +18,8 @@ def bisect_history(plan: HistoryPlan, ride: RideReleases) -> dict[PlannedRide, M
     """Ride the first and the last release, and halve every interval between releases whose rides differ.
 
     Of an interval only those engines and scenarios are ridden on that differ between its ends. A release that is not
-    installable is replaced by its neighbour. Where two moves within an interval cancel, neither is found.
+    installable is replaced by its neighbour, the first and the last by the nearest towards the other. Where two moves
+    within an interval cancel, neither is found; nor is anything between two ends of which neither rides.
 
     Parameters
     ----------
@@ -42,9 +43,14 @@ def bisect_history(plan: HistoryPlan, ride: RideReleases) -> dict[PlannedRide, M
         missing = [one for one in rides if one not in rows]
         rows.update(ride(missing) if missing else {})
 
-    last = len(plan.releases) - 1
-    take([*at(0, pairs), *at(last, pairs)])
-    gaps = [(0, last, pairs)]
+    first, last = 0, len(plan.releases) - 1
+    take([*at(first, pairs), *at(last, pairs)])
+    # Both ends at once, so that two releases can ride at the same time.
+    while first < last and (_is_missing(rows, plan.releases[first]) or _is_missing(rows, plan.releases[last])):
+        first += _is_missing(rows, plan.releases[first])
+        last -= first < last and _is_missing(rows, plan.releases[last])
+        take([*at(first, pairs), *at(last, pairs)])
+    gaps = [(first, last, pairs)]
     while gaps:
         halves: list[tuple[int, int, int, list[tuple[str, str]]]] = []
         for low, high, which in gaps:

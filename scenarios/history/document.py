@@ -1,15 +1,16 @@
-"""The JSON document of a history: rows, the verdicts between neighbouring releases, and the turning points."""
+"""The JSON document of a history: rows, the verdicts between releases, the turning points, and what moved slowly."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .companions import list_registry_companions
 from .pairs import PAIR_FOLDER, list_suite_versions
 from .plan import HistoryPlan, PlannedRide
-from .ride import NOT_INSTALLABLE, RODE
-from .verdicts import StepVerdict, judge_step
+from .ride import RODE
+from .sequence import judge_sequence
+from .verdicts import MOVED, RUN, QuantityMove, StepVerdict, sum_up_moves
 
 
 def make_history_document(
@@ -17,7 +18,7 @@ def make_history_document(
 ) -> dict[str, Any]:
     """Return the document of the rows that there are.
 
-    A row is judged against the release before it that could be installed.
+    Releases are judged by `velodrome.scenarios.history.sequence.judge_sequence`.
 
     Parameters
     ----------
@@ -31,48 +32,77 @@ def make_history_document(
     """
     from ...reports.page import AnchorNames  # here, so that the processes that ride do not load the pages
 
-    entries: list[dict[str, Any]] = []
-    turning_points: list[dict[str, Any]] = []
-    names = AnchorNames()
-    last: dict[tuple[str, str], PlannedRide] = {}
+    described: dict[PlannedRide, dict[str, Any]] = {}
+    turning_points: dict[PlannedRide, dict[str, Any]] = {}
+    gradual_moves: dict[PlannedRide, list[dict[str, Any]]] = {}
+    by_pair: dict[tuple[str, str], list[PlannedRide]] = {}
     for ride in plan.rides:
-        row = rows.get(ride)
-        if row is None:
-            continue
-        pair = (ride.engine, ride.scenario)
-        earlier = last.get(pair)
-        verdict = None if earlier is None else judge_step(rows[earlier], row)
-        since = None if earlier is None else earlier.release.label
-        date = plan.find_date(ride.release)
-        entries.append(_describe_row(ride, row, date, verdict, since))
-        if earlier is not None and verdict is not None and verdict.moved:
-            both = rows[earlier]["status"] == row["status"] == RODE
-            name = names.choose(ride.engine, ride.scenario, earlier.release.label, ride.release.label) if both else None
-            turning_points.append(
-                {
-                    "version": ride.release.version,
-                    "release": ride.release.label,
-                    "date": date,
-                    "since": since,
-                    "engine": ride.engine,
-                    "scenario": ride.scenario,
-                    "verdict": verdict.status,
-                    "quantities": [move.as_json() for move in verdict.moves],
-                    "page": None if name is None else f"{PAIR_FOLDER}/{name}.html",
-                }
-            )
-        if row["status"] != NOT_INSTALLABLE:
-            last[pair] = ride
+        if ride in rows:
+            by_pair.setdefault((ride.engine, ride.scenario), []).append(ride)
+    for rides in by_pair.values():
+        for ride, found in zip(rides, judge_sequence([rows[ride] for ride in rides]), strict=True):
+            date = plan.find_date(ride.release)
+            since = None if found.compared_with is None else rides[found.compared_with].release.label
+            verdict = found.verdict
+            described[ride] = _describe_row(ride, rows[ride], date, verdict, since)
+            if since is not None and verdict is not None and verdict.moved:
+                status, moves = verdict.status, verdict.moves
+                turning_points[ride] = _describe_moves(ride, date, since, status, moves) | {"page": None}
+            gradual_moves[ride] = [
+                _describe_moves(ride, date, rides[one.since].release.label, sum_up_moves(one.moves), one.moves)
+                for one in found.gradual
+            ]
+    names = AnchorNames()
+    for ride in plan.rides:
+        point = turning_points.get(ride)
+        # Both rode where more is said than that one of them did.
+        if point is not None and point["verdict"] in MOVED and any(m["quantity"] != RUN for m in point["quantities"]):
+            name = names.choose(ride.engine, ride.scenario, point["since"], ride.release.label)
+            point["page"] = f"{PAIR_FOLDER}/{name}.html"
     return {
         "package": plan.package,
         "scenarios": {name: ride.title for name, ride in plan.scenarios.items()},
         "engines": list(plan.engines),
         "complete": complete,
         "bisected": bisected,
-        "remarks": [*plan.remarks, *list_registry_companions(rows)],
-        "releases": entries,
-        "turning_points": turning_points,
+        "remarks": [
+            *plan.remarks,
+            *list_registry_companions(rows),
+            *(_list_unsearched(plan, rows, by_pair) if bisected else []),
+        ],
+        "releases": [described[ride] for ride in plan.rides if ride in described],
+        "turning_points": [turning_points[ride] for ride in plan.rides if ride in turning_points],
+        "gradual_moves": [move for ride in plan.rides for move in gradual_moves.get(ride, [])],
         "libraries": list_suite_versions(plan.package),
+    }
+
+
+def _list_unsearched(
+    plan: HistoryPlan,
+    rows: Mapping[PlannedRide, Mapping[str, Any]],
+    by_pair: Mapping[tuple[str, str], Sequence[PlannedRide]],
+) -> list[str]:
+    """Return a line for every engine and scenario of which a bisection found no release that rides, and left some."""
+    return [
+        f"{engine} on {scenario}: neither the first nor the last release rides, so that --bisect rode none between "
+        "them; without it all are ridden"
+        for (engine, scenario), rides in by_pair.items()
+        if len(rides) < len(plan.releases) and not any(rows[ride]["status"] == RODE for ride in rides)
+    ]
+
+
+def _describe_moves(
+    ride: PlannedRide, date: str | None, since: str, verdict: str, moves: Sequence[QuantityMove]
+) -> dict[str, Any]:
+    return {
+        "version": ride.release.version,
+        "release": ride.release.label,
+        "date": date,
+        "since": since,
+        "engine": ride.engine,
+        "scenario": ride.scenario,
+        "verdict": verdict,
+        "quantities": [move.as_json() for move in moves],
     }
 
 

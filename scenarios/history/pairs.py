@@ -12,6 +12,7 @@ import numpy as np
 from ..run import library_versions
 from .plan import HistoryPlan, PlannedRide
 from .releases import Release
+from .verdicts import RUN
 
 PAIR_FOLDER = "rides"  # of the documents and pages, beside the document of the history
 
@@ -21,7 +22,7 @@ Row = Mapping[str, Any]
 def make_pair_documents(
     plan: HistoryPlan, rows: Mapping[PlannedRide, Row], document: Mapping[str, Any]
 ) -> dict[str, dict[str, Any]]:
-    """Return the documents of the turning points whose two releases both ride.
+    """Return the documents of the turning points at which quantities moved.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ def _describe_pair(
         "scenario": rides[1].scenario,
         "title": plan.scenarios[rides[1].scenario].title,
         "verdict": point["verdict"],
-        "moved": point["quantities"],
+        "moved": [move for move in point["quantities"] if move["quantity"] != RUN],
         "limits": rows[0]["limits"] | rows[1]["limits"],
         "before": before,
         "after": after,

@@ -13,6 +13,7 @@ from ...engines.registry import list_library_packages
 from ..error import ScenarioError
 from ..run import configure_engine, installed_engines
 from ..scenario import choose_engines, join_complaints, show_value
+from .adapters import digest_adapter
 from .children import Children
 from .dates import find_release_dates
 from .environments import list_cached_versions
@@ -147,7 +148,7 @@ def plan_history(
             name,
             key=_identify(release, engine, ride, compared_with),
             ride=ride.identify_for(engine),
-            comparison=digest_json(dict(compared_with)),
+            comparison=digest_json([dict(compared_with), digest_adapter(engine, release.package)]),
         )
         for release in releases
         for name, ride in rides.items()
@@ -231,5 +232,6 @@ def find_versions(asked: ReleaseRange, cache: Path, children: Children) -> tuple
 
 
 def _identify(release: Release, engine: str, ride: MeasuredRide, compared_with: Mapping[str, Any]) -> str:
-    determined = [release.key, release.digest, engine, ride.settings_of(engine), ride.digest, dict(compared_with)]
-    return digest_json(determined)
+    adapter = digest_adapter(engine, release.package)
+    settings = ride.settings_of(engine)
+    return digest_json([release.key, release.digest, engine, adapter, settings, ride.digest, dict(compared_with)])

@@ -116,7 +116,11 @@ def describe_comparison(package: str) -> dict[str, str]:
 
 @cache
 def digest_suite() -> str:
-    """Return the SHA-256 of the suite's code, since a change of it may change a ride."""
+    """Return the SHA-256 of the suite's code, since a change of it may change a ride.
+
+    All of its code counts, also what only shows results: no list of exceptions has to be kept true, and a ride too many
+    costs time only. Texts and styles of pages are no code.
+    """
     root = Path(__file__).parents[2]
     found = hashlib.sha256()
     # In an editable install the floors are links, which rglob does not follow below a folder.

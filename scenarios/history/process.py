@@ -14,12 +14,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from .adapters import digest_adapter
 from .children import Children
 from .environments import ReleaseEnvironment
 from .problems import digest_suite
 from .releases import Release
-from .ride import FAILED, RideSetup, describe_exit
+from .ride import FAILED, REPEATED, RideSetup, describe_exit
 
+_LONGEST_WAIT = 3600.0  # [s]
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
@@ -63,6 +65,7 @@ def ride_tasks(
         rides=str(rides.path),
         rides_sha256=rides.digest,
         suite_sha256=digest_suite(),
+        adapters={engine: digest_adapter(engine, release.package) for _, engine in tasks},
     )
     process: subprocess.Popen[bytes] | None = None
     try:
@@ -104,8 +107,12 @@ def _ask_for_row(process: subprocess.Popen[bytes], task: Mapping[str, str], time
 
 def _describe_lost_process(answer: Mapping[str, Any] | None, status: int, time_limit: float) -> dict[str, Any]:
     if answer is None:
-        return {"status": FAILED, "reason": f"no result within {time_limit:g} s"}
-    return {"status": FAILED, "reason": answer["broken"] or f"its process ended by {describe_exit(status)}"}
+        return {"status": FAILED, "reason": f"no result within {time_limit:g} s", REPEATED: True}
+    return {
+        "status": FAILED,
+        "reason": answer["broken"] or f"its process ended by {describe_exit(status)}",
+        REPEATED: True,
+    }
 
 
 def _say(process: subprocess.Popen[bytes], line: str) -> None:
@@ -123,8 +130,11 @@ def _read_line(process: subprocess.Popen[bytes], due: float) -> bytes | None:
     with selectors.DefaultSelector() as selector:
         selector.register(process.stdout, selectors.EVENT_READ)
         while not data.endswith(b"\n"):
-            if not selector.select(max(0.0, due - time.monotonic())):
-                return None
+            # In parts, since the system takes no time of any length.
+            if not selector.select(min(_LONGEST_WAIT, max(0.0, due - time.monotonic()))):
+                if time.monotonic() >= due:
+                    return None
+                continue
             part = os.read(process.stdout.fileno(), 1 << 16)
             if not part:
                 break

@@ -17,6 +17,7 @@ import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
+from importlib.metadata import packages_distributions
 from pathlib import Path
 from typing import Any
 
@@ -29,14 +30,18 @@ from ...engines.storage import digest, trajectory_table
 from ..error import ScenarioError
 from ..gate import SHOWN, take_sample
 from ..run import configure_engine
+from .adapters import digest_adapter
+from .loaded import list_loaded_packages
 from .overlay import WrongRelease, lay_over, require_loaded_from, require_release
 from .problems import MeasuredRide, digest_suite, read_rides
+from .requirements import list_top_modules
 
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux's prctl
 _MOST_SAMPLES = 41  # of a stored ride; the digest covers all of it
 _LONGEST_REASON = 500  # characters
 _TIMING = "cpu_ratio"  # it differs from run to run
 RODE, REFUSED, FAILED, NOT_INSTALLABLE = "rode", "refused", "failed", "not-installable"
+REPEATED = "repeated"  # key of rows that are ridden again when the history goes on: it was not the release that broke
 
 
 @dataclass(frozen=True)
@@ -55,6 +60,8 @@ class RideSetup:
         File of the rides, by `velodrome.scenarios.history.problems.store_rides`, and its digest.
     suite_sha256 : str
         Digest of the suite's code, with which this process must ride too.
+    adapters : dict
+        Digests of the adapters' code, by engine; None where the suite's or the release's covers it.
     """
 
     parent: int
@@ -64,6 +71,7 @@ class RideSetup:
     rides: str
     rides_sha256: str
     suite_sha256: str
+    adapters: dict[str, str | None]
 
     def line(self) -> str:
         """Return the setup as one line of JSON."""
@@ -85,17 +93,21 @@ def main() -> None:
         require_release(folder, setup.package, setup.version)
         if digest_suite() != setup.suite_sha256:
             raise WrongRelease("the suite's own code has changed since the history was started")
+        for engine, known in setup.adapters.items():
+            if digest_adapter(engine, setup.package) != known:
+                raise WrongRelease(f"the code of the engine {engine} has changed since the history was started")
         rides = read_rides(Path(setup.rides), setup.rides_sha256)
         _warm_up(next(iter(rides.values())))
+        owners = packages_distributions()
     except Exception as error:  # reported to the parent, since there is no other output
         _send(results, {"broken": reason_of_failure(error)})
         sys.exit(1)
     for line in tasks:
         task = json.loads(line)
-        _send(results, _ride_in_fork(rides[task["scenario"]], task["engine"], own))
+        _send(results, _ride_in_fork(rides[task["scenario"]], task["engine"], own, owners))
 
 
-def _ride_in_fork(ride: MeasuredRide, engine: str, own: list[Path]) -> dict[str, Any]:
+def _ride_in_fork(ride: MeasuredRide, engine: str, own: list[Path], owners: Mapping[str, list[str]]) -> dict[str, Any]:
     """Ride in a fork of this process, and return the row."""
     ours, theirs = os.pipe()
     parent = os.getpid()
@@ -104,7 +116,8 @@ def _ride_in_fork(ride: MeasuredRide, engine: str, own: list[Path]) -> dict[str,
         status = 1
         try:
             _die_with(parent)
-            _send(theirs, ride_release(ride, engine, own))
+            row = ride_release(ride, engine, own)
+            _send(theirs, row | {"loaded": list_loaded_packages(own, owners)})
             status = 0
         finally:
             os._exit(status)
@@ -115,7 +128,8 @@ def _ride_in_fork(ride: MeasuredRide, engine: str, own: list[Path]) -> dict[str,
     try:
         return json.loads(line)
     except ValueError:
-        return {"status": FAILED, "reason": f"its process ended by {describe_exit(os.waitstatus_to_exitcode(ended))}"}
+        how = describe_exit(os.waitstatus_to_exitcode(ended))
+        return {"status": FAILED, "reason": f"its process ended by {how}", REPEATED: True}
 
 
 def describe_exit(status: int) -> str:
@@ -135,10 +149,9 @@ def ride_release(ride: MeasuredRide, name: str, own: list[Path]) -> dict[str, An
         engine, settings = configure_engine(name, ride.settings_of(name), any_release=True)
         sample = call_engine(take_sample, ride.start, ride.exact, ride.gate, engine, settings, watch=lambda _: None)
         require_loaded_from(own)
-    except (UnsuitableProblem, ScenarioError) as error:
-        return {"status": REFUSED, "reason": reason_of_failure(error)}
     except Exception as error:  # an engine may raise anything; the row says what
-        return {"status": FAILED, "reason": reason_of_failure(error)}
+        status = REFUSED if isinstance(error, UnsuitableProblem | ScenarioError) else FAILED
+        return {"status": status, "reason": reason_of_failure(error), REPEATED: _is_of_surroundings(error, own)}
     quantities = {quantity: value for quantity, value in sample.values.items() if quantity != _TIMING}
     return {
         "status": RODE,
@@ -176,6 +189,20 @@ def reason_of_failure(error: Exception) -> str:
     own_words = isinstance(error, ScenarioError | UnsuitableProblem | WrongRelease)
     text = str(error) if own_words else why_failed(error)
     return " ".join(text.encode(errors="replace").decode().split())[:_LONGEST_REASON]
+
+
+def _is_of_surroundings(error: BaseException, own: list[Path]) -> bool:
+    """Whether a failure may be one of the machine or of the suite's environment, and not of the release."""
+    tops = {top for folder in own if folder.is_dir() for top in list_top_modules(folder)}
+    found: BaseException | None = error
+    while found is not None:
+        if isinstance(found, OSError | MemoryError | WrongRelease):
+            return True
+        # A module of its own is missing in the release, of others in the environment.
+        if isinstance(found, ImportError) and (found.name or "").partition(".")[0] not in tops:
+            return True
+        found = found.__cause__ or found.__context__
+    return False
 
 
 def _to_finite(values: Mapping[str, float | None]) -> dict[str, float | None]:

@@ -23,9 +23,10 @@ from ...engines.storage import versioned_metadata
 from ..error import ScenarioError
 from ..files import content_digest, make_folder, write_json, write_sealed, write_text
 from ..run import read_json
+from .loaded import are_installed
 from .pairs import PAIR_FOLDER
 from .plan import PlannedRide
-from .ride import NOT_INSTALLABLE
+from .ride import NOT_INSTALLABLE, REPEATED
 
 HISTORY_DOCUMENT, HISTORY_TABLE, HISTORY_PAGE = "history.json", "rides.parquet", "history.html"
 ROWS = "rows"
@@ -78,14 +79,20 @@ class HistoryFolder:
             os.close(file)
 
     def read(self, ride: PlannedRide) -> dict[str, Any] | None:
-        """Return the row of a ride, None if it is missing, damaged or of a release that was not installable."""
+        """Return the row of a ride; None if there is none that holds.
+
+        A row holds if it is whole, the release was installable, the packages that the ride loaded of the suite's
+        environment are there in the same versions, and the ride was not ended by what need not be the release's fault.
+        """
         try:
             found = read_json(self._path(ride))
             whole = found["sha256"] == content_digest(found) and found["key"] == ride.key
         except (OSError, ValueError, KeyError, TypeError):
             return None
         row = found.get("row")
-        return row if whole and isinstance(row, dict) and row["status"] != NOT_INSTALLABLE else None
+        if not whole or not isinstance(row, dict) or row["status"] == NOT_INSTALLABLE or row.get(REPEATED):
+            return None
+        return row if are_installed(row.get("loaded", {})) else None
 
     def write(self, ride: PlannedRide, row: Mapping[str, Any]) -> None:
         """Store the row of a ride."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from ..gate import ABSOLUTE, BELOW_NOISE, CHANGES, judge_sample
@@ -11,7 +11,7 @@ from .ride import NOT_INSTALLABLE, RODE
 
 SAME_BITS, WITHIN_LIMITS, CHANGED, WORSE, BETTER = "same-bits", "round-off", "changed", "worse", "better"
 MOVED = (CHANGED, WORSE, BETTER)
-_RIDES_AT_ALL = "run"  # the quantity that moved where only one of two releases rides
+RUN = "run"  # the quantity that moved where a release rides and the one before it did not, or the opposite
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,9 @@ class StepVerdict:
     ----------
     status : str
         `SAME_BITS`, `WITHIN_LIMITS`, `BETTER` or `WORSE` where all moves that have a direction agree, else `CHANGED`.
+        Where a release rides again, this is of its quantities alone.
     moves : tuple of QuantityMove
+        What moved beyond its limit, and ``run`` where the release rides and the one before it did not, or the opposite.
     """
 
     status: str
@@ -55,8 +57,8 @@ class StepVerdict:
 
     @property
     def moved(self) -> bool:
-        """Whether something moved beyond its limit."""
-        return self.status in MOVED
+        """Whether something moved beyond its limit, or the release rides where the one before it did not."""
+        return bool(self.moves)
 
 
 def judge_step(before: Mapping[str, Any], after: Mapping[str, Any]) -> StepVerdict | None:
@@ -70,21 +72,44 @@ def judge_step(before: Mapping[str, Any], after: Mapping[str, Any]) -> StepVerdi
     Returns
     -------
     StepVerdict or None
-        None where there is nothing to compare: neither rode, or one was not installable.
+        None where there is nothing to compare: neither rode, or one was not installable. Where only the second rode,
+        it is `CHANGED`: without quantities to compare it cannot be better.
     """
     if NOT_INSTALLABLE in (before["status"], after["status"]):
         return None
     if RODE not in (before["status"], after["status"]):
         return None
     if before["status"] != after["status"]:
-        status = BETTER if after["status"] == RODE else WORSE
-        return StepVerdict(status, (QuantityMove(_RIDES_AT_ALL, None, None, None, status),))
+        status = CHANGED if after["status"] == RODE else WORSE
+        return StepVerdict(status, (QuantityMove(RUN, None, None, None, status),))
     if before["bits"] == after["bits"]:
         return StepVerdict(SAME_BITS)
     moves = (*_judge_quantities(before, after), *_judge_reports(before, after))
+    return StepVerdict(sum_up_moves(moves), moves) if moves else StepVerdict(WITHIN_LIMITS)
+
+
+def sum_up_moves(moves: Iterable[QuantityMove]) -> str:
+    """Return `BETTER` or `WORSE` where all moves that have a direction agree, else `CHANGED`."""
     directions = {move.status for move in moves} - {CHANGED}
-    status = directions.pop() if len(directions) == 1 else CHANGED
-    return StepVerdict(status, moves) if moves else StepVerdict(WITHIN_LIMITS)
+    return directions.pop() if len(directions) == 1 else CHANGED
+
+
+def judge_return(last_rode: Mapping[str, Any], after: Mapping[str, Any]) -> StepVerdict:
+    """Judge a release that rides again after others did not, against the last one that rode.
+
+    Parameters
+    ----------
+    last_rode, after : mapping
+        Rows of two rides, as `judge_step` takes them.
+
+    Returns
+    -------
+    StepVerdict
+        The status is that of the quantities; the moves have ``run`` besides.
+    """
+    found = judge_step(last_rode, after)
+    assert found is not None, "both rode"
+    return replace(found, moves=(QuantityMove(RUN, None, None, None, BETTER), *found.moves))
 
 
 def _judge_quantities(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[QuantityMove]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 # Columns of text; all others are numbers.
-_TEXTS = ("ended", "not_finite", "inconsistent_reports")
+_TEXTS = ("ended", "adaptations", "not_finite", "inconsistent_reports")
 
 
 class MetricsTable(Mapping[str, Mapping[str, Any]]):

@@ -31,6 +31,7 @@ from ...engines.engine import (
     why_failed,
 )
 from ...engines.registry import load_engine
+from ...engines.releases import find_reach
 from ...reports.drawing import make_remarks
 from ...reports.measure import Level, engine_document, measure_creep, measure_order_range
 from ..error import MissingMotionError, ScenarioError
@@ -130,7 +131,9 @@ class LeagueEngine:
 
     def as_json(self, rides: Mapping[str, LeagueRide]) -> dict[str, Any]:
         """Return the engine's part of the document."""
+        reach = None if self.engine is None else find_reach(self.engine)
         return {
+            **({} if reach is None else reach.list_adaptations()),
             "version": None if self.engine is None else self.engine.version,
             "description": None if self.engine is None else describe_engine(self.engine),
             "settings": None if self.settings is None else self.settings.model_dump(mode="json"),

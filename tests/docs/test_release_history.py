@@ -14,6 +14,7 @@ from histories import HISTORIES, list_turning_points, read_history
 from pages import DOCS
 
 from benchmarks.release_history import condense_history
+from velodrome.reports.page import describe_run
 from velodrome.reports.page.history import rank_moves
 from velodrome.reports.page.judged_quantities import format_title
 from velodrome.scenarios.gate import take_sample
@@ -46,9 +47,7 @@ def test_a_turning_point_names_its_engines_scenarios_and_largest_moves(package: 
             assert f"`{point['engine']}`" in text
             assert point["scenario"] in text
             first = rank_moves(point["quantities"])[0]
-            assert (
-                "rides, and did not before" if first["quantity"] == "run" else format_title(first["quantity"])
-            ) in text
+            assert (describe_run("changed") if first["quantity"] == "run" else format_title(first["quantity"])) in text
 
 
 @pytest.mark.parametrize("package", PACKAGES)

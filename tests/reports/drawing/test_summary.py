@@ -116,6 +116,7 @@ def test_no_news_is_no_remark() -> None:
         ({"horizon": 7.25}, ["exudyn", "7.25 s", "instability"]),
         ({"energy_drift_rate": None}, ["exudyn: its energy drift is no more than 6.2e-08, the error of the damping's"]),
         ({"contact_force_error_at": 0.0}, ["exudyn", "first sample"]),
+        ({"adaptations": ["it keeps no forces of the start"]}, ["exudyn, for this release: it keeps no forces"]),
     ],
 )
 def test_what_spoils_a_row_is_said(change: dict[str, Any], words: list[str]) -> None:

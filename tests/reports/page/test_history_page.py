@@ -79,7 +79,7 @@ def document() -> dict[str, Any]:
             row("0.6", None, "failed"),
             row("0.7", None, "refused"),
             row("0.8", None, "not-installable"),
-            row("0.9", "better", changed=["run"], release="0.9 wheel abcd1234", wheel=HOSTILE),
+            row("0.9", "better", changed=["run", "position_error"], release="0.9 wheel abcd1234", wheel=HOSTILE),
             row("1.0", "worse", changed=["position_error"]),
         ],
         "turning_points": [
@@ -90,11 +90,17 @@ def document() -> dict[str, Any]:
             | {"version": "0.5", "release": "0.5", "date": None, "since": "0.4", "verdict": "worse"}
             | {"quantities": RUN, "page": None},
             point
-            | {"version": "0.9", "release": "0.9 wheel abcd1234", "date": None, "since": "0.7"}
-            | {"verdict": "better", "quantities": [move("run", None, None, "better")], "page": None},
+            | {"version": "0.9", "release": "0.9 wheel abcd1234", "date": None, "since": "0.4"}
+            | {"verdict": "better", "quantities": [move("run", None, None, "better"), MOVES[0]]}
+            | {"page": "rides/three.html"},
             point
             | {"version": "1.0", "release": "1.0", "date": None, "since": "0.9 wheel abcd1234"}
             | {"verdict": "worse", "quantities": MOVES[:1], "page": "rides/two.html"},
+        ],
+        "gradual_moves": [
+            point
+            | {"version": "0.3", "release": "0.3", "date": None, "since": "0.1", "verdict": "worse"}
+            | {"quantities": [move("steps", 2500.0, 2502.0, "changed")]},
         ],
         "libraries": {"velodrome": "0.1.0", HOSTILE: HOSTILE},
     }
@@ -234,7 +240,24 @@ def test_a_turning_point_names_its_moves_its_date_and_its_rides() -> None:
     assert "0.4, 2026-03-04" in text
     assert "changed since 0.1: observed order 2.012 → – ; also radius drift rate, position error" in text
     assert "worse since 0.4: it does not ride any more" in text
-    assert page.count("The two rides side by side") == 2
+    assert "better since 0.4: it rides again, and the one before it did not; also position error" in text
+    assert "worse between 0.1 and 0.3: steps 2500 → 2502" in text
+    assert page.count("The two rides side by side") == 3
+    assert "moved gradually between 0.1 and <b>0.3</b>" in page
+
+
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    [
+        ([row("1.0")], "Nothing to compare"),
+        ([row("1.0", None, "failed"), row("1.1", None, "refused")], "Nothing to compare"),
+        ([row("1.0"), row("1.1", "round-off")], "No release moved a quantity beyond its limit"),
+    ],
+)
+def test_that_nothing_moved_is_said_where_releases_were_compared_alone(rows: list[dict[str, Any]], told: str) -> None:
+    page = make_history_page(document() | {"releases": rows, "turning_points": [], "gradual_moves": []})
+    both = ("Nothing to compare", "No release moved a quantity beyond its limit")
+    assert [text in page for text in both] == [text == told for text in both]
 
 
 def test_places_follow_the_values_and_the_band_the_value_before() -> None:
@@ -337,10 +360,10 @@ def test_every_judged_quantity_is_described() -> None:
 
 
 def test_an_empty_history_says_so() -> None:
-    found = document() | {"releases": [], "turning_points": []}
+    found = document() | {"releases": [], "turning_points": [], "gradual_moves": []}
     page = make_history_page(found)
     assert "No ride was reached." in page
-    assert "No release moved a quantity beyond its limit." in page
+    assert "Nothing to compare" in page
 
 
 @pytest.mark.slow

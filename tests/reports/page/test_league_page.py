@@ -94,6 +94,15 @@ def test_the_page_is_whole_escaped_and_loads_nothing() -> None:
     assert "None" not in re.sub(r"<style>.*?</style>", "", page, flags=re.DOTALL)
 
 
+def test_what_an_engine_leaves_out_for_an_old_release_is_told() -> None:
+    found = document()
+    assert "For this release" not in make_league_page(found)
+    found["engines"]["worse"] |= {"left_out": {"first_force": f"no forces {HOSTILE}"}}
+    page = make_league_page(found)
+    assert "For this release left out: no forces" in read_text(page)
+    assert HOSTILE not in page
+
+
 def test_rows_stand_by_error_with_their_reasons() -> None:
     page = make_league_page(document())
     body = page[page.index("<tbody>") : page.index("</tbody>")]

@@ -21,6 +21,7 @@ from tests.sealing import contents
 from velodrome.engines import registry
 from velodrome.engines.engine import Engine, EngineError, Settings, Trajectory
 from velodrome.engines.registry import engine_names, load_engine, uninstalled_engines
+from velodrome.engines.releases import LibraryReach
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.families import find_motion
 from velodrome.reference.surface import Paraboloid
@@ -50,6 +51,16 @@ def test_list_names_every_scenario_and_engine(velodrome) -> None:
     table = velodrome("list")
     assert table.status == 0
     assert all(name in table.stdout for name in [*library_names(), *engine_names()])
+
+
+def test_list_says_which_engines_do_not_ride_with_the_installed_release(
+    velodrome, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(LibraryReach, "version", property(lambda self: "3.2.0" if self.package == "mujoco" else "99"))
+    found = {entry["name"]: entry for entry in velodrome("list", "--json").json()["engines"]}
+    assert found["mujoco-multipliers"]["error"].startswith("mujoco-multipliers needs MuJoCo 3.3.1 or newer")
+    assert "error" not in found["mujoco-native"]
+    assert "needs MuJoCo 3.3.1 or newer" in " ".join(velodrome("list").stdout.split())
 
 
 CIRCULAR_FIELDS = {

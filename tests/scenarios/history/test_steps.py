@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import ceil, log2
 from types import SimpleNamespace
 from typing import Any
@@ -80,7 +81,7 @@ def test_equal_bits_are_equal_whatever_else() -> None:
     [
         ("rode", "failed", "worse"),
         ("rode", "refused", "worse"),
-        ("failed", "rode", "better"),
+        ("failed", "rode", "changed"),
         ("failed", "refused", None),
         ("not-installable", "rode", None),
         ("rode", "not-installable", None),
@@ -160,3 +161,122 @@ def test_a_release_is_judged_against_the_last_one_that_could_be_installed() -> N
     assert [entry["since_previous"] for entry in document["releases"]] == [None, None, "worse"]
     assert document["releases"][2]["compared_with"] == "1.0"
     assert document["releases"][1]["reason"] == "no wheel"
+
+
+def judge_rows(*rows: dict[str, Any]) -> dict[str, Any]:
+    """The document of releases of one engine, of which the first is 1.0."""
+    plan = plan_of(len(rows), ("one",))
+    return make_history_document(plan, dict(zip(plan.rides, rows, strict=True)), complete=True, bisected=False)
+
+
+FAILED = {"status": "failed", "reason": "it broke"}
+WORSE_RIDE = row("b", quantities={"position_error": 2e-3})
+
+
+def names_of(point: dict[str, Any]) -> list[str]:
+    return [move["quantity"] for move in point["quantities"]]
+
+
+def test_what_moved_behind_a_release_that_failed_is_named() -> None:
+    document = judge_rows(row(), FAILED, WORSE_RIDE)
+    assert [(one["compared_with"], one["since_previous"], one["changed"]) for one in document["releases"]] == [
+        (None, None, []),
+        ("1.0", "worse", ["run"]),
+        ("1.0", "worse", ["run", "position_error"]),
+    ]
+    broken, fixed = document["turning_points"]
+    assert (broken["since"], broken["verdict"], broken["page"]) == ("1.0", "worse", None)
+    assert (fixed["since"], fixed["verdict"], names_of(fixed)) == ("1.0", "worse", ["run", "position_error"])
+    assert fixed["quantities"][0]["status"] == "better"
+    assert fixed["page"] == "rides/one-circle-1.0-1.2.html"
+
+
+def test_a_release_that_rides_again_as_before_is_told_and_is_not_better() -> None:
+    document = judge_rows(row(), FAILED, {**FAILED, "status": "refused"}, row())
+    assert [one["since_previous"] for one in document["releases"]] == [None, "worse", None, "same-bits"]
+    point = document["turning_points"][-1]
+    assert (point["since"], point["verdict"], names_of(point), point["page"]) == ("1.0", "same-bits", ["run"], None)
+
+
+def test_the_first_release_that_rides_is_not_better() -> None:
+    document = judge_rows(FAILED, {**FAILED, "status": "not-installable"}, row(), row("c", status="rode"))
+    assert [one["since_previous"] for one in document["releases"]] == [None, None, "changed", "round-off"]
+    (point,) = document["turning_points"]
+    assert (point["since"], point["verdict"], names_of(point), point["page"]) == ("1.0", "changed", ["run"], None)
+
+
+def drift(*errors: float) -> list[dict[str, Any]]:
+    """Rides whose error moves; its limit is 1e-6."""
+    return [row(str(place), quantities={"position_error": error}) for place, error in enumerate(errors)]
+
+
+def test_a_slow_drift_is_named_where_it_exceeds_the_limit_and_counted_once() -> None:
+    rides = drift(*(1e-3 + 0.4e-6 * place for place in range(7)))
+    document = judge_rows(*rides[:2], FAILED, *rides[2:])
+    assert all("position_error" not in one["changed"] for one in document["releases"])
+    first, second = document["gradual_moves"]
+    # 3 * 0.4e-6 is the first sum beyond 1e-6; the next is counted from there on.
+    assert (first["since"], first["release"], first["verdict"]) == ("1.0", "1.4", "worse")
+    assert (second["since"], second["release"]) == ("1.4", "1.7")
+    (move,) = first["quantities"]
+    assert (move["before"], move["after"]) == (1e-3, 1e-3 + 1.2e-6)
+
+
+def test_a_turning_point_of_one_quantity_does_not_hide_the_drift_of_another() -> None:
+    rides = drift(1e-3, 1e-3 + 0.8e-6, 1e-3 + 1.6e-6)
+    rides[1]["quantities"]["energy_drift"] = rides[2]["quantities"]["energy_drift"] = 2e-5
+    document = judge_rows(*rides)
+    assert [names_of(point) for point in document["turning_points"]] == [["energy_drift"]]
+    (slow,) = document["gradual_moves"]
+    assert (slow["since"], slow["release"], names_of(slow)) == ("1.0", "1.2", ["position_error"])
+
+
+def test_what_a_single_release_moves_is_no_drift() -> None:
+    document = judge_rows(*drift(1e-3, 1e-3 + 0.8e-6, 2e-3, 2e-3 + 0.8e-6))
+    assert [point["release"] for point in document["turning_points"]] == ["1.2"]
+    assert document["gradual_moves"] == []
+
+
+@pytest.mark.parametrize(
+    ("missing", "turn"), [((0,), 3), ((11,), 3), ((0, 1, 10, 11), 5), ((0, 1, 2, 3, 4), 6), ((0, 11), 1)]
+)
+def test_bisection_replaces_ends_that_are_not_installable(missing: tuple[int, ...], turn: int) -> None:
+    plan, asked = plan_of(12, ("one",)), list[PlannedRide]()
+    values = [None if place in missing else 1e-3 if place < turn else 2e-3 for place in range(12)]
+    rows = bisect_history(plan, ride_as(plan, {"one": values}, asked))
+    points = make_history_document(plan, rows, complete=True, bisected=True)["turning_points"]
+    there = [place for place in range(12) if place not in missing]
+    expected = [(f"1.{one}", f"1.{two}") for one, two in pairwise(there) if one < turn <= two]
+    assert [(point["since"], point["version"]) for point in points] == expected
+    assert len(asked) == len(set(asked)), "a ride was asked for twice"
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_bisection_where_nothing_is_installable_ends(count: int) -> None:
+    plan, asked = plan_of(count, ("one",)), list[PlannedRide]()
+    assert len(bisect_history(plan, ride_as(plan, {"one": [None] * count}, asked))) == count
+
+
+def test_a_bisection_finds_what_moved_behind_failures() -> None:
+    plan, asked = plan_of(12, ("one",)), list[PlannedRide]()
+    rows = [row() if place < 4 else FAILED if place < 7 else WORSE_RIDE for place in range(12)]
+
+    def ride(rides):
+        asked.extend(rides)
+        return {one: rows[plan.releases.index(one.release)] for one in rides}
+
+    document = make_history_document(plan, bisect_history(plan, ride), complete=True, bisected=True)
+    assert [(one["since"], one["release"], names_of(one)) for one in document["turning_points"]] == [
+        ("1.3", "1.4", ["run"]),
+        ("1.3", "1.7", ["run", "position_error"]),
+    ]
+    assert document["remarks"] == []
+
+
+def test_a_bisection_between_releases_that_do_not_ride_says_what_it_left_out() -> None:
+    plan = plan_of(9, ("one",))
+    found = bisect_history(plan, lambda rides: dict.fromkeys(rides, FAILED))
+    document = make_history_document(plan, found, complete=True, bisected=True)
+    assert len(document["releases"]) == 2
+    (remark,) = document["remarks"]
+    assert remark.startswith("one on circle: neither the first nor the last release rides")

@@ -39,6 +39,7 @@ METRICS = {
     *("energy_drift", "energy_drift_rate", "energy_variation", "max_gap", "max_slip", "mean_slip"),
     *(
         "settled_force_error",
+        "adaptations",
         "not_finite",
         "inconsistent_reports",
         "required_friction",

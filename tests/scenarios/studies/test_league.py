@@ -18,6 +18,7 @@ from velodrome.engines.engine import DEFAULT_SETTINGS_SOURCE, REFERENCE, EngineE
 from velodrome.engines.mujoco.native import ENGINE as NATIVE
 from velodrome.engines.mujoco.settings import NativeSettings
 from velodrome.engines.registry import default_engines, engine_names, load_engine
+from velodrome.engines.releases import LibraryReach
 from velodrome.reports.page import find_creeping, rank_rides
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run.runner import measure_one
@@ -283,6 +284,13 @@ def test_a_file_replaces_settings_and_names_its_source(tmp_path: Path) -> None:
     assert entries["mujoco-native"]["settings_source"] == "mine.toml: the manual"
     assert entries["exudyn-builtin"]["settings_source"] == "mine.toml, which names no source"
     assert entries[REFERENCE]["settings_source"] == describe_settings_source(load_engine(REFERENCE))
+
+
+def test_what_is_left_out_for_an_old_release_is_in_the_document(monkeypatch: pytest.MonkeyPatch) -> None:
+    engines = plan(("plane-circle",), ENGINES).engines
+    assert "left_out" not in engines["exudyn-builtin"].as_json({})
+    monkeypatch.setattr(LibraryReach, "version", property(lambda _: "1.10.0"))
+    assert list(engines["exudyn-builtin"].as_json({})["left_out"]) == ["first_force"]
 
 
 @pytest.mark.parametrize(
