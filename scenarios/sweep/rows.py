@@ -40,6 +40,7 @@ METRICS: dict[str, pa.DataType] = {
     **dict.fromkeys(("energy_drift", "energy_drift_rate", "energy_variation"), pa.float64()),
     **dict.fromkeys(("max_gap", "max_slip", "mean_slip"), pa.float64()),
     **dict.fromkeys(("required_friction", "friction", "friction_left_at", "min_normal_force"), pa.float64()),
+    "adaptations": pa.string(),
     "not_finite": pa.string(),
     "inconsistent_reports": pa.string(),
     "steps": pa.int64(),
