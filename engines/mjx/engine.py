@@ -7,99 +7,42 @@ other processes, in the folder that the environment variable JAX_COMPILATION_CAC
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any
 
-from ..engine import Problem, Progress, Trajectory, package_version
-from ..mujoco.engine import GIVES, assemble_trajectory, step_counts
+from ..engine import Problem, Progress
 from ..mujoco.native import COMPARED_AT
+from ..mujoco.port_engine import PortEngine
 from ..mujoco.state import to_mujoco
 from ..single_precision import SinglePrecision, SinglePrecisionVariant
 from .ground import choose_height
 from .process import process_kept
-from .settings import ArraySettings, MjxMultiplierSettings, MjxSettings
+from .settings import MjxMultiplierSettings, MjxSettings
 
-S = TypeVar("S", bound=ArraySettings)
+if TYPE_CHECKING:
+    from ..mujoco.ride import RideState
 
-
-@dataclass(frozen=True)
-class MjxEngine(Generic[S]):
-    """A model in MJX as an engine.
-
-    Attributes
-    ----------
-    name : str
-    settings : type
-    description : str
-        The engine in one line.
-    settings_source : str
-        Whose choice its default settings are.
-    gives : tuple of str
-    single_precision : SinglePrecision or None
-        How it rides in float32 what another engine rides in float64; None if no engine does.
-    """
-
-    name: str
-    settings: type[S]
-    description: str
-    settings_source: str
-    gives: tuple[str, ...] = GIVES
-    single_precision: SinglePrecision | None = None
-    takes_inputs = True
-
-    @property
-    def bit_variants(self) -> dict[str, dict[str, Any]]:
-        """Places in a batch at which a ride should be the same to the last bit; see `Engine`."""
-        return {"last place of a batch of 4": {"batch_size": 4, "batch_place": 3}}
-
-    @property
-    def version(self) -> str:
-        """Version of MJX, with those of JAX, which compiles it, and of MuJoCo, which builds its model."""
-        return f"{package_version('mujoco-mjx')} (jax {package_version('jax')}, mujoco {package_version('mujoco')})"
-
-    def check(self, problem: Problem, settings: Any) -> None:
-        """Refuse ground without a closed form, and output times that are not multiples of the step; see `Engine`."""
-        choose_height(problem.surface)
-        step_counts(problem.times, settings.step)
-
-    def step_noise(self, settings: Any) -> float:
-        """Return the larger of round-off and what the contact solver may leave unconverged in a step; see `Engine`."""
-        return settings.noise
-
-    def simulate(self, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
-        """Run a problem.
-
-        Parameters
-        ----------
-        problem : Problem
-            Its output times must be multiples of the step.
-        settings : ArraySettings
-        progress : callable
-            Called with the simulated time [s] after every 32 outputs.
-
-        Returns
-        -------
-        Trajectory
-            Gap and slip are those of the wheels' knife edges on the true surface.
-
-        Raises
-        ------
-        ValueError
-            If an output time lies between two steps, or the ground has no closed form.
-        EngineError
-            If the model is refused, a wheel has no contact point at the start, or the contact solver fails there.
-        """
-        counts = step_counts(problem.times, settings.step)
-        with process_kept():
-            from .ride import ride_in_mjx
-
-        ridden = ride_in_mjx(problem, settings, counts, progress)
-        return assemble_trajectory(self.name, self.version, problem, settings, ridden)
+PACKAGE = "mujoco-mjx"
+LIBRARIES = {"jax": "jax", "mujoco": "mujoco"}
 
 
-ENGINE = MjxEngine(
+def _ride(problem: Problem, settings: Any, counts: list[int], progress: Progress) -> RideState:
+    with process_kept():
+        from .ride import ride_in_mjx
+
+    return ride_in_mjx(problem, settings, counts, progress)
+
+
+def _refuse_unknown_ground(problem: Problem, settings: Any) -> None:
+    choose_height(problem.surface)
+
+
+ENGINE = PortEngine(
     "mjx",
     MjxSettings,
+    PACKAGE,
+    LIBRARIES,
+    _ride,
+    _refuse_unknown_ground,
     description="MJX, MuJoCo's port to JAX, with the model of mujoco-native",
     settings_source="those of mujoco-native, whose model it rides: the suite's own choice within MuJoCo's limits",
     single_precision=SinglePrecision(
@@ -109,9 +52,13 @@ ENGINE = MjxEngine(
         store=to_mujoco,
     ),
 )
-MULTIPLIERS = MjxEngine(
+MULTIPLIERS = PortEngine(
     "mjx-multipliers",
     MjxMultiplierSettings,
+    PACKAGE,
+    LIBRARIES,
+    _ride,
+    _refuse_unknown_ground,
     description="MJX's tree under the exact forces of rolling, without its contacts and integrators",
     settings_source="those of mujoco-multipliers: the suite's own choice",
 )

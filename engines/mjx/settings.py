@@ -42,11 +42,6 @@ class ArraySettings(BatchSettings):
         """Relative round-off of the numbers that it computes with."""
         return _ROUND_OFF[self.precision]
 
-    @property
-    def noise(self) -> float:
-        """Relative error that a step may add beyond its method: a pose is the result of some eight roundings."""
-        return max(super().noise, 4 * self.round_off)
-
 
 class MjxSettings(ArraySettings, PortSolverSettings):
     """The choices of `mujoco-native`, with MuJoCo's default limits of the solver's iterations."""

@@ -39,6 +39,11 @@ class BatchSettings(StepSettings):
             )
         return self
 
+    @property
+    def noise(self) -> float:
+        """Relative error that a step may add beyond its method: a pose is the result of some eight roundings."""
+        return max(super().noise, 4 * self.round_off)
+
 
 class PortSolverSettings(SoftContactSettings):
     """The contact solver of a port, with MuJoCo's default limits of its iterations."""

@@ -46,8 +46,3 @@ class WarpSettings(BatchSettings, PortSolverSettings, ContactSettings):
     def round_off(self) -> float:
         """Relative round-off of the numbers that it computes with: MuJoCo Warp knows single precision alone."""
         return SINGLE
-
-    @property
-    def noise(self) -> float:
-        """Relative error that a step may add beyond its method: a pose is the result of some eight roundings."""
-        return max(super().noise, 4 * self.round_off)

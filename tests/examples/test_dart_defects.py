@@ -6,8 +6,6 @@
 from __future__ import annotations
 
 import runpy
-import subprocess
-import sys
 from importlib.metadata import version
 from pathlib import Path
 
@@ -16,20 +14,17 @@ import pytest
 
 pytest.importorskip("dartpy", reason="DART is not installed; make test-packages installs it")
 
+from tests.defects import DEFECTS, assert_shows_defect
+
 pytestmark = pytest.mark.packages
 
-SCRIPT = Path(__file__).parents[2] / "examples" / "defects" / "dart_friction_bound.py"
+SCRIPT = DEFECTS / "dart_friction_bound.py"
 
 
 def test_the_script_shows_the_defect(tmp_path: Path) -> None:
-    """Alone, without the suite, and by its exit status."""
-    done = subprocess.run(
-        [sys.executable, "-P", SCRIPT], capture_output=True, text=True, timeout=120, check=False, cwd=tmp_path
+    assert_shows_defect(
+        SCRIPT, tmp_path, f"DART {version('dartpy')} has mended this: a friction of 2 is enough for the package"
     )
-    fixed = f"DART {version('dartpy')} has mended this: a friction of 2 is enough for the package"
-    assert done.returncode == 1, fixed if done.returncode == 0 else done.stderr
-    assert "defect: " in done.stdout.splitlines()[-1]
-    assert "velodrome" not in SCRIPT.read_text(encoding="utf-8")
 
 
 def test_friction_is_bounded_by_the_force_without_friction() -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import runpy
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,7 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / "examples" / "defects" / "exudyn_stored_test_value.py"
+from tests.defects import DEFECTS, assert_shows_defect
+
+SCRIPT = DEFECTS / "exudyn_stored_test_value.py"
 
 
 @cache
@@ -21,13 +21,7 @@ def load_script() -> dict[str, Any]:
 
 
 def test_the_script_shows_the_defect(tmp_path: Path) -> None:
-    """Alone, without the suite, and by its exit status."""
-    done = subprocess.run(
-        [sys.executable, "-P", SCRIPT], capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path
-    )
-    assert done.returncode == 1, done.stderr or "Exudyn has mended this"
-    assert "defect: " in done.stdout.splitlines()[-1]
-    assert "velodrome" not in SCRIPT.read_text(encoding="utf-8")
+    assert_shows_defect(SCRIPT, tmp_path, "Exudyn has mended this")
 
 
 def test_the_ring_keeps_its_energy() -> None:

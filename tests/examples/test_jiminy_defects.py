@@ -6,8 +6,6 @@
 from __future__ import annotations
 
 import runpy
-import subprocess
-import sys
 from importlib.metadata import version
 from pathlib import Path
 
@@ -16,22 +14,17 @@ import pytest
 
 pytest.importorskip("jiminy_py", reason="Jiminy is not installed; make test-packages installs it")
 
+from tests.defects import DEFECTS, assert_shows_defect
+
 pytestmark = pytest.mark.packages
 
-SCRIPTS = Path(__file__).parents[2] / "examples" / "defects"
-ORDER, REFERENCE = SCRIPTS / "jiminy_rk4.py", SCRIPTS / "jiminy_wheel_reference.py"
+ORDER, REFERENCE = DEFECTS / "jiminy_rk4.py", DEFECTS / "jiminy_wheel_reference.py"
 FIXED = f"Jiminy {version('jiminy-py')} has mended this: drop what works around it"
 
 
 @pytest.mark.parametrize("script", [ORDER, REFERENCE], ids=lambda script: script.stem)
 def test_the_script_shows_the_defect(script: Path, tmp_path: Path) -> None:
-    """Alone, without the suite, and by its exit status."""
-    done = subprocess.run(
-        [sys.executable, "-P", script], capture_output=True, text=True, timeout=120, check=False, cwd=tmp_path
-    )
-    assert done.returncode == 1, FIXED if done.returncode == 0 else done.stderr
-    assert "defect: " in done.stdout.splitlines()[-1]
-    assert "velodrome" not in script.read_text(encoding="utf-8")
+    assert_shows_defect(script, tmp_path, FIXED)
 
 
 def test_order_is_two() -> None:
