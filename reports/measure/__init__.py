@@ -28,7 +28,6 @@ from .precision import (
     eigenvalue_document,
     eigenvalue_pairs,
     engine_document,
-    measure_order_range,
 )
 from .quantities import QUANTITIES, Quantity
 from .steady import steady_trajectory
@@ -78,7 +77,6 @@ __all__ = [
     "interval_of",
     "jacobian_at",
     "measure_creep",
-    "measure_order_range",
     "measure_sensitivity",
     "measure_step_errors",
     "measure_work",

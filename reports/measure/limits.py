@@ -29,7 +29,7 @@ START_ERROR = 1e-11
 ROUND_OFF = 2.0**-52
 
 # An order with a larger uncertainty than this cannot be told from its neighbours.
-_LARGEST_ORDER_LIMIT = 0.5
+LARGEST_ORDER_LIMIT = 0.5
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ def order_limit(error: float, moves: tuple[float, float]) -> float | None:
     if min(moves) <= 0:
         return None
     limit = 2 * error * (1 / moves[0] + 1 / moves[1]) / math.log(2)
-    return limit if limit < _LARGEST_ORDER_LIMIT else None
+    return limit if limit < LARGEST_ORDER_LIMIT else None
 
 
 def eigenvalue_limits(

@@ -12,11 +12,16 @@ import numpy as np
 from ...engines.engine import Trajectory
 from .convergence import extrapolate, observed_orders
 from .identify import Identified
+from .limits import LARGEST_ORDER_LIMIT
 from .metrics import position_errors, to_number
 
 SMALL = 0.1  # of the motion's size: up to here the next powers of the step absorb what nonlinearity adds to an error
 
 SAME_BITS = "its step changes nothing: rides of different steps are equal to the last bit"
+UNSETTLED = (
+    "no order: over parts of the ride the last three steps show {0:.2f} to {1:.2f}, which round-off or iterations "
+    "leave where the method's own error is smaller, or steps that are too long"
+)
 
 
 @dataclass(frozen=True)
@@ -140,6 +145,8 @@ def engine_document(
 ) -> dict[str, Any]:
     """Return one engine's part of the JSON document of `velodrome precision`.
 
+    An order that differs by one or more between parts of the ride (`measure_order_range`) is none.
+
     Parameters
     ----------
     levels : sequence of Level
@@ -153,11 +160,16 @@ def engine_document(
     """
     convergence = measure_convergence(levels, reference, size)
     orders = [] if convergence is None else convergence.orders
-    equal_rides = [{"step": None, "reason": SAME_BITS}] if step_changes_nothing(levels) else []
+    order_range = measure_order_range(levels, reference, size)
+    settled = order_range is None or order_range[1] - order_range[0] < 2 * LARGEST_ORDER_LIMIT
+    reasons = [SAME_BITS] if step_changes_nothing(levels) else []
+    if order_range is not None and not settled:
+        reasons.append(UNSETTLED.format(*order_range))
     return {
         "points": [_level_document(level, reference, horizon) for level in levels],
-        "failures": [*failures, *equal_rides],
-        "observed_order": to_number(orders[-1]) if orders else None,
+        "failures": [*failures, *({"step": None, "reason": reason} for reason in reasons)],
+        "observed_order": to_number(orders[-1]) if orders and settled else None,
+        "order_range": None if order_range is None else list(order_range),
         "orders": [to_number(order) for order in orders],
         "richardson_error": None if convergence is None else convergence.limit_error,
         "richardson_uncertainty": None if convergence is None else convergence.uncertainty,

@@ -33,7 +33,7 @@ from ...engines.engine import (
 from ...engines.registry import load_engine
 from ...engines.releases import find_reach
 from ...reports.drawing import make_remarks
-from ...reports.measure import Level, engine_document, measure_creep, measure_order_range
+from ...reports.measure import Level, engine_document, measure_creep
 from ..error import MissingMotionError, ScenarioError
 from ..files import make_folder, write_json, write_text
 from ..run import RunPlan, RunWatch, Trace, claimed_noise, describe_run_environment, measure_one
@@ -70,7 +70,7 @@ class LeagueRide:
         As in ``metrics.json`` [s].
     observed_order : float or None
         Order of convergence of the levels.
-    order_range : tuple of float or None
+    order_range : list of float or None
         Least and largest order over parts of the ride.
     limit_error : float or None
         Distance of the limit of small steps from the reference [m].
@@ -104,7 +104,7 @@ class LeagueRide:
     horizon: float | None = None
     fell_at: float | None = None
     observed_order: float | None = None
-    order_range: tuple[float, float] | None = None
+    order_range: list[float] | None = None
     limit_error: float | None = None
     step: float | None = None
     cpu_per_second: float | None = None
@@ -359,7 +359,7 @@ def _ride(
         horizon=measured["horizon"],
         fell_at=measured["fell_at"],
         observed_order=study["observed_order"],
-        order_range=measure_order_range(found, reference, start.size),
+        order_range=study["order_range"],
         limit_error=study["richardson_error"],
         step=first.step,
         cpu_per_second=min(costs, default=None),

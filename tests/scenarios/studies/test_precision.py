@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -98,6 +99,31 @@ def test_a_step_that_changes_nothing_shows_neither_order_nor_limit() -> None:
     entry = engine_document(levels, [], same, start.size, None)
     assert (entry["observed_order"], entry["richardson_error"], entry["window"]) == (None, None, None)
     assert [failure["reason"] for failure in entry["failures"]] == [SAME_BITS]
+
+
+def test_an_order_that_is_not_settled_is_none() -> None:
+    """Rides of order 2 that end in noise which a halved step does not change show some other order at the end."""
+    start = make_start(load_scenario("plane-circle", {"simulation.duration": 0.2})[1])
+    engine = load_engine(REFERENCE)
+    exact = ride_engine(engine, start.problem, engine.settings(), lambda _: None)
+    measured = measure_one(start, exact, exact, step_noise=0.0)
+    steps, late = (0.04, 0.02, 0.01), exact.time > 0.8 * exact.time[-1]
+
+    def ride(step: float, noise: float) -> Level:
+        q = exact.q.copy()
+        q[:, 0] += 1e-6 * step**2 * exact.time + noise * late
+        return Level(step, replace(exact, q=q), measured)
+
+    clean = engine_document([ride(step, 0.0) for step in steps], [], exact, start.size, None)
+    assert clean["observed_order"] == pytest.approx(2, abs=1e-3)
+    assert clean["failures"] == []
+    noisy = [ride(step, noise) for step, noise in zip(steps, (0.0, 0.0, 1e-9), strict=True)]
+    entry = engine_document(noisy, [], exact, start.size, None)
+    assert entry["observed_order"] is None
+    least, largest = entry["order_range"]
+    assert largest == pytest.approx(2, abs=1e-3)
+    assert least < 1
+    assert [failure["reason"].split(":")[0] for failure in entry["failures"]] == ["no order"]
 
 
 def test_eigenvalues_are_part_of_the_study() -> None:
