@@ -309,7 +309,7 @@ def _check_process_state(before: Mapping[str, Any]) -> ConformanceCheck:
     names = _list_changed_variables(before[_VARIABLES], after[_VARIABLES])
     changed = [f"{line}: {', '.join(names)}" if line.endswith(_VARIABLES) else line for line in changed]
     if changed:
-        changed.append("if a library does so when it is imported, keep the state before the import and restore it after it")
+        changed.append("if a library does so when it is imported, keep the state from before and restore it afterwards")
     return make_check("surroundings", "it leaves the process as it found it", changed)
 
 
