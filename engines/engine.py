@@ -287,13 +287,14 @@ class Engine(Protocol):
     An engine is an object of any class with the members below. Its package adds it to the suite through an entry point
     of the group ``velodrome.engines`` with the engine's name; the suite itself is not changed. To write an engine:
 
-    1. Derive its settings from `Settings`. Every field has a default, bounds and a description with its unit. With a
+    1. Derive its settings from `Settings`. Every field has a default, bounds, a description and its unit, as
+       ``json_schema_extra={"unit": "1/s"}``; the description of a field ``step`` names its unit too, ``[s]``. With a
        field ``step`` the settings can be refined for studies of convergence; a method that chooses its own steps
        overrides ``refined`` and scales its tolerance by the factor to the power of its order.
     2. In ``check`` refuse what the engine cannot run, before anything is computed: raise `UnsuitableProblem` for a
        ground that the engine does not know, and ValueError for output times that its steps do not meet. The message is
-       one line that says what would be right. `velodrome.reference.simulate.steps_per_output` checks the times for a
-       fixed step.
+       one line that says what would be right. `velodrome.engines.problems` has the usual questions: whether the
+       ground is level, and whether a fixed step meets the output times.
     3. Start from exactly the coordinates and rates of the problem, for its bicycle and on its ground.
        `velodrome.engines.coordinates` computes the poses and twists of the bodies, and `velodrome.engines.rolling` the
        contacts of the wheels.
@@ -310,7 +311,7 @@ class Engine(Protocol):
     8. Return from ``step_noise`` the relative error that a step may add beyond its method: 2^-52 for round-off, or the
        tolerance of its iterations or of its steps. The suite derives limits from it.
     9. Return the same bits for the same problem, whatever was simulated before. Do not print to stdout and do not
-       change the process. Import modules that load slowly only where they are needed.
+       change the process, not by an import either. Import modules that load slowly only where they are needed.
     10. Test the engine with `velodrome.testing.check_engine`, which diagnoses violations of these rules.
 
     ``examples/velodrome-symbrim`` is a complete package with an engine.

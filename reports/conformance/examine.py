@@ -38,6 +38,7 @@ from .start import check_start
 from .timing import check_clock, check_rates
 
 _MAP_IS_WRONG = "a map of its coordinates is wrong: correct it first"
+_VARIABLES = "the environment variables"
 _FEWEST = 5  # samples that a ride needs for fits along it
 _RIDE = "it rides to the end, and what it gives is a trajectory of the problem"
 
@@ -298,11 +299,20 @@ def _read_process_state() -> dict[str, Any]:
         "numpy's handling of errors": np.geterr(),
         "numpy's random numbers": repr(np.random.get_state()),  # noqa: NPY002
         "Python's random numbers": random.getstate(),
-        "the environment variables": dict(os.environ),
+        _VARIABLES: dict(os.environ),
     }
 
 
 def _check_process_state(before: Mapping[str, Any]) -> ConformanceCheck:
     after = _read_process_state()
     changed = [f"it changed {what}" for what, value in before.items() if after[what] != value]
+    names = _list_changed_variables(before[_VARIABLES], after[_VARIABLES])
+    changed = [f"{line}: {', '.join(names)}" if line.endswith(_VARIABLES) else line for line in changed]
+    if changed:
+        changed.append("if a library does so when it is imported, keep the state from before and restore it afterwards")
     return make_check("surroundings", "it leaves the process as it found it", changed)
+
+
+def _list_changed_variables(before: Mapping[str, str], after: Mapping[str, str]) -> list[str]:
+    """Return the names of environment variables that were set, changed or removed; values may be secret."""
+    return sorted(name for name in before.keys() | after.keys() if before.get(name) != after.get(name))

@@ -29,7 +29,13 @@ from velodrome.scenarios.run.machine import describe_machine
 from velodrome.scenarios.scenario.schema import Scenario
 from velodrome.scenarios.sweep.file import Hypercube, SweepFile
 
-FACES = ("velodrome", "velodrome.engines.coordinates", "velodrome.engines.rolling", "velodrome.testing")
+FACES = (
+    "velodrome",
+    "velodrome.engines.coordinates",
+    "velodrome.engines.problems",
+    "velodrome.engines.rolling",
+    "velodrome.testing",
+)
 
 
 def marks() -> list[tuple[str, str]]:

@@ -10,15 +10,15 @@ from pydantic import Field
 
 import velodrome
 from velodrome import Engine, Problem, Settings, Trajectory, UnsuitableProblem
-from velodrome.reference.kinematics import body_positions, body_quaternions
-from velodrome.reference.simulate import simulate_modified_euler, steps_per_output
-from velodrome.reference.surface import is_level
+from velodrome.engines.coordinates import body_positions, body_quaternions
+from velodrome.engines.problems import is_level, steps_per_output
+from velodrome.reference.simulate import simulate_modified_euler
 
 
 class OwnSettings(Settings):
     """Settings of the engine."""
 
-    step: float = Field(default=1e-3, ge=1e-5, le=0.01, description="step [s]")
+    step: float = Field(default=1e-3, ge=1e-5, le=0.01, description="step [s]", json_schema_extra={"unit": "s"})
 
 
 class OwnEngine:

@@ -8,9 +8,8 @@ import numpy as np
 
 from velodrome.engines.coordinates import BODIES, quaternions, start_on_turn
 from velodrome.engines.engine import Problem, Progress, Trajectory, UnsuitableProblem
+from velodrome.engines.problems import is_level, steps_per_output
 from velodrome.engines.rolling import observe
-from velodrome.reference.simulate import steps_per_output
-from velodrome.reference.surface import is_level
 
 from .settings import BulletSettings
 

@@ -32,7 +32,7 @@ from velodrome.engines.coordinates import (
     rotations,
 )
 from velodrome.engines.engine import EngineError, Problem, Progress
-from velodrome.reference.simulate import steps_per_output
+from velodrome.engines.problems import steps_per_output
 
 from .settings import BulletSettings
 from .tree import COLUMNS, HINGES, compose_rotations, describe_bicycle

@@ -19,7 +19,7 @@ import numpy as np
 
 from velodrome.engines.coordinates import WHEELS, coordinates_from_bodies
 from velodrome.engines.engine import Problem, Progress
-from velodrome.reference.simulate import steps_per_output
+from velodrome.engines.problems import steps_per_output
 
 from .settings import DartSettings
 from .tree import HINGES, REAR_RATE, STEER_RATE, build_tree

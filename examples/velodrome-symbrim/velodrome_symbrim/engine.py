@@ -12,8 +12,8 @@ from scipy.integrate import DOP853
 
 from velodrome.engines.coordinates import body_positions, body_quaternions
 from velodrome.engines.engine import EngineError, Problem, Progress, Settings, Trajectory, UnsuitableProblem
+from velodrome.engines.problems import is_level
 from velodrome.engines.rolling import observe
-from velodrome.reference.surface import is_level
 
 from .coordinates import AXES, from_symbrim, to_symbrim
 from .equations import Equations

@@ -238,6 +238,25 @@ def test_a_changed_process_is_told() -> None:
         np.seterr(**before)
 
 
+def test_changed_environment_variables_are_named_without_their_values(monkeypatch: pytest.MonkeyPatch) -> None:
+    inner = load_engine(REFERENCE)
+    monkeypatch.setenv("CHANGED_BY_A_RIDE", "old")
+    monkeypatch.setenv("REMOVED_BY_A_RIDE", "old")
+    monkeypatch.delenv("SET_BY_A_RIDE", raising=False)
+
+    def careless(problem: Problem, settings: Any, progress: Any) -> Trajectory:
+        monkeypatch.setenv("CHANGED_BY_A_RIDE", "secret")
+        monkeypatch.setenv("SET_BY_A_RIDE", "secret")
+        monkeypatch.delenv("REMOVED_BY_A_RIDE", raising=False)
+        return inner.simulate(problem, settings, progress)
+
+    words = said(examine_engine(variant(simulate=careless)), "surroundings")
+    names = "CHANGED_BY_A_RIDE, REMOVED_BY_A_RIDE, SET_BY_A_RIDE"
+    assert f"it changed the environment variables: {names}" in words
+    assert "imported" in words
+    assert "secret" not in words
+
+
 STRANGER = """
 import numpy, numba, mujoco, exudyn, os, signal, sys
 def state():
