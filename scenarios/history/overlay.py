@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import os
+import re
 import site
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from importlib.metadata import PackageNotFoundError, distribution
@@ -17,6 +19,8 @@ from packaging.version import Version
 from .requirements import list_regular_modules, list_top_modules
 
 _MAPS = Path("/proc/self/maps")
+_SEARCHED_FIRST = "LD_LIBRARY_PATH"  # folders in which the system looks before those that a library names itself
+_PRELOADED = "LD_PRELOAD"
 
 
 class WrongRelease(RuntimeError):
@@ -100,7 +104,9 @@ def require_release(folder: Path, package: str, version: str) -> None:
 def require_loaded_from(own: list[Path]) -> None:
     """Make sure that modules of the laid-over packages come from their environment, compiled libraries too.
 
-    Of a namespace package, which several packages may share, only what the environment has must come from there.
+    Of a namespace package, which several packages may share, only what the environment has must come from there. The
+    system's variables for its linker may put other libraries in the place of the environment's, and are not changed,
+    since Python itself may need them.
 
     Parameters
     ----------
@@ -126,8 +132,14 @@ def require_loaded_from(own: list[Path]) -> None:
         loaded += bool(places)
     if not loaded:
         raise WrongRelease("the engine loaded nothing of the release, so that the ride says nothing about it")
+    mapped = _list_mapped_files()
+    for name, path in _list_replacements(there):
+        if path in mapped:
+            raise WrongRelease(
+                f"{path}, of {_SEARCHED_FIRST} or {_PRELOADED}, was loaded instead of the release's {name}"
+            )
     elsewhere = [Path(entry).resolve() for entry in sys.path if Path(entry) not in own]
-    for path in _list_mapped_files():
+    for path in mapped:
         for other in elsewhere:
             if not path.is_relative_to(other):
                 continue
@@ -148,6 +160,20 @@ def _has_module(folders: list[Path], name: str) -> bool:
         for entry in folder.joinpath(*parents).iterdir()
         if entry.is_dir() or entry.suffix in (".py", ".so", ".pyd")
     )
+
+
+def _list_replacements(folders: list[Path]) -> Iterator[tuple[str, Path]]:
+    """Yield the names of an environment's compiled libraries for which the linker finds other files first."""
+    preloaded = [Path(entry) for entry in re.split("[ :]", os.environ.get(_PRELOADED, "")) if entry]
+    searched = [Path(entry) for entry in re.split("[:;]", os.environ.get(_SEARCHED_FIRST, "")) if entry]
+    if not preloaded and not searched:
+        return
+    for library in {path for folder in folders for path in folder.rglob("*.so*") if path.is_file()}:
+        others = [folder / library.name for folder in searched]
+        others += [path for path in preloaded if path.name == library.name]
+        for other in others:
+            if other.is_file() and not any(other.resolve().is_relative_to(folder.resolve()) for folder in folders):
+                yield library.name, other.resolve()
 
 
 def _find_places(module: ModuleType) -> list[Path]:

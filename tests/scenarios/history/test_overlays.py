@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
+from numpy.random import _common
 
 from velodrome.scenarios.history.requirements import RequirementConflict, find_suite_packages, resolve_needs
 
+# Any small compiled library.
+COMPILED = _common.__file__
 _PROBE = """
 import sys
 from collections.abc import Mapping
@@ -96,13 +101,18 @@ def test_only_the_release_itself_is_loaded(body: str, told: str, tmp_path: Path)
     assert found.startswith(told)
 
 
-def probe(tmp_path: Path, body: str) -> str:
+def probe(tmp_path: Path, body: str, environment: Mapping[str, str] | None = None) -> str:
     """Lay the release in ``own`` over the one in ``suite``, in a process of its own, and run a line."""
     script = f"import sys; sys.path.insert(0, {str(tmp_path / 'suite')!r})\n" + _PROBE.format(
         body=body.replace("OTHER", f"Path({str(tmp_path / 'suite')!r})")
     )
     done = subprocess.run(
-        [sys.executable, "-c", script, str(tmp_path / "own")], capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, "-c", script, str(tmp_path / "own")],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env=os.environ | (environment or {}),
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
@@ -130,6 +140,24 @@ def test_of_a_namespace_only_what_the_release_has_must_be_its_own(body: str, tol
     write_package(tmp_path / "suite", "other", "1.0", "", {"shared/other.py": "", "shared/part.py": ""})
     write_package(tmp_path / "own", "mill", "2.0", "", {"shared/part.py": ""})
     assert probe(tmp_path, body).startswith(told)
+
+
+@pytest.mark.parametrize("variable", ["LD_LIBRARY_PATH", "LD_PRELOAD"])
+def test_a_library_that_the_shell_puts_in_the_place_of_the_releases_is_seen(variable: str, tmp_path: Path) -> None:
+    """The linker looks in the folders of these variables before those that a library names itself."""
+    library = "libmill.so.1"
+    write_package(tmp_path / "suite", "mill", "1.0", "", {"mill/__init__.py": ""})
+    write_package(tmp_path / "own", "mill", "2.0", "", {"mill/__init__.py": ""})
+    (tmp_path / "shell").mkdir()
+    for folder in (tmp_path / "own" / "mill", tmp_path / "shell"):
+        shutil.copyfile(COMPILED, folder / library)
+    shell = {"LD_LIBRARY_PATH": str(tmp_path / "shell"), "LD_PRELOAD": str(tmp_path / "shell" / library)}
+    loading = "import mill" if variable == "LD_PRELOAD" else f"import ctypes, mill; ctypes.CDLL({library!r})"
+    found = probe(tmp_path, loading, {variable: shell[variable]})
+    assert found.startswith(f"WrongRelease: {tmp_path / 'shell' / library}, of LD_LIBRARY_PATH or LD_PRELOAD, was")
+    # What is found there and not loaded does no harm, nor does a folder that is not there.
+    rightly = f"import ctypes, mill; ctypes.CDLL({str(tmp_path / 'own' / 'mill' / library)!r})"
+    assert probe(tmp_path, rightly, {"LD_LIBRARY_PATH": f"{tmp_path / 'absent'}:{tmp_path / 'shell'}"}) == "right"
 
 
 def test_path_files_of_the_environment_come_first(tmp_path: Path) -> None:
