@@ -26,6 +26,8 @@ class MeasuredRide:
     Attributes
     ----------
     scenario : str
+    source : str
+        Its library name or the path of its file, as the user named it.
     title : str
     gate : Gate
         What is measured.
@@ -39,6 +41,7 @@ class MeasuredRide:
     """
 
     scenario: str
+    source: str
     title: str
     gate: Gate
     start: Start
@@ -77,7 +80,7 @@ def prepare_ride(source: str) -> MeasuredRide:
         "qd": start.problem.qd.tolist(),
         "times": start.problem.times.tolist(),
     }
-    return MeasuredRide(name, scenario.title, gate, start, find_exact(start), settings, digest_json(determined))
+    return MeasuredRide(name, source, scenario.title, gate, start, find_exact(start), settings, digest_json(determined))
 
 
 def store_rides(rides: Mapping[str, MeasuredRide], path: Path) -> str:

@@ -44,7 +44,7 @@ class Mill:
     settings = MillSettings
 
     def check(self, problem, settings):
-        pass
+        {checking}
 
     def step_noise(self, settings):
         return 2.0**-52
@@ -103,6 +103,7 @@ def make_wheel(
     before: str = "",
     requires: str | None = None,
     loading: str = "",
+    checking: str = "",
 ) -> Path:
     """Write a wheel of the engine's package.
 
@@ -118,10 +119,18 @@ def make_wheel(
         What the package needs.
     loading : str
         A line that the module runs when it is imported.
+    checking : str
+        A line that the engine runs when it is asked whether it can ride.
     """
     info = f"{PACKAGE}-{version}.dist-info"
     files = {
-        f"{PACKAGE}.py": _SOURCE.format(version=version, stretch=stretch, before=before or "pass", loading=loading),
+        f"{PACKAGE}.py": _SOURCE.format(
+            version=version,
+            stretch=stretch,
+            before=before or "pass",
+            loading=loading,
+            checking=checking or "pass",
+        ),
         f"{info}/entry_points.txt": f"[velodrome.engines]\n{PACKAGE} = {PACKAGE}:ENGINE\n",
     }
     return make_package_wheel(folder, PACKAGE, version, files, requires)
