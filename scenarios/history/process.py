@@ -12,14 +12,13 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from .adapters import digest_adapter
 from .children import Children
 from .environments import ReleaseEnvironment
-from .problems import digest_suite
+from .problems import RideFile, digest_suite
 from .protocol import ASKING, describe_exit
 from .releases import Release
 from .ride import FAILED, REPEATED, RideSetup
@@ -31,14 +30,6 @@ _FRAME = re.compile(r'^  File "(.*)", line (\d+) in (.*)$', re.MULTILINE)  # by 
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
-
-
-@dataclass(frozen=True)
-class RideFile:
-    """The file of the rides of a session, and its SHA-256."""
-
-    path: Path
-    digest: str
 
 
 def ride_tasks(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -18,7 +17,7 @@ from .companions import describe_registry_companions
 from .one_release import open_named_environment, parse_one_release, require_one_release
 from .plan import HistoryPlan, PlannedRide, plan_history
 from .problems import store_rides
-from .process import RideFile, ride_tasks
+from .process import ride_tasks
 from .releases import Release
 from .ride import RODE
 
@@ -101,13 +100,11 @@ def ride_release_baselines(
     reasons: dict[str, dict[str, str]] = {}
     with (
         open_named_environment(release, _OPTION, cache, children) as environment,
-        tempfile.TemporaryDirectory(prefix="velodrome-baselines-") as own,
+        store_rides(plan.scenarios) as file,
     ):
         remark = describe_registry_companions(release, environment.packages)
         if remark is not None:
             note(remark)
-        path = Path(own) / "rides.pickle"
-        file = RideFile(path, store_rides(plan.scenarios, path))
         tasks = [(ride.scenario, ride.engine) for ride in rides]
         watch(0, len(rides))
         arriving = ride_tasks(release, environment, tasks, file, time_limit, children)
