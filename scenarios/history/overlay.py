@@ -28,17 +28,22 @@ class WrongRelease(RuntimeError):
 
 
 def lay_over(folder: Path) -> list[Path]:
-    """Put a release's environment first on Python's path, with the folders that its path files add.
+    """Put a release's environment first on Python's path, with the folders that path files add of it.
+
+    A path file of the suite's environment may have added some already, behind its own: packages of cmeel, such as
+    Pinocchio's, lie in a folder of every folder of the path.
 
     Returns
     -------
     list of Path
         The folders of the environment that are on the path, itself first.
     """
-    known = [entry for entry in sys.path if entry != str(folder)]
+    inside = [entry for entry in sys.path if entry and Path(entry).is_relative_to(folder)]
+    known = [entry for entry in sys.path if entry not in inside]
     sys.path[:] = known
     site.addsitedir(str(folder))  # a folder of PYTHONPATH alone would not have its path files read
-    own = [str(folder), *(entry for entry in sys.path if entry not in known and entry != str(folder))]
+    added = [entry for entry in sys.path if entry not in known]
+    own = list(dict.fromkeys([str(folder), *added, *inside]))
     sys.path[:] = [*own, *known]
     importlib.invalidate_caches()
     folders = [Path(entry) for entry in own]

@@ -101,9 +101,9 @@ def test_only_the_release_itself_is_loaded(body: str, told: str, tmp_path: Path)
     assert found.startswith(told)
 
 
-def probe(tmp_path: Path, body: str, environment: Mapping[str, str] | None = None) -> str:
+def probe(tmp_path: Path, body: str, environment: Mapping[str, str] | None = None, before: str = "") -> str:
     """Lay the release in ``own`` over the one in ``suite``, in a process of its own, and run a line."""
-    script = f"import sys; sys.path.insert(0, {str(tmp_path / 'suite')!r})\n" + _PROBE.format(
+    script = f"import sys; sys.path.insert(0, {str(tmp_path / 'suite')!r}); {before}\n" + _PROBE.format(
         body=body.replace("OTHER", f"Path({str(tmp_path / 'suite')!r})")
     )
     done = subprocess.run(
@@ -165,3 +165,11 @@ def test_path_files_of_the_environment_come_first(tmp_path: Path) -> None:
     write_package(tmp_path / "own", "mill", "2.0", "", {"prefix/mill.py": "WHERE = 'own'"})
     (tmp_path / "own" / "mill.pth").write_text("prefix\n")
     assert probe(tmp_path, "import mill; assert mill.WHERE == 'own'") == "right"
+
+
+def test_folders_of_the_environment_that_the_suites_path_files_have_added_come_first(tmp_path: Path) -> None:
+    """As cmeel does: its path file adds a folder of every folder of the path, the suite's first."""
+    write_package(tmp_path / "suite", "mill", "1.0", "", {"prefix/mill.py": "WHERE = 'suite'"})
+    write_package(tmp_path / "own", "mill", "2.0", "", {"prefix/mill.py": "WHERE = 'own'"})
+    adding = f"sys.path += [{str(tmp_path / 'suite' / 'prefix')!r}, {str(tmp_path / 'own' / 'prefix')!r}]"
+    assert probe(tmp_path, "import mill; assert mill.WHERE == 'own'", before=adding) == "right"
