@@ -55,6 +55,8 @@ class _OwnModulesOnly(MetaPathFinder):
     """Find the modules of a release's packages in its environment alone.
 
     A package may extend its path to others of its name, and would then load modules of the suite's installed release.
+    The other way round, a release may be a part of another package, as ``mujoco.mjx`` is: what it has of that is found
+    in its environment first.
 
     Parameters
     ----------
@@ -64,7 +66,9 @@ class _OwnModulesOnly(MetaPathFinder):
 
     def __init__(self, own: list[Path]) -> None:
         self._own = own
-        self._tops = {top for folder in own if folder.is_dir() for top in list_regular_modules(folder)}
+        there = [folder for folder in own if folder.is_dir()]
+        self._tops = {top for folder in there for top in list_regular_modules(folder)}
+        self._shared = {top for folder in there for top in list_top_modules(folder)} - self._tops
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
@@ -76,7 +80,10 @@ class _OwnModulesOnly(MetaPathFinder):
         ModuleNotFoundError
             If the environment does not have the module, but it has the package.
         """
-        if fullname.partition(".")[0] not in self._tops:
+        top = fullname.partition(".")[0]
+        if top in self._shared:
+            return self._find_shared(fullname, target)
+        if top not in self._tops:
             return None
         places = (
             [str(folder) for folder in self._own]
@@ -87,6 +94,12 @@ class _OwnModulesOnly(MetaPathFinder):
         if found is None:
             raise ModuleNotFoundError(f"No module named {fullname!r} in the release", name=fullname)
         return found
+
+    def _find_shared(self, fullname: str, target: ModuleType | None) -> ModuleSpec | None:
+        """Return the specification of a module that the environment has of a package that others share."""
+        *parents, _ = fullname.split(".")
+        found = PathFinder.find_spec(fullname, [str(folder.joinpath(*parents)) for folder in self._own], target)
+        return found if found is not None and found.loader is not None and found.origin is not None else None
 
 
 def require_release(folder: Path, package: str, version: str) -> None:
@@ -163,7 +176,8 @@ def _has_module(folders: list[Path], name: str) -> bool:
         for folder in folders
         if folder.joinpath(*parents).is_dir()
         for entry in folder.joinpath(*parents).iterdir()
-        if entry.is_dir() or entry.suffix in (".py", ".so", ".pyd")
+        # A folder without a module of its own is no more than a place that is shared as well.
+        if (any(entry.glob("__init__.*")) if entry.is_dir() else entry.suffix in (".py", ".so", ".pyd"))
     )
 
 

@@ -160,6 +160,17 @@ def test_a_library_that_the_shell_puts_in_the_place_of_the_releases_is_seen(vari
     assert probe(tmp_path, rightly, {"LD_LIBRARY_PATH": f"{tmp_path / 'absent'}:{tmp_path / 'shell'}"}) == "right"
 
 
+def test_of_a_package_that_the_suite_has_too_a_release_may_be_a_part(tmp_path: Path) -> None:
+    """As MJX, a package of its own, is a part of MuJoCo's module, whose path is extended behind its own folder."""
+    extending = "__path__ = __import__('pkgutil').extend_path(__path__, __name__)\n"
+    suite = {"shared/__init__.py": extending, "shared/rest.py": "", "shared/part/__init__.py": "WHERE = 'suite'"}
+    write_package(tmp_path / "suite", "mill", "1.0", "", suite | {"shared/part/gone.py": ""})
+    write_package(tmp_path / "own", "mill", "2.0", "", {"shared/part/__init__.py": "WHERE = 'own'"})
+    body = "import shared.part, shared.rest; assert shared.part.WHERE == 'own'"
+    assert probe(tmp_path, body) == "right"
+    assert probe(tmp_path, "import shared.part.gone").startswith("ModuleNotFoundError")
+
+
 def test_path_files_of_the_environment_come_first(tmp_path: Path) -> None:
     write_package(tmp_path / "suite", "mill", "1.0", "", {"mill.py": "WHERE = 'suite'"})
     write_package(tmp_path / "own", "mill", "2.0", "", {"prefix/mill.py": "WHERE = 'own'"})
