@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -102,3 +105,28 @@ def test_a_release_that_refuses_crashes_or_loads_from_elsewhere(velodrome, regis
     (run,) = wrong.json()["runs"]
     assert "wheelmill.stray was loaded from" in run["failures"][PACKAGE]
     assert [*run["engines"]] == ["reference"]
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_the_engine_that_runs_and_keeps_the_others(registry: Path, tmp_path: Path) -> None:
+    make_wheel(registry, "1.1", before="time.sleep(1000)")
+    code = "from velodrome.scenarios.cli import main; main()"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, *RUN, f"{PACKAGE}==1.1"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    give_up = time.monotonic() + 120
+    while not [*tmp_path.glob("runs/*/reference.parquet")] and process.poll() is None:
+        assert time.monotonic() < give_up
+        time.sleep(0.1)
+    time.sleep(1.0)  # the engine's turn
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=120)
+    assert process.returncode == 130, errors
+    assert "interrupted: finished engines are kept" in errors
+    (run,) = json.loads(output)["runs"]
+    assert (run["complete"], [*run["engines"]], run["failures"]) == (False, ["reference"], {})
+    assert (tmp_path / run["folder"] / "comparison.rrd").is_file()
