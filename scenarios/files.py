@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +64,25 @@ def file_digest(path: Path) -> str:
         If it cannot be read.
     """
     return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def digest_named_files(files: Iterable[tuple[str, Path]]) -> str:
+    """Return the SHA-256 of files in this order with their names, in hexadecimal digits.
+
+    Parameters
+    ----------
+    files : iterable of (name, path)
+
+    Raises
+    ------
+    OSError
+        If one cannot be read.
+    """
+    found = hashlib.sha256()
+    for name, path in files:
+        found.update(f"{name}\n".encode())
+        found.update(hashlib.sha256(path.read_bytes()).digest())
+    return found.hexdigest()
 
 
 def write_text(path: Path, text: str) -> None:

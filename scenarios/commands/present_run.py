@@ -12,14 +12,16 @@ from ...reports.drawing import COLUMNS, describe_required_friction, format_table
 from .tables import Column, print_table
 
 if TYPE_CHECKING:
-    from ..run import RunOutcome, RunPlan
+    from ..run import RunOutcome
+    from ..scenario import Scenario
 
 
-def show_outcome(console: Console, plan: RunPlan, outcome: RunOutcome) -> None:
+def show_outcome(console: Console, name: str, scenario: Scenario, outcome: RunOutcome) -> None:
     """Print the table of a run and the path of its folder."""
-    duration = plan.scenario.simulation.duration
+    duration = scenario.simulation.duration
+    ridden = "" if outcome.release is None else f", with {outcome.release}"
     console.print()
-    console.print(f"{plan.name}: {plan.scenario.title}, {duration:g} s", style="bold", markup=False)
+    console.print(f"{name}: {scenario.title}, {duration:g} s{ridden}", style="bold", markup=False)
     table = format_table(outcome.metrics)
     columns = [Column("engine", list(table), right=False)]
     for k, (title, unit, _, _) in enumerate(COLUMNS):
@@ -28,16 +30,16 @@ def show_outcome(console: Console, plan: RunPlan, outcome: RunOutcome) -> None:
     for verdict in outcome.verdicts:
         style = "green" if verdict["holds"] else "red"
         console.print(format_verdict(verdict), style=style, markup=False, soft_wrap=True)
-    for name, reason in outcome.failures.items():
-        console.print(f"{name} did not run: {reason}", style="red", markup=False, soft_wrap=True)
-    for name in table:
-        for line in make_remarks(name, outcome.metrics[name], duration):
+    for engine, reason in outcome.failures.items():
+        console.print(f"{engine} did not run: {reason}", style="red", markup=False, soft_wrap=True)
+    for engine in table:
+        for line in make_remarks(engine, outcome.metrics[engine], duration):
             console.print(line, style="yellow", markup=False, soft_wrap=True)
     friction = describe_required_friction(outcome.metrics)
     if friction is not None:
         console.print(friction, style="dim", markup=False, soft_wrap=True)
-    for name, reason in plan.left_out.items():
-        console.print(f"{name} left out: {reason}", style="dim", markup=False, soft_wrap=True)
+    for engine, reason in outcome.left_out.items():
+        console.print(f"{engine} left out: {reason}", style="dim", markup=False, soft_wrap=True)
     command = Path(sys.executable).with_name("velodrome")
     if command.is_relative_to(Path.cwd()):
         command = command.relative_to(Path.cwd())
@@ -47,14 +49,15 @@ def show_outcome(console: Console, plan: RunPlan, outcome: RunOutcome) -> None:
         console.print(f"recording:  {command} view {outcome.folder}", markup=False, soft_wrap=True)
 
 
-def outcome_json(plan: RunPlan, outcome: RunOutcome) -> dict[str, Any]:
+def outcome_json(name: str, outcome: RunOutcome) -> dict[str, Any]:
     """Return the JSON document of one run."""
     return {
-        "scenario": plan.name,
+        "scenario": name,
+        "release": outcome.release,
         "folder": str(outcome.folder),
         "complete": not outcome.interrupted,
         "engines": outcome.metrics,
         "failures": outcome.failures,
-        "left_out": plan.left_out,
+        "left_out": outcome.left_out,
         "verdicts": outcome.verdicts,
     }

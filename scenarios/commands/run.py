@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +16,7 @@ from .completion import complete_engine, complete_scenario
 from .options import (
     STARTING,
     BicycleOption,
+    CacheOption,
     ChangesOption,
     DurationOption,
     JsonOption,
@@ -28,7 +32,10 @@ from .options import (
 
 if TYPE_CHECKING:
     from ...reference.bicycle import Bicycle
-    from ..run import RunOutcome, RunPlan
+    from ..history import OpenedRelease
+    from ..run import RunOutcome
+    from ..scenario import Scenario
+    from .progress import ProgressBars
 
 
 def list_command(as_json: JsonOption = False) -> None:
@@ -109,6 +116,22 @@ def run_command(
     change: ChangesOption = None,
     duration: DurationOption = None,
     bicycle: BicycleOption = None,
+    release: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PACKAGE==VERSION",
+            help="Run the engines of this package with this release of it, in an environment of its own, as velodrome "
+            "history does; a package alone with --wheel.",
+        ),
+    ] = None,
+    wheel: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE.whl",
+            help="A build as the release of --release; given again for wheels of packages that it requires.",
+        ),
+    ] = None,
+    cache: CacheOption = None,
     out: Annotated[Path, typer.Option(help="Folder for the run folders.")] = Path("runs"),
     traceback: TracebackOption = False,
     as_json: JsonOption = False,
@@ -117,7 +140,7 @@ def run_command(
 
     --bicycle replaces a scenario's bicycle; --set bicycle.KEY=VALUE then changes single parameters of it.
     """
-    from ..run import installed_engines, run_plan
+    from ..run import installed_engines
     from .present_run import outcome_json, show_outcome
     from .progress import ProgressBars, show_working
     from .terminal import make_console
@@ -125,24 +148,44 @@ def run_command(
     sources = [*(scenario or []), *(_find_tagged(tag) if tag is not None else [])]
     if not sources:
         raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
+    if wheel and release is None:
+        raise ScenarioError("--wheel: it belongs to --release, e.g. --release mujoco --wheel FILE.whl")
     changes = parse_changes(change, duration)
     installed_engines()  # raises here if two packages announce one engine, which is not a fault of a scenario
     other = None if bicycle is None else load_bicycle(bicycle).bicycle
-    with answering_missing_motion(as_json), showing_traceback(traceback), show_working(STARTING):
-        plans = [_plan_source(source, changes, engine, other) for source in dict.fromkeys(sources)]
-    console = make_console(stderr=as_json)
-    outcomes = []
-    for plan in plans:
-        with ProgressBars() as progress:
-            outcome = run_plan(plan, out, progress.watch, progress.note, print_traceback if traceback else None)
-        outcomes.append((plan, outcome))
-        with ending_with(0):  # the next run goes on if the reader of this table has closed the pipe
-            show_outcome(console, plan, outcome)
-        if outcome.interrupted:
-            break
+    sources = list(dict.fromkeys(sources))
+    with ExitStack() as using:
+        with answering_missing_motion(as_json), showing_traceback(traceback):
+            if release is None:
+                with show_working(STARTING):
+                    rides = [_plan_source(source, changes, engine, other, out, traceback) for source in sources]
+            else:
+                with show_working(STARTING):
+                    loaded = {source: _load_source(source, changes, other) for source in sources}
+                opened = using.enter_context(_open_release(release, engine, wheel, cache))
+                rides = [_plan_in_release(opened, source, *one, out, traceback) for source, one in loaded.items()]
+        console = make_console(stderr=as_json)
+        outcomes = []
+        for ride in rides:
+            with showing_traceback(traceback), ProgressBars() as progress:
+                outcome = ride.start(progress)
+            outcomes.append((ride, outcome))
+            with ending_with(0):  # the next run goes on if the reader of this table has closed the pipe
+                show_outcome(console, ride.name, ride.scenario, outcome)
+            if outcome.interrupted:
+                break
     with ending_with(_exit_status([outcome for _, outcome in outcomes])):
         if as_json:
-            print_json({"runs": [outcome_json(plan, outcome) for plan, outcome in outcomes]})
+            print_json({"runs": [outcome_json(ride.name, outcome) for ride, outcome in outcomes]})
+
+
+@dataclass(frozen=True)
+class _Ride:
+    """A run that has been checked."""
+
+    name: str
+    scenario: Scenario
+    start: Callable[[ProgressBars], RunOutcome]
 
 
 def _exit_status(outcomes: Sequence[RunOutcome]) -> int:
@@ -153,13 +196,85 @@ def _exit_status(outcomes: Sequence[RunOutcome]) -> int:
     return 0 if all(holds) else 1
 
 
-def _plan_source(source: str, changes: dict[str, Any], wanted: list[str] | None, bicycle: Bicycle | None) -> RunPlan:
-    from ..run import plan_run
+def _plan_source(
+    source: str,
+    changes: dict[str, Any],
+    wanted: list[str] | None,
+    bicycle: Bicycle | None,
+    out: Path,
+    traceback: bool,
+) -> _Ride:
+    """Check a run of a scenario with the installed releases."""
+    from ..run import plan_run, run_plan
     from ..scenario import load_scenario
 
     name, scenario = load_scenario(source, changes, "--set", bicycle)
+    with _naming(source):
+        plan = plan_run(name, scenario, wanted)
+    trace = print_traceback if traceback else None
+    return _Ride(name, plan.scenario, lambda progress: run_plan(plan, out, progress.watch, progress.note, trace))
+
+
+def _load_source(source: str, changes: dict[str, Any], bicycle: Bicycle | None) -> tuple[str, Scenario]:
+    """Load a scenario whose start exists."""
+    from ..scenario import load_scenario, make_start
+
+    name, scenario = load_scenario(source, changes, "--set", bicycle)
+    with _naming(source):
+        make_start(scenario)
+    return name, scenario
+
+
+@contextmanager
+def _open_release(
+    wanted: str, engines: list[str] | None, wheels: list[Path] | None, cache: Path | None
+) -> Iterator[OpenedRelease]:
+    """Install a release, or find it in the cache."""
+    from ..history import Children, find_cache_folder, open_release, plan_release_run
+    from .progress import show_working
+    from .terminal import make_console
+
+    children, environments = Children(), find_cache_folder(cache)
+    console = make_console(stderr=True)
     try:
-        return plan_run(name, scenario, wanted)
+        with ExitStack() as using:
+            with show_working(f"opening the environment of {wanted}"):
+                plan = plan_release_run(wanted, engines or (), wheels or (), cache=environments, children=children)
+                opening = open_release(
+                    plan,
+                    lambda line: console.print(line, soft_wrap=True, highlight=False, markup=False),
+                    cache=environments,
+                    children=children,
+                )
+                opened = using.enter_context(opening)
+            yield opened
+    finally:
+        children.stop()
+
+
+def _plan_in_release(
+    opened: OpenedRelease, source: str, name: str, scenario: Scenario, out: Path, traceback: bool
+) -> _Ride:
+    """Return a run of a scenario with a release."""
+    from ..history import RunEnded, run_in_release
+
+    def start(progress: ProgressBars) -> RunOutcome:
+        trace = (lambda text: print(text, file=sys.stderr, end="")) if traceback else None
+        try:
+            with _naming(source):
+                return run_in_release(opened, name, scenario, out, progress.watch, progress.note, trace)
+        except RunEnded as error:
+            progress.note(f"velodrome: {source}: {error}")
+            raise typer.Exit(1) from error
+
+    return _Ride(name, scenario, start)
+
+
+@contextmanager
+def _naming(source: str) -> Iterator[None]:
+    """Put the name of the scenario before what is wrong."""
+    try:
+        yield
     except MissingMotionError as error:
         raise MissingMotionError(f"{source}: {error}", error.reason) from error
     except ScenarioError as error:

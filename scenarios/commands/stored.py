@@ -48,7 +48,12 @@ def diff_command(
 
 
 def view_command(
-    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.", autocompletion=complete_folder)],
+    run_folder: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RUN", help="A run folder, or what diff --out has written.", autocompletion=complete_folder
+        ),
+    ],
     web: Annotated[bool, typer.Option("--web", help="Serve the report page with the viewer in it.")] = False,
     port: Annotated[
         int | None, typer.Option(min=0, max=65535, help="Port for --web; any free one if not given.")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
 from functools import cache
 from importlib.util import find_spec
@@ -12,6 +11,7 @@ from packaging.utils import canonicalize_name
 
 from ...engines.engine import REFERENCE
 from ...engines.registry import find_announcement, package_of
+from ..files import digest_named_files
 
 
 @cache
@@ -34,11 +34,7 @@ def digest_adapter(engine: str, package: str) -> str | None:
     announced_by = package_of(engine)
     if announced_by is None or canonicalize_name(announced_by) in (package, package_of(REFERENCE)):
         return None
-    found = hashlib.sha256()
-    for name, path in sorted(_list_files(engine)):
-        found.update(f"{name}\n".encode())
-        found.update(hashlib.sha256(path.read_bytes()).digest())
-    return found.hexdigest()
+    return digest_named_files(sorted(_list_files(engine)))
 
 
 def _list_files(engine: str) -> Iterator[tuple[str, Path]]:

@@ -13,9 +13,8 @@ from typing import Any
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
-from ...engines.format_version import read_version
-from ..files import content_digest, file_digest, write_sealed
-from ..run import read_json
+from ..files import file_digest, write_sealed
+from ..run import read_sealed
 from .children import Children
 from .pip_calls import PipError, install_packages
 from .releases import Release
@@ -90,10 +89,9 @@ def fill_environment(folder: Path, release: Release, children: Children) -> Mapp
 def read_marker(folder: Path) -> dict[str, Any] | None:
     """Return what `fill_environment` has written about an environment; None if it is damaged or of another format."""
     try:
-        marker = read_json(folder / MARKER)
-        read_version(marker, _MARKER_VERSION)
-        return marker if marker["sha256"] == content_digest(marker) and "suite" in marker else None
-    except (OSError, ValueError, KeyError, TypeError):
+        marker = read_sealed(folder / MARKER, _MARKER_VERSION)
+        return marker if "suite" in marker else None
+    except (OSError, ValueError):
         return None
 
 

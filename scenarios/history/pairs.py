@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from collections.abc import Mapping
 from pathlib import PurePosixPath
@@ -11,6 +12,7 @@ import numpy as np
 
 from ..run import library_versions
 from .plan import HistoryPlan, PlannedRide
+from .problems import MeasuredRide
 from .releases import Release
 from .verdicts import RUN
 
@@ -64,11 +66,12 @@ def _describe_pair(
         for ride, row in zip(rides, rows, strict=True)
     )
     first, second = rides[0].release, rides[1].release
+    ride = plan.scenarios[rides[1].scenario]
     return {
         "package": plan.package,
         "engine": rides[1].engine,
         "scenario": rides[1].scenario,
-        "title": plan.scenarios[rides[1].scenario].title,
+        "title": ride.title,
         "verdict": point["verdict"],
         "moved": [move for move in point["quantities"] if move["quantity"] != RUN],
         "limits": rows[0]["limits"] | rows[1]["limits"],
@@ -76,7 +79,8 @@ def _describe_pair(
         "after": after,
         "distance": measure_separation(before, after),
         "libraries": list_suite_versions(plan.package),
-        "command": write_pair_command(first, second, rides[1].engine, rides[1].scenario),
+        "command": write_pair_command(first, second, rides[1].engine, ride.source),
+        "commands": write_run_commands(first, second, rides[1].engine, ride),
     }
 
 
@@ -105,10 +109,44 @@ def measure_separation(before: Row, after: Row) -> dict[str, list[float]]:
     return {"time": time.tolist(), "distance": np.linalg.norm(apart, axis=1).tolist()}
 
 
-def write_pair_command(before: Release, after: Release, engine: str, scenario: str) -> str:
-    """Return the command that rides two releases again, for the shell; wheels are named as the user did."""
+def write_pair_command(before: Release, after: Release, engine: str, source: str) -> str:
+    """Return the command that rides two releases again, for the shell; files are named as the user did."""
     versions = [release.version for release in (before, after) if release.wheel is None]
     wheels = dict.fromkeys(str(file.path) for release in (before, after) for file in release.files)
     wanted = before.package + ("==" + ",".join(versions) if versions else "")
     named = [part for wheel in wheels for part in ("--wheel", wheel)]
-    return shlex.join(["velodrome", "history", wanted, scenario, "--engine", engine, *named, "--out", "two-releases"])
+    return shlex.join(["velodrome", "history", wanted, source, "--engine", engine, *named, "--out", "two-releases"])
+
+
+def write_run_commands(before: Release, after: Release, engine: str, ride: MeasuredRide) -> list[str]:
+    """Return the commands that run two releases, compare the runs, and show both in one recording, for the shell.
+
+    The runs are the rides of the history, to the bit where its releases are those of the cache.
+    """
+    folder = "two-rides"
+    runs = [
+        _write_run_command(release, engine, ride, f"{folder}/{name}")
+        for release, name in ((before, "before"), (after, "after"))
+    ]
+    # The names of run folders have the time.
+    compare = f"velodrome diff {folder}/before/* {folder}/after/* --out {folder}/diff"
+    return [*runs, compare, f"velodrome view {folder}/diff"]
+
+
+def _write_run_command(release: Release, engine: str, ride: MeasuredRide, out: str) -> str:
+    wanted = release.package + ("" if release.files else f"=={release.version}")
+    named = [part for file in release.files for part in ("--wheel", str(file.path))]
+    simulation = {"simulation.output_rate": ride.gate.output_rate}
+    changes = simulation | _list_leaves(ride.settings_of(engine), f"engines.{engine}")
+    # Numbers, texts and lists are written in TOML as in JSON.
+    settings = [part for key, value in changes.items() for part in ("--set", f"{key}={json.dumps(value)}")]
+    what = ["velodrome", "run", ride.source, "--engine", engine, "--release", wanted, *named]
+    return shlex.join([*what, "--duration", repr(ride.gate.duration), *settings, "--out", out])
+
+
+def _list_leaves(values: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Return values that are no tables by their dotted keys."""
+    found: dict[str, Any] = {}
+    for key, value in values.items():
+        found |= _list_leaves(value, f"{where}.{key}") if isinstance(value, Mapping) else {f"{where}.{key}": value}
+    return found

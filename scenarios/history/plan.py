@@ -86,10 +86,6 @@ class HistoryPlan:
         """Return the day on which a release was uploaded; None where it is unknown, and for a wheel."""
         return self.dates.get(release.version) if release.wheel is None else None
 
-    def rides_of(self, release: Release) -> list[PlannedRide]:
-        """Return the rides of one release."""
-        return [ride for ride in self.rides if ride.release == release]
-
 
 def plan_history(
     wanted: str,

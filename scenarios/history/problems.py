@@ -5,13 +5,16 @@ from __future__ import annotations
 import hashlib
 import json
 import pickle
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from ...engines.registry import packages
+from ..files import digest_named_files
 from ..gate import Exact, find_exact, gate_settings, gated_content, load_gated
 from ..run import library_versions
 from ..scenario import Gate, Start, make_start
@@ -26,6 +29,8 @@ class MeasuredRide:
     Attributes
     ----------
     scenario : str
+    source : str
+        Its library name or the path of its file, as the user named it.
     title : str
     gate : Gate
         What is measured.
@@ -39,6 +44,7 @@ class MeasuredRide:
     """
 
     scenario: str
+    source: str
     title: str
     gate: Gate
     start: Start
@@ -77,14 +83,25 @@ def prepare_ride(source: str) -> MeasuredRide:
         "qd": start.problem.qd.tolist(),
         "times": start.problem.times.tolist(),
     }
-    return MeasuredRide(name, scenario.title, gate, start, find_exact(start), settings, digest_json(determined))
+    return MeasuredRide(name, source, scenario.title, gate, start, find_exact(start), settings, digest_json(determined))
 
 
-def store_rides(rides: Mapping[str, MeasuredRide], path: Path) -> str:
-    """Write rides for the processes of this session, and return the SHA-256 of the file."""
+@dataclass(frozen=True)
+class RideFile:
+    """The file of the rides of a session, and its SHA-256."""
+
+    path: Path
+    digest: str
+
+
+@contextmanager
+def store_rides(rides: Mapping[str, MeasuredRide]) -> Iterator[RideFile]:
+    """Yield a file with rides for the processes of this session, in a folder that nobody else can write."""
     data = pickle.dumps(dict(rides))
-    path.write_bytes(data)
-    return hashlib.sha256(data).hexdigest()
+    with tempfile.TemporaryDirectory(prefix="velodrome-rides-") as own:
+        path = Path(own) / "rides.pickle"
+        path.write_bytes(data)
+        yield RideFile(path, hashlib.sha256(data).hexdigest())
 
 
 def read_rides(path: Path, digest: str) -> dict[str, MeasuredRide]:
@@ -121,12 +138,14 @@ def digest_suite() -> str:
     All of its code counts, also what only shows results: no list of exceptions has to be kept true, and a ride too many
     costs time only. Texts and styles of pages are no code.
     """
+    return digest_named_files(_list_code())
+
+
+def _list_code() -> Iterator[tuple[str, Path]]:
+    """Yield the files of the suite's code with their names."""
     root = Path(__file__).parents[2]
-    found = hashlib.sha256()
     # In an editable install the floors are links, which rglob does not follow below a folder.
     for floor in ("reference", "engines", "reports", "scenarios"):
         folder = (root / floor).resolve()
         for path in sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".toml") and path.is_file()):
-            found.update(f"{floor}/{path.relative_to(folder)}\n".encode())
-            found.update(hashlib.sha256(path.read_bytes()).digest())
-    return found.hexdigest()
+            yield f"{floor}/{path.relative_to(folder)}", path

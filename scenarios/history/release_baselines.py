@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -13,14 +12,13 @@ from packaging.version import Version
 from ...engines.registry import load_engine
 from ..error import ScenarioError
 from ..gate import GivenBaselines, gate_scenarios, gated_names
-from ..scenario import show_value
 from .children import Children
 from .companions import describe_registry_companions
-from .environments import NotInstallable, open_environment
+from .one_release import open_named_environment, parse_one_release, require_one_release
 from .plan import HistoryPlan, PlannedRide, plan_history
 from .problems import store_rides
-from .process import RideFile, ride_tasks
-from .releases import Release, parse_release_range
+from .process import ride_tasks
+from .releases import Release
 from .ride import RODE
 
 _OPTION = "--baseline-of"
@@ -56,16 +54,9 @@ def plan_release_baselines(
     ScenarioError
         If anything of it is wrong, in one line, or it is more or less than one release.
     """
-    asked = parse_release_range(wanted)
-    where = f"{_OPTION} {show_value(repr(wanted))}"
-    if wheels and asked.alternatives:
-        raise ScenarioError(f"{where}: with --wheel the build is the release; name the package alone, {asked.package}")
-    if not wheels and len(asked.exact or ()) != 1:
-        raise ScenarioError(f"{where}: must be one release, such as '{asked.package}==1.0', or a package with --wheel")
+    parse_one_release(wanted, wheels, _OPTION)
     plan = plan_history(wanted, sources or gated_names(), engines, wheels, cache=cache, children=children)
-    if len(plan.releases) != 1:
-        named = ", ".join(release.label for release in plan.releases)
-        raise ScenarioError(f"{where}: must be one release, but --wheel gives {len(plan.releases)}: {named}")
+    require_one_release(plan.releases, wanted, _OPTION)
     return plan
 
 
@@ -107,28 +98,23 @@ def ride_release_baselines(
     rides = [one for one in plan.rides if all_rides or _is_ridden_unnamed(one)]
     entries: dict[str, dict[str, Any]] = {}
     reasons: dict[str, dict[str, str]] = {}
-    try:
-        with (
-            open_environment(release, cache, children) as environment,
-            tempfile.TemporaryDirectory(prefix="velodrome-baselines-") as own,
-        ):
-            remark = describe_registry_companions(release, environment.packages)
-            if remark is not None:
-                note(remark)
-            path = Path(own) / "rides.pickle"
-            file = RideFile(path, store_rides(plan.scenarios, path))
-            tasks = [(ride.scenario, ride.engine) for ride in rides]
-            watch(0, len(rides))
-            arriving = ride_tasks(release, environment, tasks, file, time_limit, children)
-            for done, (ride, row) in enumerate(zip(rides, arriving, strict=True), 1):
-                if row["status"] == RODE:
-                    entries.setdefault(ride.scenario, {})[ride.engine] = _make_entry(release, name, ride.engine, row)
-                else:
-                    why = f"no baseline: with {name} it did not ride ({row['status']}): {row['reason']}"
-                    reasons.setdefault(ride.scenario, {})[ride.engine] = why
-                watch(done, len(rides))
-    except NotInstallable as error:
-        raise ScenarioError(f"{_OPTION}: {name} cannot be installed here: {error}") from error
+    with (
+        open_named_environment(release, _OPTION, cache, children) as environment,
+        store_rides(plan.scenarios) as file,
+    ):
+        remark = describe_registry_companions(release, environment.packages)
+        if remark is not None:
+            note(remark)
+        tasks = [(ride.scenario, ride.engine) for ride in rides]
+        watch(0, len(rides))
+        arriving = ride_tasks(release, environment, tasks, file, time_limit, children)
+        for done, (ride, row) in enumerate(zip(rides, arriving, strict=True), 1):
+            if row["status"] == RODE:
+                entries.setdefault(ride.scenario, {})[ride.engine] = _make_entry(release, name, ride.engine, row)
+            else:
+                why = f"no baseline: with {name} it did not ride ({row['status']}): {row['reason']}"
+                reasons.setdefault(ride.scenario, {})[ride.engine] = why
+            watch(done, len(rides))
     if not entries:
         scenario, found = next(iter(reasons.items()))
         engine, why = next(iter(found.items()))

@@ -1,21 +1,20 @@
 """The process that rides one release: ``python -m velodrome.scenarios.history.ride``, in lines of JSON.
 
-Standard input: first the `RideSetup`, then one task per line. Standard output: one line per task. The process lays the
-release's environment over its own and loads the reference. Every ride is done by a fork of it, in which the engine's
-library is loaded: no ride can change another one, and a crash ends one ride only. A result is held back unless all
-that was loaded of the release's packages comes from its environment.
+Standard input: first the `RideSetup`, then one task per line. Standard output: one line per task; and, when the process
+is asked by a signal, where it is in its code. The process lays the release's environment over its own and loads the
+reference. Every ride is done by a fork of it, in which the engine's library is loaded: no ride can change another one,
+and a crash ends one ride only. A result is held back unless all that was loaded of the release's packages comes from
+its environment.
 """
 
 from __future__ import annotations
 
-import ctypes
 import json
 import math
 import os
 import signal
 import sys
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import packages_distributions
 from pathlib import Path
@@ -34,9 +33,9 @@ from .adapters import digest_adapter
 from .loaded import list_loaded_packages
 from .overlay import WrongRelease, lay_over, require_loaded_from, require_release
 from .problems import MeasuredRide, digest_suite, read_rides
+from .protocol import ASKING, answer_where, describe_exit, die_with, reserve_streams, send_message
 from .requirements import list_top_modules
 
-_DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux's prctl
 _MOST_SAMPLES = 41  # of a stored ride; the digest covers all of it
 _LONGEST_REASON = 500  # characters
 _TIMING = "cpu_ratio"  # it differs from run to run
@@ -80,14 +79,11 @@ class RideSetup:
 
 def main() -> None:
     """Do tasks until the input ends."""
-    tasks, results = os.fdopen(os.dup(0), encoding="utf-8"), os.dup(1)
-    # Engines may print and read: this must not interfere with the protocol.
-    with open(os.devnull, "r+b") as nothing:
-        for standard in (0, 1, 2):
-            os.dup2(nothing.fileno(), standard)
+    tasks, results = reserve_streams()
+    answer_where(results)
     try:
         setup = RideSetup(**json.loads(tasks.readline()))
-        _die_with(setup.parent)
+        die_with(setup.parent)
         folder = Path(setup.folder)
         own = lay_over(folder)
         require_release(folder, setup.package, setup.version)
@@ -100,24 +96,26 @@ def main() -> None:
         _warm_up(next(iter(rides.values())))
         owners = packages_distributions()
     except Exception as error:  # reported to the parent, since there is no other output
-        _send(results, {"broken": reason_of_failure(error)})
+        send_message(results, {"broken": reason_of_failure(error)})
         sys.exit(1)
     for line in tasks:
         task = json.loads(line)
-        _send(results, _ride_in_fork(rides[task["scenario"]], task["engine"], own, owners))
+        send_message(results, _ride_in_fork(rides[task["scenario"]], task["engine"], own, owners))
 
 
 def _ride_in_fork(ride: MeasuredRide, engine: str, own: list[Path], owners: Mapping[str, list[str]]) -> dict[str, Any]:
     """Ride in a fork of this process, and return the row."""
     ours, theirs = os.pipe()
     parent = os.getpid()
+    signal.pthread_sigmask(signal.SIG_BLOCK, {ASKING})  # from now on the fork answers
     child = os.fork()
     if child == 0:
         status = 1
         try:
-            _die_with(parent)
+            die_with(parent)
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {ASKING})
             row = ride_release(ride, engine, own)
-            _send(theirs, row | {"loaded": list_loaded_packages(own, owners)})
+            send_message(theirs, row | {"loaded": list_loaded_packages(own, owners)})
             status = 0
         finally:
             os._exit(status)
@@ -130,11 +128,6 @@ def _ride_in_fork(ride: MeasuredRide, engine: str, own: list[Path], owners: Mapp
     except ValueError:
         how = describe_exit(os.waitstatus_to_exitcode(ended))
         return {"status": FAILED, "reason": f"its process ended by {how}", REPEATED: True}
-
-
-def describe_exit(status: int) -> str:
-    """Return words for the exit status of a process, negative for a signal."""
-    return signal.Signals(-status).name if status < 0 else f"exit status {status}"
 
 
 def _warm_up(ride: MeasuredRide) -> None:
@@ -208,20 +201,6 @@ def _is_of_surroundings(error: BaseException, own: list[Path]) -> bool:
 def _to_finite(values: Mapping[str, float | None]) -> dict[str, float | None]:
     plain = {name: None if value is None else float(value) for name, value in values.items()}
     return {name: value if value is None or math.isfinite(value) else None for name, value in plain.items()}
-
-
-def _die_with(parent: int) -> None:
-    """Let this process be killed when its parent ends, if the system supports that."""
-    with suppress(OSError, AttributeError):
-        ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGKILL)
-    if os.getppid() != parent:
-        os._exit(1)
-
-
-def _send(results: int, message: dict[str, Any]) -> None:
-    data = json.dumps(message, allow_nan=False).encode() + b"\n"
-    while data:
-        data = data[os.write(results, data) :]
 
 
 if __name__ == "__main__":

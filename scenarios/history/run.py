@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
@@ -16,8 +15,8 @@ from .document import make_history_document
 from .environments import NotInstallable, open_environment, read_cached_packages
 from .pairs import make_pair_documents
 from .plan import HistoryPlan, PlannedRide
-from .problems import store_rides
-from .process import RideFile, ride_tasks
+from .problems import RideFile, store_rides
+from .process import ride_tasks
 from .releases import Release
 from .ride import NOT_INSTALLABLE, RODE
 from .store import HistoryFolder
@@ -115,24 +114,21 @@ def _ride_all(
             rows[ride] = found[ride] = row
             watch(ride, row, True)
 
-    with tempfile.TemporaryDirectory(prefix="velodrome-history-") as own:
-        path = Path(own) / "rides.pickle"
-        file = RideFile(path, store_rides(plan.scenarios, path))
-        with ThreadPoolExecutor(min(options.workers, len(by_release))) as pool:
-            waiting = {
-                pool.submit(_ride_release, release, missing, file, options, keep, children)
-                for release, missing in by_release.items()
-            }
-            try:
-                while waiting:
-                    done, waiting = wait(waiting, timeout=_LOOK, return_when=FIRST_COMPLETED)
-                    for future in done:
-                        future.result()
-            except BaseException:
-                children.stop()
-                for future in waiting:
-                    future.cancel()
-                raise
+    with store_rides(plan.scenarios) as file, ThreadPoolExecutor(min(options.workers, len(by_release))) as pool:
+        waiting = {
+            pool.submit(_ride_release, release, missing, file, options, keep, children)
+            for release, missing in by_release.items()
+        }
+        try:
+            while waiting:
+                done, waiting = wait(waiting, timeout=_LOOK, return_when=FIRST_COMPLETED)
+                for future in done:
+                    future.result()
+        except BaseException:
+            children.stop()
+            for future in waiting:
+                future.cancel()
+            raise
     return found
 
 

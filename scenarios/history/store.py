@@ -6,7 +6,6 @@ the process, a row is there whole or not at all.
 
 from __future__ import annotations
 
-import fcntl
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -18,11 +17,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ...engines.files import write_whole
-from ...engines.format_version import read_version
 from ...engines.storage import versioned_metadata
 from ..error import ScenarioError
-from ..files import content_digest, make_folder, write_json, write_sealed, write_text
-from ..run import read_json
+from ..files import make_folder, write_json, write_sealed, write_text
+from ..locks import open_locked
+from ..run import read_sealed
 from .loaded import are_installed
 from .pairs import PAIR_FOLDER
 from .plan import PlannedRide
@@ -67,11 +66,9 @@ class HistoryFolder:
         ScenarioError
             If another one does.
         """
-        file = os.open(self._out / ".lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            os.close(file)
+            file = open_locked(self._out / ".lock")
+        except BlockingIOError as error:
             raise ScenarioError(f"--out {self._out}: another history is being written there") from error
         try:
             yield
@@ -85,12 +82,13 @@ class HistoryFolder:
         environment are there in the same versions, and the ride was not ended by what need not be the release's fault.
         """
         try:
-            found = read_json(self._path(ride))
-            whole = found["sha256"] == content_digest(found) and found["key"] == ride.key
+            found = read_sealed(self._path(ride), _ROW_VERSION)
+            if found["key"] != ride.key:
+                return None
+            row = dict(found["row"])
         except (OSError, ValueError, KeyError, TypeError):
             return None
-        row = found.get("row")
-        if not whole or not isinstance(row, dict) or row["status"] == NOT_INSTALLABLE or row.get(REPEATED):
+        if row["status"] == NOT_INSTALLABLE or row.get(REPEATED):
             return None
         return row if are_installed(row.get("loaded", {})) else None
 
@@ -183,10 +181,8 @@ def read_stored_rows(out: Path) -> list[StoredRow]:
     names = [one.name for one in fields(StoredRow)]
     for path in sorted((out / ROWS).glob("[!.]*.json")):
         try:
-            stored = read_json(path)
-            read_version(stored, _ROW_VERSION)
-            if stored["sha256"] == content_digest(stored):
-                found.append(StoredRow(**{name: stored[name] for name in names}))
+            stored = read_sealed(path, _ROW_VERSION)
+            found.append(StoredRow(**{name: stored[name] for name in names}))
         except (OSError, ValueError, KeyError, TypeError):
             continue
     return found

@@ -21,6 +21,7 @@ from .stored import (
     read_document,
     read_json,
     read_ride,
+    read_sealed,
     read_start_state,
     read_stored_scenario,
 )
@@ -44,6 +45,7 @@ __all__ = [
     "read_document",
     "read_json",
     "read_ride",
+    "read_sealed",
     "read_start_state",
     "read_stored_scenario",
     "ride_plan",

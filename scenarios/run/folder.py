@@ -40,6 +40,9 @@ class RunPlan:
         Pairs of engine and settings by name, the reference first.
     left_out : dict
         Reasons by engine, for engines that were not requested by name and do not support this problem.
+    release : mapping, optional
+        Facts about the release with which its engines run, where that is not the one of the suite's environment; see
+        `velodrome.scenarios.history.release_run`.
     """
 
     name: str
@@ -47,6 +50,7 @@ class RunPlan:
     start: Start
     engines: dict[str, tuple[Engine, Settings]]
     left_out: dict[str, str]
+    release: Mapping[str, Any] | None = None
 
 
 def new_folder(out: Path, name: str) -> Path:
@@ -113,6 +117,7 @@ def write_manifest(
         SCENARIO_DIGEST_KEY: scenario_digest,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "complete": complete,
+        **({} if plan.release is None else {"release": dict(plan.release)}),
         "engines": engines,
         "left_out": plan.left_out,
         "warnings": list(plan.start.problem.bicycle.warnings()),

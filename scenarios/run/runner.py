@@ -6,7 +6,7 @@ import signal
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -20,6 +20,7 @@ from ...reports.measure import ROUND_OFF, compute_metrics, cut_at_fall, evaluate
 from ..error import ScenarioError
 from ..files import file_digest, write_sealed, write_text
 from ..scenario import (
+    EngineChoice,
     Scenario,
     Start,
     choose_engines,
@@ -65,6 +66,10 @@ class RunOutcome:
     verdicts : list of dict
         For each engine and criterion: ``engine, quantity, value, limit, holds``.
     interrupted : bool
+    left_out : dict
+        As in `RunPlan`.
+    release : str or None
+        Package and release with which the engines ran, where that is not the one of the suite's environment.
     """
 
     folder: Path
@@ -72,6 +77,8 @@ class RunOutcome:
     failures: dict[str, str]
     verdicts: list[dict[str, Any]]
     interrupted: bool
+    left_out: dict[str, str] = field(default_factory=dict)
+    release: str | None = None
 
 
 @dataclass(frozen=True)
@@ -115,29 +122,37 @@ class RunResult:
     interrupted: bool
 
 
-def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> RunPlan:
+def plan_run(
+    name: str,
+    scenario: Scenario,
+    wanted: list[str] | EngineChoice | None = None,
+    release: Mapping[str, Any] | None = None,
+) -> RunPlan:
     """Check engines and settings and compute the start.
 
     Parameters
     ----------
     name : str
     scenario : Scenario
-    wanted : list of str, optional
+    wanted : list of str or EngineChoice, optional
         Engines to run in addition to the reference: names, patterns, or ``all``; by default the engines of the suite's
         own dependencies that support the problem.
+    release : mapping, optional
+        Facts about the release that is laid over this process; it may be one that the suite's package excludes.
 
     Raises
     ------
     ScenarioError
         If an engine is not installed, a setting is wrong, or the motion does not exist.
     """
-    choice, unknown = choose_engines(wanted)
+    choice, unknown = (wanted, {}) if isinstance(wanted, EngineChoice) else choose_engines(wanted)
     faults = list(unknown.values())
     chosen: dict[str, tuple[Engine, Settings]] = {}
     cause: BaseException | None = None
     for engine in choice.names:
         try:
-            chosen[engine] = configure_engine(engine, scenario.engines.get(engine, {}))
+            values = scenario.engines.get(engine, {})
+            chosen[engine] = configure_engine(engine, values, any_release=release is not None)
         except ScenarioError as error:
             faults.append(str(error))
             cause = cause or error.__cause__ or error  # --traceback shows it
@@ -156,11 +171,16 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
         except Exception as error:  # an engine's check may raise anything
             raise ScenarioError(f"engines.{engine}: its check failed: {why_failed(error)}") from error
     chosen = {engine: pair for engine, pair in chosen.items() if engine not in left_out}
-    return RunPlan(name, scenario, start, chosen, left_out)
+    return RunPlan(name, scenario, start, chosen, left_out, release)
 
 
 def run_plan(
-    plan: RunPlan, out: Path, watch: RunWatch, note: Callable[[str], None], trace: Trace | None = None
+    plan: RunPlan,
+    out: Path,
+    watch: RunWatch,
+    note: Callable[[str], None],
+    trace: Trace | None = None,
+    accept: Callable[[str], None] | None = None,
 ) -> RunOutcome:
     """Run every engine of a plan and write the run folder.
 
@@ -178,17 +198,32 @@ def run_plan(
         Called with a line of text for warnings and failures.
     trace : callable, optional
         Called with the name of an engine that failed and its exception.
+    accept : callable, optional
+        Called with the name of an engine that has finished; what it raises is that engine's failure.
 
     Returns
     -------
     RunOutcome
     """
-    folder, result = store_run(plan, out, watch, note, trace)
-    return RunOutcome(folder, result.metrics, result.failures, result.verdicts, result.interrupted)
+    folder, result = store_run(plan, out, watch, note, trace, accept)
+    return RunOutcome(
+        folder,
+        result.metrics,
+        result.failures,
+        result.verdicts,
+        result.interrupted,
+        plan.left_out,
+        None if plan.release is None else f"{plan.release['package']} {plan.release['release']}",
+    )
 
 
 def store_run(
-    plan: RunPlan, out: Path, watch: RunWatch, note: Callable[[str], None], trace: Trace | None = None
+    plan: RunPlan,
+    out: Path,
+    watch: RunWatch,
+    note: Callable[[str], None],
+    trace: Trace | None = None,
+    accept: Callable[[str], None] | None = None,
 ) -> tuple[Path, RunResult]:
     """Run every engine of a plan and write the run folder; return the folder and all results.
 
@@ -204,7 +239,7 @@ def store_run(
             write_trajectory(rides.trajectories[name], folder / f"{name}.parquet")
         write_manifest(folder, plan, digest, rides.trajectories, rides.failures)
 
-    rides = ride_plan(plan, watch, note, trace, store)
+    rides = ride_plan(plan, watch, note, trace, store, accept)
     with _block_interrupts():
         result = measure_run(plan, rides)
         write_sealed(folder / "metrics.json", result.metrics, RUN_VERSION)
@@ -222,13 +257,14 @@ def ride_plan(
     note: Callable[[str], None],
     trace: Trace | None = None,
     store: Callable[[str, Rides], None] | None = None,
+    accept: Callable[[str], None] | None = None,
 ) -> Rides:
     """Simulate the problem of a plan with every engine.
 
     Parameters
     ----------
     plan : RunPlan
-    watch, note, trace : callable
+    watch, note, trace, accept : callable
         As `run_plan` takes them.
     store : callable, optional
         Called after each engine with its name and the rides so far.
@@ -261,6 +297,8 @@ def ride_plan(
         for name, (engine, settings) in plan.engines.items():
             try:
                 trajectory = ride_engine(engine, problem, settings, lambda time, name=name: report(name, time))
+                if accept is not None:
+                    accept(name)
             except Exception as error:  # whatever an engine raises must not cost the others' results
                 if raised:
                     raise

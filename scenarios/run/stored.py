@@ -68,6 +68,31 @@ def read_document(folder: Path, name: str) -> Mapping[str, Any]:
     return {key: value for key, value in found.items() if key not in (VERSION_KEY, DIGEST_KEY)}
 
 
+def read_sealed(path: Path, newest: int) -> dict[str, Any]:
+    """Read a JSON object as `velodrome.scenarios.files.write_sealed` writes it.
+
+    Parameters
+    ----------
+    path : Path
+    newest : int
+        Newest version of its format that is read.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        If it is no JSON object, has a newer format, or was changed since it was written.
+    """
+    found = read_json(path)
+    if not isinstance(found, dict):
+        raise ValueError("not a JSON object")
+    read_version(found, newest)
+    if found.get(DIGEST_KEY) != content_digest(found):
+        raise ValueError("its contents do not match their digest")
+    return found
+
+
 def read_stored_scenario(folder: Path, manifest: Mapping[str, Any]) -> Scenario:
     """Return the scenario of a run folder.
 

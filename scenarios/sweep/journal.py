@@ -7,7 +7,6 @@ one task the later one holds: the task was tried again. Only one process writes 
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import time
@@ -18,6 +17,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..error import ScenarioError
+from ..locks import open_locked
 
 _BATCH, _WAIT = 200, 0.5  # rows, seconds that a power failure may lose; a killed process loses none
 
@@ -91,11 +91,9 @@ class Journal:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            os.close(self._file)
+            self._file = open_locked(path)
+        except BlockingIOError as error:
             raise ScenarioError(f"{path.parent}: another sweep is writing there") from error
         self._end = _length_of_whole_lines(path)
         self._partial_line_removed = False

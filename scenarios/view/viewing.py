@@ -15,26 +15,29 @@ from .server import LOOPBACK, RunPageServer
 from .viewer import ReplayError, rerun, viewer_files
 
 RECORDING, REPORT = "comparison.rrd", "report.html"
+DIFF_RECORDING = "diff.rrd"  # of two runs, as `velodrome diff --out` writes it
 
 
 def open_native(folder: Path) -> None:
-    """Open a run's recording in the native viewer; return when its window is closed.
+    """Open the recording of a run, or of the difference of two, in the native viewer; return when it is closed.
 
     Raises
     ------
     ScenarioError
         If the folder has no recording, its scenario was changed, or the viewer cannot run here.
     """
-    command = native_command(find_recording(folder))
+    of_two = (folder / DIFF_RECORDING).is_file() and not (folder / RECORDING).exists()
+    recording = folder / DIFF_RECORDING if of_two else find_recording(folder)
+    command = native_command(recording)
     try:
         status = subprocess.call(command)
     except OSError as error:
         raise ScenarioError(f"the viewer {command[0]} cannot be started: {error.strerror}") from error
     if status != 0:
-        raise ScenarioError(
-            f"the viewer ended with status {status}; it needs a display. Without one, "
-            f"open {folder / REPORT} in a browser, or run: velodrome view --web {folder}"
-        )
+        without = f"open {folder / REPORT} in a browser, or run: velodrome view --web {folder}"
+        if of_two:
+            without = f"open {recording} in rerun's viewer on another machine"
+        raise ScenarioError(f"the viewer ended with status {status}; it needs a display. Without one, {without}")
 
 
 def find_recording(folder: Path) -> Path:

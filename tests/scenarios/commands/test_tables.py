@@ -53,7 +53,7 @@ def ridden() -> tuple[RunPlan, RunOutcome, dict[str, Any]]:
 
 def show_run(console: Console) -> None:
     plan, outcome, _ = ridden()
-    show_outcome(console, plan, outcome)
+    show_outcome(console, plan.name, plan.scenario, outcome)
 
 
 def show_difference(console: Console) -> None:

@@ -24,6 +24,7 @@ from velodrome import Settings, Trajectory, UnsuitableProblem
 from velodrome.reference.kinematics import body_positions, body_quaternions
 from velodrome.reference.simulate import simulate_modified_euler
 
+{loading}
 __version__ = {version!r}
 STRETCH = {stretch!r}
 
@@ -43,7 +44,7 @@ class Mill:
     settings = MillSettings
 
     def check(self, problem, settings):
-        pass
+        {checking}
 
     def step_noise(self, settings):
         return 2.0**-52
@@ -96,7 +97,13 @@ output_rate = 50.0
 
 
 def make_wheel(
-    folder: Path, version: str, stretch: float = SAME, before: str = "", requires: str | None = None
+    folder: Path,
+    version: str,
+    stretch: float = SAME,
+    before: str = "",
+    requires: str | None = None,
+    loading: str = "",
+    checking: str = "",
 ) -> Path:
     """Write a wheel of the engine's package.
 
@@ -110,10 +117,20 @@ def make_wheel(
         A line that the engine runs before it rides.
     requires : str, optional
         What the package needs.
+    loading : str
+        A line that the module runs when it is imported.
+    checking : str
+        A line that the engine runs when it is asked whether it can ride.
     """
     info = f"{PACKAGE}-{version}.dist-info"
     files = {
-        f"{PACKAGE}.py": _SOURCE.format(version=version, stretch=stretch, before=before or "pass"),
+        f"{PACKAGE}.py": _SOURCE.format(
+            version=version,
+            stretch=stretch,
+            before=before or "pass",
+            loading=loading,
+            checking=checking or "pass",
+        ),
         f"{info}/entry_points.txt": f"[velodrome.engines]\n{PACKAGE} = {PACKAGE}:ENGINE\n",
     }
     return make_package_wheel(folder, PACKAGE, version, files, requires)

@@ -94,7 +94,7 @@ def test_every_kind_of_release_has_its_row(velodrome, registry: Path, tmp_path: 
     }
     reasons = {row["version"]: row["reason"] for row in document["releases"]}
     assert reasons["1.4"] == "its process ended by SIGABRT"
-    assert reasons["1.5"] == "no result within 30 s"
+    assert reasons["1.5"].startswith("no result within 30 s, while in simulate (wheelmill.py, line ")
     assert reasons["1.6"] == "it rides no circles"
     assert "ZeroDivisionError" in reasons["1.7"]
     assert "numpy<1" in reasons["1.8"]

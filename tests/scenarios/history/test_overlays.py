@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
+from numpy.random import _common
 
 from velodrome.scenarios.history.requirements import RequirementConflict, find_suite_packages, resolve_needs
 
+# Any small compiled library.
+COMPILED = _common.__file__
 _PROBE = """
 import sys
 from collections.abc import Mapping
@@ -96,13 +101,18 @@ def test_only_the_release_itself_is_loaded(body: str, told: str, tmp_path: Path)
     assert found.startswith(told)
 
 
-def probe(tmp_path: Path, body: str) -> str:
+def probe(tmp_path: Path, body: str, environment: Mapping[str, str] | None = None, before: str = "") -> str:
     """Lay the release in ``own`` over the one in ``suite``, in a process of its own, and run a line."""
-    script = f"import sys; sys.path.insert(0, {str(tmp_path / 'suite')!r})\n" + _PROBE.format(
+    script = f"import sys; sys.path.insert(0, {str(tmp_path / 'suite')!r}); {before}\n" + _PROBE.format(
         body=body.replace("OTHER", f"Path({str(tmp_path / 'suite')!r})")
     )
     done = subprocess.run(
-        [sys.executable, "-c", script, str(tmp_path / "own")], capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, "-c", script, str(tmp_path / "own")],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env=os.environ | (environment or {}),
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
@@ -132,8 +142,45 @@ def test_of_a_namespace_only_what_the_release_has_must_be_its_own(body: str, tol
     assert probe(tmp_path, body).startswith(told)
 
 
+@pytest.mark.parametrize("variable", ["LD_LIBRARY_PATH", "LD_PRELOAD"])
+def test_a_library_that_the_shell_puts_in_the_place_of_the_releases_is_seen(variable: str, tmp_path: Path) -> None:
+    """The linker looks in the folders of these variables before those that a library names itself."""
+    library = "libmill.so.1"
+    write_package(tmp_path / "suite", "mill", "1.0", "", {"mill/__init__.py": ""})
+    write_package(tmp_path / "own", "mill", "2.0", "", {"mill/__init__.py": ""})
+    (tmp_path / "shell").mkdir()
+    for folder in (tmp_path / "own" / "mill", tmp_path / "shell"):
+        shutil.copyfile(COMPILED, folder / library)
+    shell = {"LD_LIBRARY_PATH": str(tmp_path / "shell"), "LD_PRELOAD": str(tmp_path / "shell" / library)}
+    loading = "import mill" if variable == "LD_PRELOAD" else f"import ctypes, mill; ctypes.CDLL({library!r})"
+    found = probe(tmp_path, loading, {variable: shell[variable]})
+    assert found.startswith(f"WrongRelease: {tmp_path / 'shell' / library}, of LD_LIBRARY_PATH or LD_PRELOAD, was")
+    # What is found there and not loaded does no harm, nor does a folder that is not there.
+    rightly = f"import ctypes, mill; ctypes.CDLL({str(tmp_path / 'own' / 'mill' / library)!r})"
+    assert probe(tmp_path, rightly, {"LD_LIBRARY_PATH": f"{tmp_path / 'absent'}:{tmp_path / 'shell'}"}) == "right"
+
+
+def test_of_a_package_that_the_suite_has_too_a_release_may_be_a_part(tmp_path: Path) -> None:
+    """As MJX, a package of its own, is a part of MuJoCo's module, whose path is extended behind its own folder."""
+    extending = "__path__ = __import__('pkgutil').extend_path(__path__, __name__)\n"
+    suite = {"shared/__init__.py": extending, "shared/rest.py": "", "shared/part/__init__.py": "WHERE = 'suite'"}
+    write_package(tmp_path / "suite", "mill", "1.0", "", suite | {"shared/part/gone.py": ""})
+    write_package(tmp_path / "own", "mill", "2.0", "", {"shared/part/__init__.py": "WHERE = 'own'"})
+    body = "import shared.part, shared.rest; assert shared.part.WHERE == 'own'"
+    assert probe(tmp_path, body) == "right"
+    assert probe(tmp_path, "import shared.part.gone").startswith("ModuleNotFoundError")
+
+
 def test_path_files_of_the_environment_come_first(tmp_path: Path) -> None:
     write_package(tmp_path / "suite", "mill", "1.0", "", {"mill.py": "WHERE = 'suite'"})
     write_package(tmp_path / "own", "mill", "2.0", "", {"prefix/mill.py": "WHERE = 'own'"})
     (tmp_path / "own" / "mill.pth").write_text("prefix\n")
     assert probe(tmp_path, "import mill; assert mill.WHERE == 'own'") == "right"
+
+
+def test_folders_of_the_environment_that_the_suites_path_files_have_added_come_first(tmp_path: Path) -> None:
+    """As cmeel does: its path file adds a folder of every folder of the path, the suite's first."""
+    write_package(tmp_path / "suite", "mill", "1.0", "", {"prefix/mill.py": "WHERE = 'suite'"})
+    write_package(tmp_path / "own", "mill", "2.0", "", {"prefix/mill.py": "WHERE = 'own'"})
+    adding = f"sys.path += [{str(tmp_path / 'suite' / 'prefix')!r}, {str(tmp_path / 'own' / 'prefix')!r}]"
+    assert probe(tmp_path, "import mill; assert mill.WHERE == 'own'", before=adding) == "right"

@@ -14,6 +14,7 @@ from mill import CIRCLE, FAULT, PACKAGE, install_mill, make_wheel, use_registry
 from velodrome.scenarios.history import HistoryFolder, PlannedRide
 from velodrome.scenarios.history.adapters import digest_adapter
 from velodrome.scenarios.history.loaded import are_installed, list_loaded_packages
+from velodrome.scenarios.history.process import describe_place
 from velodrome.scenarios.history.releases import Release
 
 RODE: dict[str, Any] = {"status": "rode", "reason": None, "loaded": {}}
@@ -116,6 +117,59 @@ def test_going_on_repeats_what_a_limit_ended_and_keeps_what_the_engine_raised(
     assert again.status == 0, again.stderr
     assert [row["status"] for row in again.json()["releases"]] == ["rode", "rode", "failed", "rode", "rode"]
     assert {*log.read_text().split()} == {"1.1", "1.3", "1.4"}
+
+
+@pytest.mark.slow
+def test_a_row_says_where_a_ride_hung(velodrome, registry: Path) -> None:
+    make_wheel(registry, "1.0")
+    make_wheel(registry, "1.1", loading="time.sleep(1000)")
+    make_wheel(registry, "1.2", before="time.sleep(1000)")
+    # Compiled code that never returns to Python.
+    make_wheel(registry, "1.3", before="import ctypes; ctypes.PyDLL(None).sleep(1000)")
+    found = velodrome("history", f"{PACKAGE}>=1", "circle.toml", "--time-limit", "30", "--json")
+    rows = {row["version"]: (row["status"], row["reason"]) for row in found.json()["releases"]}
+    lines = (registry.parent / "installed" / "site" / f"{PACKAGE}.py").read_text().splitlines()
+    importing, riding = lines.index("__version__ = '1.0'"), lines.index("        pass", lines.index(SIMULATE)) + 1
+    assert rows == {
+        "1.0": ("rode", None),
+        "1.1": ("failed", f"no result within 30 s, while it imported {PACKAGE}.py (line {importing})"),
+        "1.2": ("failed", f"no result within 30 s, while in simulate ({PACKAGE}.py, line {riding})"),
+        "1.3": ("failed", f"no result within 30 s, while in simulate ({PACKAGE}.py, line {riding})"),
+    }
+
+
+SIMULATE = "    def simulate(self, problem, settings, progress):"
+FRAMES = """Current thread 0x00007f1 (most recent call first):
+  File "{innermost}", line 7 in {function}
+  File "<frozen importlib._bootstrap>", line 241 in _call_with_frames_removed
+  File "/env/mill/__init__.py", line 3 in <module>
+  File "<frozen importlib._bootstrap>", line 1176 in _find_and_load
+  File "/suite/engines/mill.py", line 12 in simulate
+"""
+RIDING = FRAMES.replace("<module>", "step")
+
+
+@pytest.mark.parametrize(
+    ("frames", "told"),
+    [
+        ("", None),
+        ("Segmentation fault", None),
+        (FRAMES.format(innermost="/env/mill/part.py", function="<module>"), "while it imported mill/part.py (line 7)"),
+        # What an import calls is still the import.
+        (FRAMES.format(innermost="/env/mill/part.py", function="wait"), "while it imported mill/__init__.py (line 3)"),
+        (FRAMES.format(innermost="/usr/lib/socket.py", function="recv"), "while it imported mill/__init__.py (line 3)"),
+        (
+            FRAMES.replace("<module>", "step").format(innermost="/env/mill/part.py", function="wait"),
+            "while in wait (mill/part.py, line 7)",
+        ),
+        (
+            FRAMES.replace("<module>", "step").format(innermost="/usr/lib/socket.py", function="recv"),
+            "while in recv (socket.py, line 7)",
+        ),
+    ],
+)
+def test_frames_say_in_words_where_a_process_is(frames: str, told: str | None) -> None:
+    assert describe_place(frames, Path("/env")) == told
 
 
 @pytest.mark.slow

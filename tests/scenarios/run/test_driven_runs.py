@@ -132,8 +132,8 @@ def test_an_engine_that_ignores_inputs_is_left_out_or_refused_by_name(driven: Pa
     name, scenario = load_scenario(str(driven))
     configure = runner.configure_engine
 
-    def configure_silent(engine: str, given: dict[str, Any]) -> tuple[GuardedEngine, Settings]:
-        loaded, settings = configure(engine, given)
+    def configure_silent(engine: str, given: dict[str, Any], any_release: bool) -> tuple[GuardedEngine, Settings]:
+        loaded, settings = configure(engine, given, any_release)
         assert isinstance(loaded, GuardedEngine)
         return replace(loaded, takes_inputs=engine != "exudyn"), settings
 
