@@ -12,9 +12,9 @@ circle they change slowly, and Phi with them.
 Two models of d_k use the ride in float64 alone. The last digit of a number x in float32 is its spacing u(x). Every
 rounding of a number counts in one of them; both results are parts of the prediction, whose squares add up.
 
-- Repeated: where the increment of a position is the same as that of the step before, to within u, as in rolling straight
-  on, the increment of the ride in float64 is added in float32. Such steps are rounded alike, and the errors themselves
-  add up.
+- Repeated: where the increment of a position is the same as that of the step before, to within u, as in rolling
+  straight on, the increment of the ride in float64 is added in float32. Such steps are rounded alike, and the errors
+  themselves add up.
 - Unrelated: everywhere else the rounding is evenly spread over +-u / 2 and unrelated from step to step, with the
   variance u^2 / 12. The variances of all steps add up. Velocities always count here: contacts answer an error of a
   velocity within two steps, by increments as large as the error, so that no increment stays the same.
@@ -105,9 +105,7 @@ class Sensitivity:
         return found
 
 
-def measure_sensitivity(
-    q: np.ndarray, qd: np.ndarray, block: int, forming: int, advance: Advance
-) -> Sensitivity:
+def measure_sensitivity(q: np.ndarray, qd: np.ndarray, block: int, forming: int, advance: Advance) -> Sensitivity:
     """Measure how a ride carries deviations.
 
     Parameters
@@ -151,8 +149,8 @@ def carry_errors(sensitivity: Sensitivity, errors: np.ndarray, end: int) -> np.n
     """Return the deviation of the position (3,) after ``end`` blocks that errors of steps lead to.
 
     Contacts answer an error at right angles to the ground within some steps, so that little is left of it. Derivatives
-    that are interpolated between the ends of a block miss that by the square of the angle by which the motion turns in a
-    block: where such errors keep their sign, blocks must be short for the little to come out right.
+    that are interpolated between the ends of a block miss that by the square of the angle by which the motion turns in
+    a block: where such errors keep their sign, blocks must be short for the little to come out right.
 
     Parameters
     ----------

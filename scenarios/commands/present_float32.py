@@ -21,9 +21,9 @@ _COLUMNS = (
     ("all /\ndigits", "measured_to_predicted", "", ".2f"),
 )
 _EXPLANATION = (
-    "own, all: distances of D, measured; errors of steps: what those of the own ride lead to, and rest what they leave of "
-    "its deviation; first 0.1 s: what they lead to; digits: what the last digits of the state lead to, by roundings that "
-    "are unrelated to each other and by those that repeat"
+    "own, all: distances of D, measured; errors of steps: what those of the own ride lead to, and rest what they leave "
+    "of its deviation; first 0.1 s: what they lead to; digits: what the last digits of the state lead to, by roundings "
+    "that are unrelated to each other and by those that repeat"
 )
 
 

@@ -44,8 +44,8 @@ from ..scenario import Scenario, choose_engines, join_complaints, make_start, na
 
 _TIMES = (1.0, 3.0, 10.0, 20.0)  # at which distances are given, as far as a ride reaches, beside its end [s]
 _INTERVAL = 0.1  # between times at which distances can be given; in the first of it contacts form [s]
-# Of a block of the sensitivity [s]. The modes of a bicycle, of some rad/s, turn by some hundredths in it, and errors that
-# contacts undo are off by a twelfth of the square of that.
+# Of a block of the sensitivity [s]. The modes of a bicycle, of some rad/s, turn by some hundredths in it, and errors
+# that contacts undo are off by a twelfth of the square of that.
 _BLOCK = 0.01
 _LAST_DIGIT = 2.0**-23  # relative spacing of float32
 _MOST_STEPS = 200_000  # whose states are kept, some hundred megabytes
@@ -64,7 +64,8 @@ class Float32Point:
     rms_distance, largest_distance : float
         Over all starts [m].
     start : float
-        What the states after the first 0.1 s, by which contacts have formed, lead to: root mean square over all starts [m].
+        What the states after the first 0.1 s, by which contacts have formed, lead to: root mean square over all
+        starts [m].
     unrelated_digits, repeated_digits : float
         What the last digits of the state lead to, by the ride in double precision alone: two parts [m].
     measured_to_predicted : float or None
@@ -399,12 +400,14 @@ def _make_points(
     interval, sensitivity = double.interval_time, double.sensitivity
     rates = [double.interval, *[1] * (len(rides) - 1)]  # samples of an interval
     pairs = list(zip(rates, rides, double.rides, strict=True))
-    begun = np.array([_find_deviation(ride, exact, rate) for rate, ride, exact in pairs]) if end else None
-    ends = dict.fromkeys([*(round(t / interval) for t in _TIMES if t < interval * (end - 0.5)), end])
-    for k in filter(None, ends):
+    if not end:
+        return
+    begun = np.array([_find_deviation(ride, exact, rate) for rate, ride, exact in pairs])
+    for k in dict.fromkeys([*(round(t / interval) for t in _TIMES if t < interval * (end - 0.5)), end]):
         distances = np.array([np.linalg.norm((ride.q - exact.q)[k * rate, :3]) for rate, ride, exact in pairs])
         blocks = k * sensitivity.forming
         unrelated, repeated = digits.predict_unrelated(blocks), digits.predict_repeated(blocks)
+        formed = begun @ sensitivity.carry_to(blocks)[sensitivity.forming].T
         led_to = carry_errors(sensitivity, errors, blocks)
         deviation = _find_deviation(rides[0], double.rides[0], k * double.interval)[:3]
         carried = float(np.linalg.norm(led_to))
@@ -414,7 +417,7 @@ def _make_points(
             distance=float(distances[0]),
             rms_distance=rms,
             largest_distance=float(distances.max()),
-            start=_root_mean_square(np.linalg.norm(begun @ sensitivity.carry_to(blocks)[sensitivity.forming].T, axis=1)),
+            start=_root_mean_square(np.linalg.norm(formed, axis=1)),
             unrelated_digits=unrelated,
             repeated_digits=repeated,
             measured_to_predicted=rms / predicted if predicted > 0 else None,

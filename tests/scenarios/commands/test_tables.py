@@ -199,7 +199,8 @@ def test_tables_fit_sixty_columns(show: Show) -> None:
 def test_the_table_of_float32_is_one_in_eighty_columns() -> None:
     titles = [line for line in printed(show_single_precision, 80).splitlines() if line.startswith("time")]
     assert len(titles) == len(LONG_NAMES)
-    assert all(line.split() == ["time", "start", "of", "steps", "rest", "starts", "0.1", "s", "digits", "digits", "all", "/"] for line in titles)
+    assert {tuple(line.split()[:3]) for line in titles} == {("time", "start", "of")}
+    assert all(line.endswith("all /") for line in map(str.rstrip, titles))
 
 
 def test_a_table_is_one_where_it_fits_and_whole_where_nothing_does() -> None:

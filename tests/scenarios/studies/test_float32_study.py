@@ -15,10 +15,11 @@ from scipy.stats import chi2
 from tests.sealing import contents
 from velodrome.engines.admission import ride_engine
 from velodrome.engines.mujoco.model import MARGIN
+from velodrome.engines.mujoco.native import ENGINE as NATIVE
 from velodrome.engines.mujoco.planes import build_planes
 from velodrome.engines.mujoco.ride import ride_rig
 from velodrome.engines.mujoco.rounding import build_rounded_planes
-from velodrome.engines.mujoco.settings import RoundedSettings
+from velodrome.engines.mujoco.settings import NativeSettings, RoundedSettings
 from velodrome.engines.mujoco.state import from_mujoco
 from velodrome.engines.registry import load_engine
 from velodrome.reports.measure import carry_errors, find_deviations, measure_sensitivity, measure_step_errors
@@ -73,8 +74,7 @@ def test_a_bias_that_contacts_undo_is_carried(name: str) -> None:
     Blocks of 0.1 s miss the distance by 0.4 and 7 times itself, those of 0.01 s by less than a tenth: the square of the
     ratio.
     """
-    engine = load_engine("mujoco-native").inner  # type: ignore[attr-defined]
-    settings = engine.settings.model_validate({"tolerance": 1e-14})
+    settings = NativeSettings(tolerance=1e-14)
     problem = make_start(load_scenario(name, {"simulation.duration": 1.0})[1]).problem
     problem = replace(problem, times=np.arange(501) * 0.002)
 
@@ -84,7 +84,7 @@ def test_a_bias_that_contacts_undo_is_carried(name: str) -> None:
         found = ride_rig(rig, 0.002, list(range(501)), lambda _: None).recording
         return from_mujoco(found.time, found.qpos, found.qvel, problem.q)
 
-    exact, other, advance = ride(MARGIN), ride(0.5e-6), engine.make_advance(problem, settings)
+    exact, other, advance = ride(MARGIN), ride(0.5e-6), NATIVE.make_advance(problem, settings)
     formed, errors = 50, np.zeros((501, 18))
     errors[formed] = find_deviations(other[0][[formed]], other[1][[formed]], exact[0][[formed]], exact[1][[formed]])[0]
     errors[formed + 1 :] = measure_step_errors(other[0][formed:], other[1][formed:], advance)
