@@ -39,7 +39,7 @@ def float32_figure(path: Path, document: Mapping[str, Any]) -> None:
             shade = tuple(_DARKER * part / 255 for part in shades[label])
             time = np.array([point["time"] for point in points])
             measured = np.array([point["rms_distance"] for point in points])
-            predicted = np.array([max(point["unrelated_digits"], point["repeated_digits"]) for point in points])
+            predicted = np.array([np.hypot(point["unrelated_digits"], point["repeated_digits"]) for point in points])
             ax.plot(time, measured, color=shade, marker=_MARKERS[k % len(_MARKERS)], ms=4, ls="none", label=label)
             ax.plot(time, predicted, color=shade, lw=1)
         rest = document["reference_distance"]

@@ -9,12 +9,15 @@ where Phi is the derivative of the state at T with respect to that at t_k, measu
 float64. Deviations are those of the generalised coordinates and rates, x and y along and across the heading: on a
 circle they change slowly, and Phi with them.
 
-Two models of d_k use the ride in float64 alone. The last digit of a number x in float32 is its spacing u(x).
+Two models of d_k use the ride in float64 alone. The last digit of a number x in float32 is its spacing u(x). Every
+rounding of a number counts in one of them; both results are parts of the prediction, whose squares add up.
 
-- Unrelated: the rounding of a number is evenly spread over +-u / 2 and unrelated from step to step, with the variance
-  u^2 / 12. The variances of all steps add up.
-- Repeated: the increments of the ride in float64 are added up in float32. Where they do not change, as in rolling
-  straight on, every step is rounded the same way, and the errors themselves add up.
+- Repeated: where the increment of a position is the same as that of the step before, to within u, as in rolling
+  straight on, the increment of the ride in float64 is added in float32. Such steps are rounded alike, and the errors
+  themselves add up.
+- Unrelated: everywhere else the rounding is evenly spread over +-u / 2 and unrelated from step to step, with the
+  variance u^2 / 12. The variances of all steps add up. Velocities always count here: contacts answer an error of a
+  velocity within two steps, by increments as large as the error, so that no increment stays the same.
 """
 
 from __future__ import annotations
@@ -75,6 +78,9 @@ class Sensitivity:
         The ride, sampled at every step; n - 1 steps are a whole number of blocks.
     block : int
         Number of steps of a block.
+    forming : int
+        Number of blocks at the start in which contacts form. An exact start just touches the ground, and a disturbance
+        decides whether a wheel does: derivatives there say nothing.
     flow : ndarray, shape (m, 18, 18)
         Derivatives of the state at the end of a block with respect to that at its start.
     """
@@ -82,21 +88,24 @@ class Sensitivity:
     q: np.ndarray
     qd: np.ndarray
     block: int
+    forming: int
     flow: np.ndarray
 
     def carry_to(self, end: int) -> np.ndarray:
-        """Return the derivatives (end + 1, 3, 18) of the position after ``end`` blocks with respect to all states."""
+        """Return the derivatives (end + 1, 3, 18) of the position after ``end`` blocks with respect to all states.
+
+        Those of the states before contacts have formed are taken as if they were of the state by then.
+        """
         found = np.zeros((end + 1, 3, _SIZE))
         found[end, :, :3] = np.eye(3)
         for j in range(end - 1, -1, -1):
             found[j] = found[j + 1] @ self.flow[j]
-        # At an exact start wheels just touch, and a disturbance decides whether they do: contacts form in this block.
-        if end:
-            found[0] = found[1]
+        formed = min(self.forming, end)
+        found[:formed] = found[formed]
         return found
 
 
-def measure_sensitivity(q: np.ndarray, qd: np.ndarray, block: int, advance: Advance) -> Sensitivity:
+def measure_sensitivity(q: np.ndarray, qd: np.ndarray, block: int, forming: int, advance: Advance) -> Sensitivity:
     """Measure how a ride carries deviations.
 
     Parameters
@@ -105,6 +114,8 @@ def measure_sensitivity(q: np.ndarray, qd: np.ndarray, block: int, advance: Adva
         The ride, sampled at every step.
     block : int
         Number of steps of a block; a rest of less than a block is left out.
+    forming : int
+        Number of blocks in which contacts form.
     advance : callable
         Moves states (n, 9), (n, 9) by a number of steps in float64.
     """
@@ -118,7 +129,7 @@ def measure_sensitivity(q: np.ndarray, qd: np.ndarray, block: int, advance: Adva
         deviations[:, i] = _DISTURBANCE
         moved = advance(*disturb_states(starts_q, starts_qd, deviations), block)
         flow[:, :, i] = find_deviations(*moved, base_q, base_qd) / _DISTURBANCE
-    return Sensitivity(q[: count * block + 1], qd[: count * block + 1], block, flow)
+    return Sensitivity(q[: count * block + 1], qd[: count * block + 1], block, forming, flow)
 
 
 def measure_step_errors(q: np.ndarray, qd: np.ndarray, advance: Advance) -> np.ndarray:
@@ -136,6 +147,10 @@ def measure_step_errors(q: np.ndarray, qd: np.ndarray, advance: Advance) -> np.n
 
 def carry_errors(sensitivity: Sensitivity, errors: np.ndarray, end: int) -> np.ndarray:
     """Return the deviation of the position (3,) after ``end`` blocks that errors of steps lead to.
+
+    Contacts answer an error at right angles to the ground within some steps, so that little is left of it. Derivatives
+    that are interpolated between the ends of a block miss that by the square of the angle by which the motion turns in
+    a block: where such errors keep their sign, blocks must be short for the little to come out right.
 
     Parameters
     ----------
@@ -173,19 +188,21 @@ class LastDigits:
         is_rounded = np.r_[
             np.full(count, "positions" in rounded), np.full(numbers.shape[1] - count, "velocities" in rounded)
         ]
-        self._digits = np.where(is_rounded, np.spacing(np.abs(numbers).astype(np.float32)).astype(float), 0.0)
+        digits = np.where(is_rounded, np.spacing(np.abs(numbers).astype(np.float32)).astype(float), 0.0)
+        repeats = (np.abs(_find_changes(numbers)) < digits) & (np.arange(numbers.shape[1]) < count)
+        self._digits = np.where(repeats, 0.0, digits)
         middles = np.arange(len(sensitivity.flow)) * block + block // 2
         # Of a quaternion's four numbers the inverse takes the part that turns, and leaves its length out.
         self._inverses = [np.linalg.pinv(_differentiate(store, sensitivity, k)) for k in middles.tolist()]
-        self._repeated = self._replay(numbers, is_rounded)
+        self._repeated = self._replay(numbers, is_rounded, repeats)
 
-    def _replay(self, numbers: np.ndarray, is_rounded: np.ndarray) -> np.ndarray:
-        """Return the errors (n, 18) where the increments of the ride are added up in float32."""
+    def _replay(self, numbers: np.ndarray, is_rounded: np.ndarray, repeats: np.ndarray) -> np.ndarray:
+        """Return the errors (n, 18) of repeating steps if the increments of the ride are added up in float32."""
         now, errors = numbers[0].copy(), np.zeros_like(numbers)
         for k in range(len(numbers)):
             exact = now + (numbers[k] - numbers[k - 1] if k else 0.0)
             now = np.where(is_rounded, exact.astype(np.float32), exact)
-            errors[k] = now - exact
+            errors[k] = np.where(repeats[k], now - exact, 0.0)
         block = self._sensitivity.block
         found = np.zeros((len(numbers), _SIZE))
         found[0] = self._inverses[0] @ errors[0]
@@ -195,7 +212,7 @@ class LastDigits:
         return found
 
     def predict_unrelated(self, end: int) -> float:
-        """Return the root mean square of the distance [m] after ``end`` blocks by unrelated roundings."""
+        """Return the root mean square of the part of the distance [m] after ``end`` blocks by unrelated roundings."""
         carried, block = self._sensitivity.carry_to(end), self._sensitivity.block
         total = 0.0
         for j in range(end):
@@ -205,8 +222,13 @@ class LastDigits:
         return float(np.sqrt(total))
 
     def predict_repeated(self, end: int) -> float:
-        """Return the distance [m] after ``end`` blocks if the ride's increments are added up in float32."""
+        """Return the part of the distance [m] after ``end`` blocks by roundings that repeat."""
         return float(np.linalg.norm(carry_errors(self._sensitivity, self._repeated, end)))
+
+
+def _find_changes(numbers: np.ndarray) -> np.ndarray:
+    """Return the changes (n, m) of the increments of numbers from step to step, those of the ends as beside them."""
+    return np.pad(np.diff(numbers, 2, axis=0), ((1, 1), (0, 0)), mode="edge")
 
 
 def _differentiate(store: Store, sensitivity: Sensitivity, k: int) -> np.ndarray:

@@ -43,7 +43,10 @@ from ..run import RunPlan, RunWatch, Trace, configure_engine, installed_engines,
 from ..scenario import Scenario, choose_engines, join_complaints, make_start, name_bicycle
 
 _TIMES = (1.0, 3.0, 10.0, 20.0)  # at which distances are given, as far as a ride reaches, beside its end [s]
-_BLOCK = 0.1  # of a block of the sensitivity [s]; in this time the modes of a bicycle hardly turn
+_INTERVAL = 0.1  # between times at which distances can be given; in the first of it contacts form [s]
+# Of a block of the sensitivity [s]. The modes of a bicycle, of some rad/s, turn by some hundredths in it, and errors
+# that contacts undo are off by a twelfth of the square of that.
+_BLOCK = 0.01
 _LAST_DIGIT = 2.0**-23  # relative spacing of float32
 _MOST_STEPS = 200_000  # whose states are kept, some hundred megabytes
 
@@ -60,25 +63,32 @@ class Float32Point:
         From the scenario's own start [m].
     rms_distance, largest_distance : float
         Over all starts [m].
+    start : float
+        What the states after the first 0.1 s, by which contacts have formed, lead to: root mean square over all
+        starts [m].
     unrelated_digits, repeated_digits : float
-        What the last digits of the state lead to, by the ride in double precision alone [m].
+        What the last digits of the state lead to, by the ride in double precision alone: two parts [m].
     measured_to_predicted : float or None
-        Root mean square of the distances, relative to the larger of these two; None where both are zero.
+        Root mean square of the distances, relative to that of both parts together; None where both are zero.
     step_errors : float
         What the errors of the own ride's steps lead to [m].
     measured_to_step_errors : float or None
         The own distance relative to it.
+    unexplained : float
+        The part of the own deviation, a vector, that the errors of the own ride's steps do not lead to [m].
     """
 
     time: float
     distance: float
     rms_distance: float
     largest_distance: float
+    start: float
     unrelated_digits: float
     repeated_digits: float
     measured_to_predicted: float | None
     step_errors: float
     measured_to_step_errors: float | None
+    unexplained: float
 
 
 @dataclass(frozen=True)
@@ -91,6 +101,16 @@ class _Double:
     problems: list[Problem]
     sensitivity: Sensitivity
     advance: AdvanceStates
+
+    @property
+    def interval(self) -> int:
+        """Number of steps of an interval: that in which contacts form, and those between samples."""
+        return self.sensitivity.forming * self.sensitivity.block
+
+    @property
+    def interval_time(self) -> float:
+        """Length of an interval [s]."""
+        return self.interval * float(self.problems[0].times[1])
 
 
 def study_float32(
@@ -245,15 +265,18 @@ def _find_counterpart(
 def _ride_double(plan: RunPlan, engine: Engine, settings: Settings, starts: int, watch: RunWatch) -> _Double:
     step, duration = _read_step(engine, settings), plan.scenario.simulation.duration
     block = max(1, round(_BLOCK / step))
-    if duration < 2 * block * step:
-        raise ScenarioError(f"{plan.name}: the duration is {duration:g} s; it must be at least {2 * block * step:g} s")
-    steps = int(duration / step * (1 + 1e-9)) // block * block
+    forming = max(1, round(_INTERVAL / (block * step)))
+    interval = forming * block
+    if duration < 2 * interval * step:
+        least = 2 * interval * step
+        raise ScenarioError(f"{plan.name}: the duration is {duration:g} s; it must be at least {least:g} s")
+    steps = int(duration / step * (1 + 1e-9)) // interval * interval
     if steps > _MOST_STEPS:
         raise ScenarioError(
             f"{plan.name}: the duration of {duration:g} s has {steps} steps; every step is looked at, so that it "
             f"must be at most {_MOST_STEPS * step:g} s"
         )
-    problems = _make_problems(plan.start.problem, step, steps, block, starts)
+    problems = _make_problems(plan.start.problem, step, steps, interval, starts)
     rides = []
     for number, problem in enumerate(problems):
         label = f"{engine.name}, float64" + (f", start {number + 1}" if number else "")
@@ -271,7 +294,7 @@ def _ride_double(plan: RunPlan, engine: Engine, settings: Settings, starts: int,
     watch(f"{engine.name}, sensitivity", 0.0, 1.0)
     try:
         advance = call_engine(make_advance, engine, plan.start.problem, settings)
-        sensitivity = call_engine(measure_sensitivity, rides[0].q, rides[0].qd, block, advance)
+        sensitivity = call_engine(measure_sensitivity, rides[0].q, rides[0].qd, block, forming, advance)
     except Exception as error:
         raise ScenarioError(f"{plan.name}: {engine.name} cannot step from its states: {why_failed(error)}") from error
     return _Double(engine, settings, rides, problems, sensitivity, advance)
@@ -284,15 +307,15 @@ def _read_step(engine: Engine, settings: Settings) -> float:
     return float(step)
 
 
-def _make_problems(problem: Problem, step: float, steps: int, block: int, starts: int) -> list[Problem]:
-    """Return the problem with a sample at every step, and with other starts and a sample at every block."""
+def _make_problems(problem: Problem, step: float, steps: int, interval: int, starts: int) -> list[Problem]:
+    """Return the problem with a sample at every step, and with other starts and a sample after every interval."""
     times = np.arange(steps + 1) * step
     found = [replace(problem, times=times)]
     numbers = np.random.default_rng(starts)
     for _ in range(starts - 1):
         # Some last digits of a number of size 1: rides from these starts are rounded in unrelated ways.
         q, qd = disturb_states(problem.q[None], problem.qd[None], 3 * _LAST_DIGIT * numbers.uniform(-1, 1, (1, 18)))
-        found.append(replace(problem, q=q[0], qd=qd[0], times=times[::block]))
+        found.append(replace(problem, q=q[0], qd=qd[0], times=times[::interval]))
     return found
 
 
@@ -341,17 +364,10 @@ def _study_variant(
     for number, problem in enumerate(double.problems):
         label = f"{engine.name}, {variant.title}" + (f", start {number + 1}" if number else "")
         rides.append(ride_engine(rider, problem, chosen, _report(watch, label, duration)))
-    own, block = rides[0], double.sensitivity.block
     # A start that ends early shortens what can be compared.
     reached = min(float(ride.time[-1]) for ride in rides)
-    end = int(reached / (block * float(double.problems[0].times[1])) * (1 + 1e-9))
-    exact = double.rides[0]
-    # In the first block contacts form, with errors that are not small; it is taken as it ended.
-    errors = np.zeros((end * block + 1, 18))
-    if end:
-        samples = slice(block, end * block + 1)
-        errors[block] = find_deviations(own.q[[block]], own.qd[[block]], exact.q[[block]], exact.qd[[block]])[0]
-        errors[block + 1 :] = call_engine(measure_step_errors, own.q[samples], own.qd[samples], double.advance)
+    end = int(reached / double.interval_time * (1 + 1e-9))
+    errors = _find_errors(rides[0], double, end)
     digits = LastDigits(double.sensitivity, single.store, variant.rounded)
     ended = next((ride.ended for ride in rides if ride.ended is not None), None)
     return {
@@ -360,39 +376,65 @@ def _study_variant(
     }
 
 
+def _find_errors(own: Trajectory, double: _Double, end: int) -> np.ndarray:
+    """Return the errors (n, 18) of the steps of a ride up to an interval."""
+    formed, last, exact = double.interval, end * double.interval, double.rides[0]
+    errors = np.zeros((last + 1, 18))
+    if end:
+        # In the first interval contacts form, with errors that are not small; it is taken as it ended.
+        errors[formed] = _find_deviation(own, exact, formed)
+        samples = slice(formed, last + 1)
+        errors[formed + 1 :] = call_engine(measure_step_errors, own.q[samples], own.qd[samples], double.advance)
+    return errors
+
+
+def _find_deviation(own: Trajectory, exact: Trajectory, sample: int) -> np.ndarray:
+    here = slice(sample, sample + 1)
+    return find_deviations(own.q[here], own.qd[here], exact.q[here], exact.qd[here])[0]
+
+
 def _make_points(
     rides: list[Trajectory], double: _Double, digits: LastDigits, errors: np.ndarray, end: int
 ) -> Iterator[Float32Point]:
-    sensitivity, block = double.sensitivity, double.sensitivity.block
-    interval = block * float(double.problems[0].times[1])
-    ends = dict.fromkeys([*(round(t / interval) for t in _TIMES if t < interval * (end - 0.5)), end])
-    for k in filter(None, ends):
-        distances = np.array(
-            [
-                np.linalg.norm(ride.q[k * rate, :3] - exact.q[k * rate, :3])
-                for rate, ride, exact in zip([block, *[1] * len(rides)], rides, double.rides, strict=False)
-            ]
-        )
-        unrelated, repeated = digits.predict_unrelated(k), digits.predict_repeated(k)
-        carried = float(np.linalg.norm(carry_errors(sensitivity, errors, k)))
-        rms, predicted = float(np.sqrt(np.mean(distances**2))), max(unrelated, repeated)
+    """Return the points at `_TIMES` and after the last of ``end`` intervals."""
+    interval, sensitivity = double.interval_time, double.sensitivity
+    rates = [double.interval, *[1] * (len(rides) - 1)]  # samples of an interval
+    pairs = list(zip(rates, rides, double.rides, strict=True))
+    if not end:
+        return
+    begun = np.array([_find_deviation(ride, exact, rate) for rate, ride, exact in pairs])
+    for k in dict.fromkeys([*(round(t / interval) for t in _TIMES if t < interval * (end - 0.5)), end]):
+        distances = np.array([np.linalg.norm((ride.q - exact.q)[k * rate, :3]) for rate, ride, exact in pairs])
+        blocks = k * sensitivity.forming
+        unrelated, repeated = digits.predict_unrelated(blocks), digits.predict_repeated(blocks)
+        formed = begun @ sensitivity.carry_to(blocks)[sensitivity.forming].T
+        led_to = carry_errors(sensitivity, errors, blocks)
+        deviation = _find_deviation(rides[0], double.rides[0], k * double.interval)[:3]
+        carried = float(np.linalg.norm(led_to))
+        rms, predicted = _root_mean_square(distances), float(np.hypot(unrelated, repeated))
         yield Float32Point(
             time=k * interval,
             distance=float(distances[0]),
             rms_distance=rms,
             largest_distance=float(distances.max()),
+            start=_root_mean_square(np.linalg.norm(formed, axis=1)),
             unrelated_digits=unrelated,
             repeated_digits=repeated,
             measured_to_predicted=rms / predicted if predicted > 0 else None,
             step_errors=carried,
             measured_to_step_errors=float(distances[0]) / carried if carried > 0 else None,
+            unexplained=float(np.linalg.norm(deviation - led_to)),
         )
+
+
+def _root_mean_square(numbers: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(numbers**2)))
 
 
 def _measure_reference(plan: RunPlan, double: _Double, watch: RunWatch) -> list[dict[str, float]]:
     """Return the distances of the ride in double precision from the reference: what the steps cost anyway."""
-    block, ride = double.sensitivity.block, double.rides[0]
-    times = double.problems[0].times[::block]
+    rate, ride = double.interval, double.rides[0]
+    times = double.problems[0].times[::rate]
     engine, settings = plan.engines[REFERENCE]
     problem = replace(plan.start.problem, times=times)
     try:
@@ -402,7 +444,7 @@ def _measure_reference(plan: RunPlan, double: _Double, watch: RunWatch) -> list[
     interval, last = float(times[1]), len(exact.time) - 1
     ends = dict.fromkeys([*(round(t / interval) for t in _TIMES if t < interval * (last - 0.5)), last])
     return [
-        {"time": float(times[k]), "distance": float(np.linalg.norm(ride.q[k * block, :3] - exact.q[k, :3]))}
+        {"time": float(times[k]), "distance": float(np.linalg.norm(ride.q[k * rate, :3] - exact.q[k, :3]))}
         for k in filter(None, ends)
     ]
 

@@ -18,6 +18,7 @@ from velodrome.reference.bicycle import Bicycle
 from velodrome.scenarios.cli import app
 from velodrome.scenarios.commands.present_bicycle import show_bicycle
 from velodrome.scenarios.commands.present_diff import show_diff
+from velodrome.scenarios.commands.present_float32 import show_float32
 from velodrome.scenarios.commands.present_gate import show_verdicts
 from velodrome.scenarios.commands.present_motions import show_atlas, show_circular, show_critical, show_families
 from velodrome.scenarios.commands.present_precision import show_precision
@@ -83,6 +84,21 @@ def show_study(console: Console) -> None:
     show_precision(console, {"scenario": "q1", "warnings": [], "horizon": None, "duration": 1.5, "engines": engines})
 
 
+def show_single_precision(console: Console) -> None:
+    keys = ("distance", "step_errors", "unexplained", "rms_distance", "start", "unrelated_digits", "repeated_digits")
+    ratios = {"measured_to_predicted": 12.3456}, {"measured_to_predicted": None}
+    points = [{"time": 19.5, **dict.fromkeys(keys, 1.2345e-10), **ratio} for ratio in ratios]
+    entry = {
+        "reason": None,
+        "counterpart": "mujoco-native",
+        "variants": {"positions rounded": {"points": points, "ended": None}},
+        "failures": [],
+    }
+    far = [{"time": 20.0, "distance": 0.123}]
+    document = {"scenario": "q1", "warnings": [], "engines": dict.fromkeys(LONG_NAMES, entry)}
+    show_float32(console, document | {"reference_distance": far})
+
+
 def show_sweep(console: Console) -> None:
     entry = {
         "rows": {"done": 1234567, "refused": 12, "fell": 345, "failed": 6, "timeout": 78},
@@ -145,7 +161,7 @@ def show_eigenvalues(console: Console) -> None:
 
 
 SHOWN = (
-    *(show_run, show_difference, show_gate, show_study, show_sweep),
+    *(show_run, show_difference, show_gate, show_study, show_sweep, show_single_precision),
     *(show_all_families, show_critical_shapes, show_regions, show_motion, show_eigenvalues),
 )
 # Those with a row or a title for each engine.
@@ -169,13 +185,22 @@ def test_words_and_figures_are_those_of_a_wide_terminal(show: Show, width: int) 
         assert set(LONG_NAMES) <= set(narrow.split())
 
 
-@pytest.mark.parametrize("show", [show_difference, show_gate, show_study, show_sweep, show_critical_shapes])
+@pytest.mark.parametrize(
+    "show", [show_difference, show_gate, show_study, show_sweep, show_single_precision, show_critical_shapes]
+)
 def test_tables_fit_sixty_columns(show: Show) -> None:
     # Lines of words below a table are left to the terminal; those of these documents are short.
     lines = printed(show, 60).splitlines()
     tables = [line for line in lines if ": " not in line]
     assert len(tables) > len(LONG_NAMES)
     assert all(len(line.rstrip()) <= 60 for line in tables)
+
+
+def test_the_table_of_float32_is_one_in_eighty_columns() -> None:
+    titles = [line for line in printed(show_single_precision, 80).splitlines() if line.startswith("time")]
+    assert len(titles) == len(LONG_NAMES)
+    assert {tuple(line.split()[:3]) for line in titles} == {("time", "start", "of")}
+    assert all(line.endswith("all /") for line in map(str.rstrip, titles))
 
 
 def test_a_table_is_one_where_it_fits_and_whole_where_nothing_does() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,15 @@ from scipy.stats import chi2
 
 from tests.sealing import contents
 from velodrome.engines.admission import ride_engine
+from velodrome.engines.mujoco.model import MARGIN
+from velodrome.engines.mujoco.native import ENGINE as NATIVE
+from velodrome.engines.mujoco.planes import build_planes
+from velodrome.engines.mujoco.ride import ride_rig
 from velodrome.engines.mujoco.rounding import build_rounded_planes
-from velodrome.engines.mujoco.settings import RoundedSettings
+from velodrome.engines.mujoco.settings import NativeSettings, RoundedSettings
+from velodrome.engines.mujoco.state import from_mujoco
 from velodrome.engines.registry import load_engine
+from velodrome.reports.measure import carry_errors, find_deviations, measure_sensitivity, measure_step_errors
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.scenario import load_scenario, make_start
 from velodrome.scenarios.studies import all_rode_float32, study_float32, write_float32
@@ -48,14 +55,45 @@ def test_every_variant_rides_and_gives_numbers() -> None:
         assert point["time"] == pytest.approx(1.0)
         assert 0 < point["distance"] <= point["largest_distance"]
         assert point["rms_distance"] <= point["largest_distance"]
+        assert 0 < point["start"] < 1e-4
     json.dumps(document, allow_nan=False)
 
 
 def test_the_errors_of_single_steps_carry_the_whole_distance() -> None:
-    """To first order it is their sum; the block's interpolation of the sensitivity leaves some per cent."""
+    """To first order it is their sum; the interpolation of the sensitivity in blocks leaves less than a per cent."""
     for variant in VARIANTS:
         for point in points(circle(), "mujoco-native", variant):
-            assert point["measured_to_step_errors"] == pytest.approx(1, abs=0.2)
+            assert point["unexplained"] < 0.02 * point["distance"]
+            assert point["measured_to_step_errors"] == pytest.approx(1, abs=0.02)
+
+
+@pytest.mark.parametrize("name", ["plane-circle", "iftomm-2"])
+def test_a_bias_that_contacts_undo_is_carried(name: str) -> None:
+    """Contacts that begin 0.5 um higher kick the wheels up in every step, and push back: 0.5 um is left of 20 mm/s.
+
+    Blocks of 0.1 s miss the distance by 0.4 and 7 times itself, those of 0.01 s by less than a tenth: the square of the
+    ratio.
+    """
+    settings = NativeSettings(tolerance=1e-14)
+    problem = make_start(load_scenario(name, {"simulation.duration": 1.0})[1]).problem
+    problem = replace(problem, times=np.arange(501) * 0.002)
+
+    def ride(margin: float) -> tuple[np.ndarray, np.ndarray]:
+        rig = build_planes(problem, settings)
+        rig.model.pair_margin[:] = margin
+        found = ride_rig(rig, 0.002, list(range(501)), lambda _: None).recording
+        return from_mujoco(found.time, found.qpos, found.qvel, problem.q)
+
+    exact, other, advance = ride(MARGIN), ride(0.5e-6), NATIVE.make_advance(problem, settings)
+    formed, errors = 50, np.zeros((501, 18))
+    errors[formed] = find_deviations(other[0][[formed]], other[1][[formed]], exact[0][[formed]], exact[1][[formed]])[0]
+    errors[formed + 1 :] = measure_step_errors(other[0][formed:], other[1][formed:], advance)
+    assert errors[formed + 1 :, 11].sum() > 0.01  # m/s upwards
+    deviation = find_deviations(other[0][-1:], other[1][-1:], exact[0][-1:], exact[1][-1:])[0, :3]
+    sensitivity = measure_sensitivity(*exact, 5, 10, advance)
+    assert np.linalg.norm(carry_errors(sensitivity, errors, 100) - deviation) < 0.1 * np.linalg.norm(deviation)
+    coarse = measure_sensitivity(*exact, 50, 1, advance)
+    assert np.linalg.norm(carry_errors(coarse, errors, 10) - deviation) > 0.3 * np.linalg.norm(deviation)
 
 
 def test_a_distance_is_that_of_two_single_rides() -> None:
@@ -126,18 +164,18 @@ def test_rides_that_cannot_be_compared_are_refused(name: str, duration: float, m
 def test_last_digits_predict_the_distance(name: str, duration: float) -> None:
     """Steady, rolling straight on far from the origin, and unstable; without a number that is fitted."""
     point = points(study(name, ["mujoco-native"], duration, STARTS), "mujoco-native", "state rounded")[-1]
-    # What a root mean square of STARTS draws may be, were each of one dimension only; a half more for the model, in
-    # which the larger of two causes stands for both: for two that are equal that is a factor of 1.4.
+    # What a root mean square of STARTS draws may be, were each of one dimension only.
     low, high = np.sqrt(chi2.ppf([1e-4, 1 - 1e-4], STARTS) / STARTS)
-    assert low / 1.5 < point["measured_to_predicted"] < 1.5 * high
-    assert point["measured_to_step_errors"] == pytest.approx(1, abs=0.2)
+    assert low < point["measured_to_predicted"] < high
+    # Where the motion is unstable, distances are large enough for terms of second order.
+    assert point["unexplained"] < 0.05 * point["distance"]
 
 
 @pytest.mark.slow
 def test_repeated_roundings_dominate_where_a_bicycle_rolls_straight_on() -> None:
     """Beyond 64 m every step of 9.2 mm is rounded the same way."""
     (*_, point) = points(study("iftomm-2", ["mujoco-native"], 20.0), "mujoco-native", "positions rounded")
-    assert point["repeated_digits"] > 20 * point["unrelated_digits"]
+    assert point["repeated_digits"] > 100 * point["unrelated_digits"]
     assert point["measured_to_predicted"] == pytest.approx(1, abs=0.1)
 
 
@@ -157,7 +195,7 @@ def test_a_port_is_compared_with_mujoco() -> None:
     (point,) = points(document, "mjx", "float32")
     assert document["engines"]["mjx"]["counterpart"] == "mujoco-native"
     assert 1e-8 < point["rms_distance"] < 1e-3
-    assert point["measured_to_step_errors"] == pytest.approx(1, abs=0.3)
+    assert point["unexplained"] < 0.02 * point["distance"]
 
 
 @pytest.mark.engines
@@ -169,6 +207,7 @@ def test_mujoco_warp_is_compared_with_mujoco_at_its_own_tolerance() -> None:
     assert document["engines"]["mujoco-warp"]["counterpart"] == "mujoco-native"
     assert [entry["settings"]["tolerance"] for entry in document["double"]] == [1e-6]
     assert 1e-8 < point["rms_distance"] < 1e-3
+    assert point["unexplained"] < 0.1 * point["distance"]
     problem = make_start(load_scenario("plane-circle", {"simulation.duration": 0.5})[1]).problem
     engine = load_engine("mujoco-native")
     loose, tight = (
