@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from ...engines.engine import REFERENCE
-from ..drawing import ERROR, RideData, format_numbers, rank_engines
+from ..drawing import ERROR, RideData, rank_engines
+from .tables import format_after_upright
 
 # A bicycle is a metre long: a millimetre is far above round-off and far below anything that changes the ride.
 NOTED = 1e-3  # [m]
@@ -86,13 +87,10 @@ def list_findings(measured: Mapping[str, Mapping[str, Any]], ride: RideData, dur
         Duration of the run [s].
     """
     names = rank_engines(measured)
-    # A ride that fell does not choose the notation of the others.
-    errors = {
-        name: text
-        for group in (True, False)
-        if (chosen := [name for name in names if stays_up(measured[name]) is group])
-        for name, text in zip(chosen, format_numbers([_pick_error(measured[name]) for name in chosen]), strict=True)
-    }
+    upright = [stays_up(measured[name]) for name in names]
+    errors = dict(
+        zip(names, format_after_upright([_pick_error(measured[name]) for name in names], upright), strict=True)
+    )
     return [_describe_engine(name, measured[name], errors[name], ride, duration) for name in names]
 
 

@@ -54,9 +54,14 @@ def list_facts(manifest: Mapping[str, Any], scenario: Mapping[str, Any]) -> list
         ("Growth rate", f"{start['growth_rate']:.4g} 1/s"),
         ("Duration", f"{simulation['duration']:g} s, {simulation['output_rate']:g} samples a second"),
         ("Bicycle", describe_bicycle(scenario.get("bicycle", {}))),
-        ("Run on", f"{datetime.fromisoformat(manifest['created']):%Y-%m-%d, %H:%M:%S %Z}"),
+        ("Run on", describe_date(manifest["created"])),
         ("State", "complete" if manifest["complete"] else "interrupted: the engines that had finished are shown"),
     ]
+
+
+def describe_date(created: str) -> str:
+    """Format a date as documents have it."""
+    return f"{datetime.fromisoformat(created):%Y-%m-%d, %H:%M:%S %Z}"
 
 
 def _list_inputs(table: Mapping[str, float]) -> list[tuple[str, str]]:
