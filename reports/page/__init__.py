@@ -3,6 +3,7 @@
 from .anchors import AnchorNames
 from .document import make_page
 from .findings import describe_stop
+from .gate import make_gate_page
 from .history import describe_run, group_releases, make_history_page
 from .league import LEAGUE_COLUMNS, find_creeping, make_league_page, rank_rides
 from .precision import make_precision_page
@@ -17,6 +18,7 @@ __all__ = [
     "find_creeping",
     "group_releases",
     "make_diff_page",
+    "make_gate_page",
     "make_history_page",
     "make_league_page",
     "make_page",

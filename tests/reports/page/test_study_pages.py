@@ -16,11 +16,13 @@ from parsed_page import Parsed, check_static_page
 from velodrome.engines.engine import REFERENCE
 from velodrome.reports.page import (
     make_diff_page,
+    make_gate_page,
     make_history_page,
     make_league_page,
     make_precision_page,
     make_ride_pair_page,
 )
+from velodrome.reports.page.gate import SIGNS
 from velodrome.reports.page.tables import format_after_upright
 from velodrome.reports.page.timelines import TimeAxis, draw_over_time
 
@@ -198,10 +200,57 @@ def test_a_precision_page_tells_who_comes_closest_and_the_orders() -> None:
     assert not check_static_page(make_precision_page(empty), HOSTILE).all("figure")
 
 
+# The gate.
+
+
+def gate_verdicts() -> list[dict[str, Any]]:
+    def verdict(engine: str, quantity: str, status: str, value: float | None = 1.0) -> dict[str, Any]:
+        numbers = {"value": value, "baseline": 1.0, "limit": 0.5} if value is not None else {}
+        found = {"scenario": HOSTILE, "engine": engine, "quantity": quantity, "status": status, "reason": HOSTILE}
+        found |= {"passes": status in ("holds", "better", "shown")}
+        return found | dict.fromkeys(("value", "baseline", "limit")) | numbers
+
+    return [
+        verdict("one", "settings", "holds", None),
+        verdict("one", "position_error", "holds", 1.25),
+        verdict("one", "max_slip", "better", 0.25),
+        verdict("one", "cpu_ratio", "shown"),
+        verdict("two", "position_error", "worse", 3.0),
+        verdict("two", "max_slip", "changed", 2.0),
+        verdict(HOSTILE, "run", "missing", None),
+        verdict("new", "run", "new", None),
+    ]
+
+
+def gate_page() -> str:
+    verdicts = gate_verdicts()
+    told = [row for row in verdicts if row["status"] not in ("holds", "shown") or row["quantity"] == "settings"]
+    return make_gate_page("fails", HOSTILE, verdicts, told, {HOSTILE: HOSTILE}, MACHINE["libraries"])
+
+
+def test_the_gates_page_puts_the_worst_first() -> None:
+    parsed = check_static_page(gate_page(), HOSTILE)
+    assert {verdict["status"] for verdict in gate_verdicts()} == set(SIGNS)
+    marks = [text.split()[0] for attrs, text in parsed.all("li") if attrs.get("class") in ("short", "remark", "holds")]
+    assert marks == ["✗", "✗", "≠", "•", "+", "!", "–"]
+    cells = [text for _, text in parsed.all("td")]
+    assert "✗worseposition error 4" in cells  # of the engine; it moved by 2 against a limit of 0.5
+    assert "+improvedmax slip 1.5" in cells
+    table = cells[cells.index("run") :]  # the worst of all quantities is the one that is missing
+    assert [row[-1] for row in zip(*[iter(table)] * 6, strict=False)][:4] == [
+        "✗ missing",
+        "✗ worse",
+        "≠ changed",
+        "• new",
+    ]
+    assert "settings" not in cells
+
+
 # All of the family, in a browser.
 
 PAGES: dict[str, Callable[[], str]] = {
     "diff": diff_page,
+    "gate": gate_page,
     "precision": lambda: make_precision_page(precision_document()),
     "league": lambda: make_league_page(test_league_page.document()),
     "history": lambda: make_history_page(test_history_page.document()),
