@@ -9,6 +9,7 @@ from .league import LEAGUE_COLUMNS, find_creeping, make_league_page, rank_rides
 from .precision import make_precision_page
 from .ride_pair import make_ride_pair_page
 from .run_diff import make_diff_page
+from .sweep import make_sweep_page
 
 __all__ = [
     "LEAGUE_COLUMNS",
@@ -24,5 +25,6 @@ __all__ = [
     "make_page",
     "make_precision_page",
     "make_ride_pair_page",
+    "make_sweep_page",
     "rank_rides",
 ]

@@ -21,10 +21,11 @@ from velodrome.reports.page import (
     make_league_page,
     make_precision_page,
     make_ride_pair_page,
+    make_sweep_page,
 )
 from velodrome.reports.page.gate import SIGNS
 from velodrome.reports.page.tables import format_after_upright
-from velodrome.reports.page.timelines import TimeAxis, draw_over_time
+from velodrome.reports.page.timelines import LinearAxis, draw_over_time, draw_over_values
 
 HOSTILE = "<script>alert(1)</script>"
 MACHINE = {"libraries": {"velodrome": "0.1.0", HOSTILE: HOSTILE}, "platform": {"system": HOSTILE}}
@@ -132,7 +133,7 @@ def test_sizes_over_time_follow_the_rides_that_stay_up() -> None:
 
 @pytest.mark.parametrize("end", [1e-3, 0.7, 1.0, 5.0, 20.0, 333.0])
 def test_a_time_axis_has_a_few_round_times(end: float) -> None:
-    ticks = TimeAxis(end).ticks
+    ticks = LinearAxis(0.0, end).ticks
     assert 3 <= len(ticks) <= 8
     assert all(0 <= tick["at"] <= 100 for tick in ticks)
     assert ticks[0]["text"] == "0"
@@ -246,12 +247,71 @@ def test_the_gates_page_puts_the_worst_first() -> None:
     assert "settings" not in cells
 
 
+# A sweep.
+
+
+def sweep_document() -> dict[str, Any]:
+    def entry(median: float | None, worst: float | None, **rows: int) -> dict[str, Any]:
+        error = None if median is None else {"median": median, "worst": worst}
+        return {"rows": rows, "position_error": error, "rows_per_second": 2.0, "reasons": []}
+
+    return {
+        "sweep": HOSTILE,
+        "title": HOSTILE,
+        "folder": HOSTILE,
+        "tasks": 30,
+        "missing": 0,
+        "complete": True,
+        "stopped": None,
+        "engines": {
+            REFERENCE: entry(None, None, done=10),
+            "near": entry(1e-6, 2e-6, done=10),
+            "far": entry(1e-2, 7.0, done=6, fell=4) | {"reasons": [f"failed: {HOSTILE}"]},
+        },
+    }
+
+
+def sweep_page() -> str:
+    values = np.array([0.0, 1.0, 2.0])
+    errors = {
+        HOSTILE: {"near": (values, np.array([1e-6, 2e-6, 1e-6])), "far": (values, np.array([1e-2, 2e-2, 1e-2]))},
+        "step": {"near": (np.array([1e-4, 1e-2]), np.array([1e-8, 1e-4]))},
+        "alone": {"near": (np.array([1.0]), np.array([1e-8]))},
+    }
+    return make_sweep_page(sweep_document(), errors, MACHINE["libraries"])
+
+
+def test_a_sweeps_page_tells_who_drifts_and_what_fell() -> None:
+    parsed = check_static_page(sweep_page(), HOSTILE)
+    (headline,) = [text for attrs, text in parsed.all("p") if attrs.get("class") == "headline"]
+    assert headline == (
+        "far drifts most: 0.01 m from the reference in half of its rides. near stays closest: 1e-06 m. "
+        "far: 4 fell of 10."
+    )
+    assert len(parsed.all("figure")) == 2  # a parameter with one value has none
+    assert f"✗ far: failed: {HOSTILE}" in [text for _, text in parsed.all("li")]
+
+
+def test_values_of_two_decades_have_a_logarithmic_axis() -> None:
+    sizes = np.array([1e-8, 1e-6, 1e-4])
+    linear = draw_over_values({"a": (np.array([-1.0, 0.0, 1.0]), sizes)}, ["a"])
+    decades = draw_over_values({"a": (np.array([1e-4, 1e-3, 1e-2]), sizes)}, ["a"])
+    assert linear is not None
+    assert decades is not None
+    assert [tick["text"] for tick in linear["x"]] == ["-1", "-0.5", "0", "0.5", "1"]
+    assert [tick["power"] for tick in decades["x"]] == [-4, -3, -2]
+    assert [x for x, _ in linear["lines"][0]["marks"]] == [x for x, _ in decades["lines"][0]["marks"]] == [0, 50, 100]
+    assert draw_over_values({"a": (np.array([1.0, 1.0]), sizes[:2])}, ["a"]) is None
+    assert draw_over_values({}, []) is None
+
+
 # All of the family, in a browser.
 
 PAGES: dict[str, Callable[[], str]] = {
     "diff": diff_page,
     "gate": gate_page,
     "precision": lambda: make_precision_page(precision_document()),
+    "sweep": sweep_page,
     "league": lambda: make_league_page(test_league_page.document()),
     "history": lambda: make_history_page(test_history_page.document()),
     "pair": lambda: make_ride_pair_page(test_history_page.pair(), "../history.html"),
