@@ -7,12 +7,15 @@ from velodrome.reports.measure import QUANTITIES
 
 
 def describe_metrics() -> str:
-    """Markdown of every key of ``metrics.json``."""
+    """Markdown of every key of ``metrics.json``, each with the anchor that report pages link to."""
     lines = []
     for name, quantity in QUANTITIES.items():
         unit = f" [{quantity.unit}]" if quantity.unit else ""
         parts = ", ".join(f"`{part}`" for part in quantity.parts)
-        lines += [f"`{name}`{unit}", f": {quantity.meaning}" + (f" An object with {parts}." if parts else "")]
+        lines += [
+            f'<span id="metric-{name}"></span>`{name}`{unit}',
+            f": {quantity.meaning}" + (f" An object with {parts}." if parts else ""),
+        ]
         if quantity.absent:
             lines.append(f": Null {quantity.absent}.")
         lines.append("")

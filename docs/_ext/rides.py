@@ -1,13 +1,13 @@
-"""The report page of the ride that the site shows, copied into the site."""
+"""The report page of the ride that the site shows, with links into the site."""
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from typing import Any
 
 from executed import run_commands
 from sphinx.application import Sphinx
+from velodrome.scenarios.view import stored_page
 
 RIDE = "velodrome run q2-plus --out runs"
 
@@ -18,12 +18,13 @@ def run_folder() -> Path:
     return found
 
 
-def _copy_report(app: Sphinx, exception: Exception | None) -> None:
+def _write_report(app: Sphinx, exception: Exception | None) -> None:
     if exception is None and app.builder.format == "html":
-        shutil.copy(run_folder() / "report.html", Path(app.outdir) / "_static" / "report.html")
+        page = stored_page(run_folder(), docs="..")
+        (Path(app.outdir) / "_static" / "report.html").write_text(page, encoding="utf-8")
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Copy the report when the pages are written."""
-    app.connect("build-finished", _copy_report)
+    """Write the report when the pages are written."""
+    app.connect("build-finished", _write_report)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,20 +1,30 @@
-"""The report of a run, and the pages of a league and of a history, as self-contained HTML."""
+"""The report of a run, and the pages of studies, each a self-contained HTML document."""
 
 from .anchors import AnchorNames
 from .document import make_page
+from .findings import describe_stop
+from .gate import make_gate_page
 from .history import describe_run, group_releases, make_history_page
 from .league import LEAGUE_COLUMNS, find_creeping, make_league_page, rank_rides
+from .precision import make_precision_page
 from .ride_pair import make_ride_pair_page
+from .run_diff import make_diff_page
+from .sweep import make_sweep_page
 
 __all__ = [
     "LEAGUE_COLUMNS",
     "AnchorNames",
     "describe_run",
+    "describe_stop",
     "find_creeping",
     "group_releases",
+    "make_diff_page",
+    "make_gate_page",
     "make_history_page",
     "make_league_page",
     "make_page",
+    "make_precision_page",
     "make_ride_pair_page",
+    "make_sweep_page",
     "rank_rides",
 ]

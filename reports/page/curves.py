@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..drawing import PLOTS, RADIUS, Plot, RideData, drawable_values
+from ...engines.engine import REFERENCE
+from ..drawing import ERROR, PLOTS, RADIUS, SMALLEST_SIZE, Plot, RideData
 
 MOST_CURVE_POINTS = 1000  # largest number of points of a curve, about the number of pixels across
 ALL_CURVE_POINTS = 40_000  # largest number of points of all curves together: less than a megabyte of the page
@@ -30,6 +31,8 @@ class Panel:
         A sentence or two on what is drawn and how to read it.
     log : bool
         Whether the plot's values are decimal logarithms, to be read on a logarithmic axis.
+    metric : str or None
+        Key of the metric that condenses these values, whose definition the page and the documentation have.
     """
 
     key: str
@@ -37,6 +40,7 @@ class Panel:
     unit: str
     meaning: str
     log: bool = False
+    metric: str | None = None
 
     @property
     def plot(self) -> Plot:
@@ -44,20 +48,23 @@ class Panel:
         return next(plot for plot in PLOTS if plot.key == self.key)
 
 
-_ROUND_OFF = "Sizes below 1e-16 are not drawn."
+_ROUND_OFF = f"Sizes up to {SMALLEST_SIZE:g} are too small to be drawn."
+
+ERROR_PANEL = Panel(
+    "log_position_error",
+    "Position error",
+    "m",
+    "Distance of the point D on the steering axis from the reference's, at the same time. On this axis exponential "
+    f"growth is a straight line. {_ROUND_OFF}",
+    True,
+    "position_error",
+)
 
 GROUPS: tuple[tuple[str, tuple[Panel, ...]], ...] = (
     (
         "Error and energy",
         (
-            Panel(
-                "log_position_error",
-                "Position error",
-                "m",
-                "Distance of the point D on the steering axis from the reference's, at the same time. On this axis "
-                f"exponential growth is a straight line. {_ROUND_OFF}",
-                True,
-            ),
+            ERROR_PANEL,
             Panel(
                 "log_energy_change",
                 "Energy change",
@@ -65,6 +72,7 @@ GROUPS: tuple[tuple[str, tuple[Panel, ...]], ...] = (
                 "Size of the change of kinetic and potential energy since the start, less the work of the inputs, "
                 f"relative to the start's: whatever is seen is the engine's own. {_ROUND_OFF}",
                 True,
+                "energy_drift",
             ),
         ),
     ),
@@ -73,8 +81,20 @@ GROUPS: tuple[tuple[str, tuple[Panel, ...]], ...] = (
         (
             Panel("lean", "Lean", "rad", "Lean of the rear frame, positive to the right."),
             Panel("steer", "Steer", "rad", "Turn of the front frame about the steering axis, positive to the left."),
-            Panel("rear_rate", "Rear-wheel rate", "rad/s", "Rate of the rear wheel's turning, positive forward."),
-            Panel("radius", "Radius", "m", "Distance of D from the bowl's axis: constant on an undisturbed circle."),
+            Panel(
+                "rear_rate",
+                "Rear-wheel rate",
+                "rad/s",
+                "Rate of the rear wheel's turning, positive forward.",
+                metric="rear_rate_error",
+            ),
+            Panel(
+                "radius",
+                "Radius",
+                "m",
+                "Distance of D from the bowl's axis: constant on an undisturbed circle.",
+                metric="radius_drift_rate",
+            ),
         ),
     ),
     (
@@ -85,12 +105,14 @@ GROUPS: tuple[tuple[str, tuple[Panel, ...]], ...] = (
                 "Normal force, rear",
                 "N",
                 "Force of the ground on the rear wheel along the normal. Below zero the ground would have to pull.",
+                metric="min_normal_force",
             ),
             Panel(
                 "front_normal_force",
                 "Normal force, front",
                 "N",
                 "Force of the ground on the front wheel along the normal. Below zero the ground would have to pull.",
+                metric="min_normal_force",
             ),
             Panel(
                 "rear_log_slip",
@@ -98,6 +120,7 @@ GROUPS: tuple[tuple[str, tuple[Panel, ...]], ...] = (
                 "m/s",
                 f"Speed of the rear wheel's material at its contact point: zero for a wheel that rolls. {_ROUND_OFF}",
                 True,
+                "max_slip",
             ),
             Panel(
                 "front_log_slip",
@@ -105,6 +128,7 @@ GROUPS: tuple[tuple[str, tuple[Panel, ...]], ...] = (
                 "m/s",
                 f"Speed of the front wheel's material at its contact point: zero for a wheel that rolls. {_ROUND_OFF}",
                 True,
+                "max_slip",
             ),
             Panel(
                 "rear_log_gap",
@@ -112,6 +136,7 @@ GROUPS: tuple[tuple[str, tuple[Panel, ...]], ...] = (
                 "m",
                 f"Size of the distance of the rear wheel's rim from the ground: zero for a contact. {_ROUND_OFF}",
                 True,
+                "max_gap",
             ),
             Panel(
                 "front_log_gap",
@@ -119,6 +144,7 @@ GROUPS: tuple[tuple[str, tuple[Panel, ...]], ...] = (
                 "m",
                 f"Size of the distance of the front wheel's rim from the ground: zero for a contact. {_ROUND_OFF}",
                 True,
+                "max_gap",
             ),
         ),
     ),
@@ -174,6 +200,11 @@ def round_values(value: float, digits: int = _DIGITS) -> float:
     return float(f"{value:.{digits}g}")
 
 
+# Why an engine has no curve in a figure.
+NOT_GIVEN, NOT_FINITE, THE_MEASURE = "not given", "not finite", "the measure itself"
+TOO_SMALL = f"at most {SMALLEST_SIZE:g}"
+
+
 @dataclass(frozen=True)
 class DrawnCurve:
     """A panel with its values.
@@ -185,11 +216,14 @@ class DrawnCurve:
         Points by engine, as returned by `make_curve`.
     extremes : dict
         Smallest, largest and last value of all samples, by engine.
+    absent : dict
+        Why an engine has no curve, by engine: `NOT_GIVEN`, `NOT_FINITE`, `TOO_SMALL` or `THE_MEASURE`.
     """
 
     panel: Panel
     curves: dict[str, dict[str, list[float | None]]]
     extremes: dict[str, tuple[float, float, float]]
+    absent: dict[str, str]
 
 
 def draw_curves(ride: RideData, circular: bool) -> list[tuple[str, list[DrawnCurve]]]:
@@ -207,21 +241,37 @@ def draw_curves(ride: RideData, circular: bool) -> list[tuple[str, list[DrawnCur
         Title of the group and its panels; groups without a panel are omitted.
     """
     found = [
-        (title, panel, drawable_values(ride, panel.plot))
+        (title, panel, *_select_drawable(ride, panel))
         for title, panels in GROUPS
         for panel in panels
         if circular or panel.key != RADIUS.key
     ]
-    count = sum(len(values) for _, _, values in found)
+    count = sum(len(values) for _, _, values, _ in found)
     most = max(4, min(MOST_CURVE_POINTS, ALL_CURVE_POINTS // max(1, count)))
     groups: dict[str, list[DrawnCurve]] = {}
-    for title, panel, values in found:
+    for title, panel, values, absent in found:
         if not values:
             continue
         curves = {name: make_curve(ride.trajectories[name].time, series, most) for name, series in values.items()}
         extremes = {name: _find_extremes(series, panel.log) for name, series in values.items()}
-        groups.setdefault(title, []).append(DrawnCurve(panel, curves, extremes))
+        groups.setdefault(title, []).append(DrawnCurve(panel, curves, extremes, absent))
     return list(groups.items())
+
+
+def _select_drawable(ride: RideData, panel: Panel) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Return the values of a panel by engine, and why the other engines have none that can be drawn."""
+    values: dict[str, np.ndarray] = {}
+    absent: dict[str, str] = {}
+    for name, run in ride.trajectories.items():
+        series = panel.plot.values(ride, run)
+        if series is None:
+            absent[name] = THE_MEASURE if name == REFERENCE and panel.plot is ERROR else NOT_GIVEN
+        elif np.isfinite(series).any():
+            values[name] = series
+        else:
+            # A finite quantity has no logarithm only where it is too small.
+            absent[name] = TOO_SMALL if panel.log and not run.not_finite() else NOT_FINITE
+    return values, absent
 
 
 def _find_extremes(values: np.ndarray, log: bool) -> tuple[float, float, float]:
@@ -233,14 +283,19 @@ def _find_extremes(values: np.ndarray, log: bool) -> tuple[float, float, float]:
 def panel_data(drawn: DrawnCurve, names: Sequence[str], measured: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Return a panel as JSON for the page's script, with engines by their index in ``names``."""
     marks = []
-    if drawn.panel.key == "log_position_error":
+    if drawn.panel is ERROR_PANEL:
+        # A horizon beyond the ride says nothing of it.
         horizons = {name: measured.get(name, {}).get("horizon") for name in drawn.curves}
-        marks = [{"engine": names.index(name), "t": t} for name, t in horizons.items() if t is not None]
+        ends = {name: points["t"][-1] for name, points in drawn.curves.items()}
+        marks = [
+            {"engine": names.index(name), "t": t} for name, t in horizons.items() if t is not None and t < ends[name]
+        ]
     return {
         "key": drawn.panel.key,
         "log": drawn.panel.log,
         "unit": drawn.panel.unit,
         "span": drawn.panel.plot.span,
         "marks": marks,
+        "absent": {str(names.index(name)): reason for name, reason in drawn.absent.items()},
         "curves": {str(names.index(name)): points for name, points in drawn.curves.items()},
     }

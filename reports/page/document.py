@@ -27,6 +27,8 @@ from ..drawing import (
     rank_engines,
 )
 from . import curves, plan, trust, words
+from .documentation import find_documentation
+from .findings import describe_stop, list_findings, write_headline
 from .ink import choose_mark_shapes, line_dashes, make_css, paper_colour
 
 _PARTS = Path(__file__).parent
@@ -39,6 +41,7 @@ def make_page(
     verdicts: Sequence[Mapping[str, Any]],
     trajectories: Mapping[str, Trajectory],
     surface: Surface,
+    docs: str | None = None,
 ) -> str:
     """Write the report of a run.
 
@@ -55,6 +58,8 @@ def make_page(
     trajectories : mapping of str to Trajectory
         By engine name, in the order of display; may be empty.
     surface : Surface
+    docs : str, optional
+        Address of the documentation, for links; without it that of the package's metadata, if there is one.
 
     Returns
     -------
@@ -66,12 +71,21 @@ def make_page(
     ride = RideData(surface, trajectories, inputs=inputs)
     circular = scenario["motion"].get("kind") != "upright"
     groups = curves.draw_curves(ride, circular) if names else []
-    trails = plan.draw_plan(ride, names) if names else None
+    ends = {name: float(run.time[-1]) for name, run in trajectories.items()}
+    stops = {name: stop for name, values in measured.items() if (stop := describe_stop(values, ends.get(name)))}
+    upright = [name for name in names if name not in stops]
+    trails = plan.draw_plan(ride, names, upright) if names else None
     unsteady = find_unsteadiness(surface, inputs, circular)
     duration, rate = scenario["simulation"]["duration"], manifest["start"]["growth_rate"]
-    ends = {name: float(run.time[-1]) for name, run in trajectories.items()}
+    panels = [curves.panel_data(drawn, names, measured) for _, group in groups for drawn in group]
     return load_template("page.html").render(
         _result_values(measured, rate, duration, ends),
+        headline=words.keep_whole(write_headline(measured, ride, rate, duration), measured),
+        findings=list_findings(measured, ride, duration),
+        stops=stops,
+        error_key=curves.ERROR_PANEL.key,
+        docs=docs or find_documentation(),
+        own_steps=words.describe_own_steps(manifest["engines"], duration),
         manifest=manifest,
         facts=words.list_facts(manifest, scenario),
         stability=describe_stability(rate, unsteady),
@@ -87,7 +101,8 @@ def make_page(
         data={
             "duration": max(ends.values(), default=duration),
             "engines": names,
-            "panels": [curves.panel_data(drawn, names, measured) for _, group in groups for drawn in group],
+            "stops": {str(names.index(name)): stop for name, stop in stops.items() if name in names},
+            "panels": panels,
             "plan": trails,
         },
         style=Markup(read_part("page.css")),
@@ -100,16 +115,19 @@ def _result_values(
     measured: Mapping[str, Mapping[str, Any]], growth_rate: float, duration: float, ends: Mapping[str, float]
 ) -> dict[str, Any]:
     """Return what the template shows of the metrics; ``ends`` are the times of the engines' last samples [s]."""
+    horizons_shown = any(
+        values.get("horizon") is not None and values["horizon"] < ends.get(name, duration)
+        for name, values in measured.items()
+    )
     return {
         "columns": COLUMNS,
-        "meanings": trust.COLUMN_MEANINGS,
-        "horizon_meaning": trust.HORIZON,
-        "rows": _format_rows(measured),
+        "meanings": trust.list_meanings(horizons_shown),
+        "horizons_shown": horizons_shown,
+        "rows": _format_rows(measured, horizons_shown),
         "trust": {
             name: trust.explain_columns(name, values, growth_rate, duration, ends.get(name))
             for name, values in measured.items()
         },
-        "fallen": [name for name, values in measured.items() if values.get("fell_at") is not None],
         "remarks": [line for name in rank_engines(measured) for line in make_remarks(name, measured[name], duration)],
     }
 
@@ -154,8 +172,10 @@ def list_engine_styles(names: list[str]) -> list[dict[str, str]]:
     ]
 
 
-def _format_rows(measured: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
-    """Format the table of a run with the horizon as its last column."""
+def _format_rows(measured: Mapping[str, Mapping[str, Any]], horizons_shown: bool) -> dict[str, list[str]]:
+    """Format the table of a run, with the horizon as its last column where it is shown."""
     table = format_table(measured)
+    if not horizons_shown:
+        return table
     horizons = format_numbers([measured[name].get("horizon") for name in table], 3)
     return {name: [*cells, horizon] for (name, cells), horizon in zip(table.items(), horizons, strict=True)}

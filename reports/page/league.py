@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime
 from typing import Any
 
 from markupsafe import Markup
@@ -183,7 +182,7 @@ def _list_facts(document: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("Scenarios", ", ".join(document["scenarios"])),
         ("Steps", f"that of the settings, halved {document['levels'] - 1} times"),
         ("Settings", "the engines' defaults" if file is None else f"the engines' defaults, replaced by {file}"),
-        ("Run on", f"{datetime.fromisoformat(document['created']):%Y-%m-%d, %H:%M:%S %Z}"),
+        ("Run on", words.describe_date(document["created"])),
         ("State", "complete" if document["complete"] else "interrupted: the finished rides are shown"),
     ]
 
@@ -214,7 +213,7 @@ def _make_section(document: Mapping[str, Any], scenario: str, names: list[str]) 
             },
             names,
         ),
-        "creep": draw_loglog(creeping, names, law),
+        "creep": draw_loglog(creeping, names, law, "1 / b = step"),
         "slip": {
             kind: [name for name, ride in rides if name != REFERENCE and classify_slip(ride) == kind]
             for kind in ("rolls", "slides")

@@ -14,6 +14,7 @@ from .curves import round_values
 
 _MOST_LABELS = 8  # on an axis; further powers of ten have lines of the grid without a label
 _DIGITS = 5
+_TURN = 9  # length of the dashes of lines that lie on one another [pixels]
 _ALIKE = 1.0  # per cent of an axis: points closer than this are covered by one another's marks
 
 Points = Sequence[tuple[float, float]]
@@ -47,7 +48,9 @@ def fit_axis(values: Sequence[float]) -> DecadeAxis:
     return DecadeAxis(low, high if high > low else low + 1)
 
 
-def draw_loglog(series: Mapping[str, Points], names: Sequence[str], guide: Points = ()) -> dict[str, Any] | None:
+def draw_loglog(
+    series: Mapping[str, Points], names: Sequence[str], guide: Points = (), guide_text: str = ""
+) -> dict[str, Any] | None:
     """Place the points of engines on two logarithmic axes.
 
     Parameters
@@ -58,12 +61,15 @@ def draw_loglog(series: Mapping[str, Points], names: Sequence[str], guide: Point
         Engines in the order of the page's colours.
     guide : sequence of (float, float)
         A further line, such as a law; its ends are cut to the axes of the points.
+    guide_text : str
+        Name of that line.
 
     Returns
     -------
     dict or None
-        ``x`` and ``y`` ticks; ``lines`` with ``engine`` (index), ``path`` (SVG, y down) and ``marks``; ``guide``, an
-        SVG path or None; ``coinciding``, groups of engines whose marks cover each other. None without a point.
+        ``x`` and ``y`` ticks; ``lines`` as `make_line` returns them; ``guide``, an SVG path or None, and its
+        ``guide_text``; ``coinciding``, groups of engines whose marks cover each other; ``marked``, True. None without a
+        point.
     """
     kept = {
         name: [(x, y) for x, y in points if x > 0 and y > 0 and math.isfinite(x) and math.isfinite(y)]
@@ -82,16 +88,45 @@ def draw_loglog(series: Mapping[str, Points], names: Sequence[str], guide: Point
     return {
         "x": across.ticks,
         "y": up.ticks,
-        "lines": [
-            {"engine": names.index(name), "path": _write_path(places), "marks": places}
-            for name, places in marks.items()
-        ],
+        "lines": [make_line(names.index(name), _write_path(places), places) for name, places in marks.items()],
         "guide": _write_path(trace(guide)) if guide else None,
-        "coinciding": _find_coinciding(marks),
+        "guide_text": guide_text,
+        "coinciding": find_coinciding(marks),
+        "marked": True,
     }
 
 
-def _find_coinciding(marks: Mapping[str, Points]) -> list[list[str]]:
+def make_line(
+    engine: int, path: str, marks: Points, stopped: str | None = None, turn: tuple[int, int] = (0, 1)
+) -> dict[str, Any]:
+    """Return a line for the macro ``plot`` of charts.html.
+
+    Parameters
+    ----------
+    engine : int
+        Index of the engine.
+    path : str
+        SVG path, y down.
+    marks : sequence of (float, float)
+        Places of its points [per cent], y down; the last one is where it stops.
+    stopped : str, optional
+        How the ride ended before its time, which is marked.
+    turn : (int, int)
+        Its number and the size of the group of lines that lie on one another: they are drawn in turns.
+    """
+    number, size = turn
+    turns = f"{_TURN} {_TURN * (size - 1)}" if size > 1 else None
+    return {
+        "engine": engine,
+        "path": path,
+        "marks": marks,
+        "stopped": stopped,
+        "turns": turns,
+        "offset": -_TURN * number,
+    }
+
+
+def find_coinciding(marks: Mapping[str, Points]) -> list[list[str]]:
     """Return groups of engines whose marks all lie at those of the group's first."""
     groups: list[list[str]] = []
     for name, places in marks.items():

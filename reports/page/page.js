@@ -23,9 +23,62 @@
   const swatches = [...document.querySelectorAll(".legend .swatch")];
   const dashes = swatches.map((swatch) => swatch.querySelector("line").getAttribute("stroke-dasharray"));
   const isReference = (engine) => data.engines[engine] === "reference";
-  // Where curves lie on one another the reference shows as a band under them.
-  const line = (engine, d, band) =>
-    draw("path", { d, stroke: ink(engine), "stroke-width": band && isReference(engine) ? 3.2 : 1.6, "stroke-dasharray": dashes[engine] });
+  const stop = (engine) => data.stops[engine];
+
+  // Where curves lie on one another the reference shows as a band under them, and the others take turns: each is drawn
+  // in dashes that leave room for the rest of its group.
+  const TURN = 9;
+  function line(engine, d, groups) {
+    const others = (groups.find((group) => group.includes(engine)) || []).filter((other) => !isReference(other));
+    const style = { d, stroke: ink(engine), "stroke-width": isReference(engine) ? 3.6 : 1.6, "stroke-dasharray": dashes[engine] };
+    if (!isReference(engine) && others.length > 1) {
+      style["stroke-dasharray"] = `${TURN} ${TURN * (others.length - 1)}`;
+      style["stroke-dashoffset"] = -TURN * others.indexOf(engine);
+    }
+    return draw("path", style);
+  }
+
+  // The value at a time by straight lines between the samples; null in a gap and beyond the ends.
+  function valueAt(t, times, values) {
+    let low = 0, high = times.length - 1;
+    if (t < times[0] || t > times[high]) return null;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (times[middle] <= t) low = middle; else high = middle;
+    }
+    if (values[low] === null || values[high] === null) return null;
+    const length = times[high] - times[low];
+    return length ? values[low] + ((values[high] - values[low]) * (t - times[low])) / length : values[low];
+  }
+
+  // Whether every sample of a curve lies on another one, but for a distance that no reader sees.
+  const PROBES = 200;
+  function follows(curve, other, parts, near) {
+    const every = Math.max(1, Math.floor(curve.t.length / PROBES));
+    for (let k = 0; k < curve.t.length; k += every) {
+      for (const part of parts) {
+        const value = curve[part][k];
+        const there = valueAt(curve.t[k], other.t, other[part]);
+        if ((value === null) !== (there === null) || Math.abs(value - there) > near) return false;
+      }
+    }
+    return true;
+  }
+
+  // Groups of engines whose curves lie on one another; what fell or ended early is in none.
+  function findGroups(curves, parts, near) {
+    const groups = [];
+    for (const [key, curve] of Object.entries(curves)) {
+      const engine = Number(key);
+      if (hidden.has(engine) || stop(engine) || !curve.t.length) continue;
+      const group = groups.find(([first]) => follows(curve, curves[first], parts, near) && follows(curves[first], curve, parts, near));
+      if (group) group.push(engine); else groups.push([engine]);
+    }
+    return groups.filter((group) => group.length > 1);
+  }
+
+  const describeGroups = (groups) =>
+    groups.map((group) => `On one another: ${group.map((engine) => data.engines[engine]).join(", ")}.`).join(" ");
   const minus = (text) => text.replace("-", "\u2212");
 
   // The index of the sample nearest to a time; times rise, and a null value is a gap.
@@ -48,10 +101,13 @@
   }
   const decimals = (step) => Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
 
+  // The axis follows the engines that stay up, and the others only where they are alone.
   function range(panel) {
     let low = Infinity, high = -Infinity;
-    for (const [engine, curve] of Object.entries(panel.curves)) {
-      if (hidden.has(Number(engine))) continue;
+    const seen = Object.keys(panel.curves).map(Number).filter((engine) => !hidden.has(engine));
+    const upright = seen.filter((engine) => !stop(engine));
+    for (const engine of upright.length ? upright : seen) {
+      const curve = panel.curves[engine];
       for (const value of curve.v) {
         if (value === null) continue;
         if (value < low) low = value;
@@ -99,9 +155,12 @@
       return d;
     };
     const cursor = draw("path", { class: "cursor" });
+    let groups = [];
 
     function paint() {
       [low, high] = range(panel);
+      groups = findGroups(panel.curves, ["v"], 0.01 * (high - low));
+      figure.querySelector(".together").textContent = describeGroups(groups);
       const svg = draw("svg", { viewBox: "0 0 100 100", preserveAspectRatio: "none" });
       const labels = [];
       for (const [value, text] of ticks(panel, low, high)) {
@@ -112,7 +171,12 @@
       for (const t of marks) labels.push(make("span", { class: "tick x", style: `left:${px(t)}%` }, t.toFixed(decimals(step))));
       labels.push(make("span", { class: "tick name" }, "time [s]"));
       for (const [engine, curve] of Object.entries(panel.curves)) {
-        if (!hidden.has(Number(engine))) svg.append(line(engine, path(curve), !panel.log));
+        if (hidden.has(Number(engine))) continue;
+        svg.append(line(Number(engine), path(curve), groups));
+        const last = curve.t.length - 1;
+        if (!stop(engine) || curve.v[last] === null) continue;
+        const top = Math.min(100, Math.max(0, py(curve.v[last])));
+        labels.push(make("span", { class: "stop", style: `left:${px(curve.t[last])}%;top:${top}%;color:${ink(engine)}`, title: `${data.engines[engine]} ${stop(engine)}` }, "\u2715"));
       }
       for (const mark of panel.marks) {
         if (hidden.has(mark.engine) || mark.t > end) continue;
@@ -123,24 +187,35 @@
       point();
     }
 
+    // What an engine has at the chosen time: a place on its curve, or the reason why there is none.
+    function read(engine) {
+      const curve = panel.curves[engine];
+      if (!curve) return { reason: panel.absent[engine] };
+      const k = nearest(curve, now);
+      const over = now > curve.t[curve.t.length - 1] + 1e-9;
+      if (over && stop(engine)) return { reason: `\u2715 ${stop(engine)}` };
+      if (over || curve.v[k] === null) return { reason: panel.log ? "too small to draw" : "no value" };
+      return { t: curve.t[k], value: curve.v[k] };
+    }
+
     function point() {
       cursor.setAttribute("d", `M${px(now)} 0V100`);
       plot.querySelectorAll(".dot").forEach((dot) => dot.remove());
       const items = [];
-      for (const [engine, curve] of Object.entries(panel.curves)) {
-        if (hidden.has(Number(engine))) continue;
-        const item = make("li", {}, swatches[engine].cloneNode(true), `${data.engines[engine]} `);
-        const k = nearest(curve, now);
-        // A run that ended early has nothing to say of later times.
-        const over = now > curve.t[curve.t.length - 1] + 1e-9;
-        if (over || curve.v[k] === null) {
-          item.append("–");
-        } else {
-          item.append(shown(panel, curve.v[k]));
-          plot.append(make("span", { class: "dot", style: `left:${px(curve.t[k])}%;top:${py(curve.v[k])}%;background:${ink(engine)}` }));
-        }
-        items.push(item);
-      }
+      const listed = new Set();
+      data.engines.forEach((_, engine) => {
+        if (hidden.has(engine) || listed.has(engine)) return;
+        const group = groups.find((each) => each.includes(engine)) || [engine];
+        group.forEach((each) => listed.add(each));
+        const found = group.map(read);
+        const texts = [...new Set(found.map((one) => one.reason || shown(panel, one.value)))];
+        const names = group.map((each) => data.engines[each]).join(" = ");
+        items.push(make("li", {}, ...group.map((each) => swatches[each].cloneNode(true)), `${names} ${texts.join(" / ")}`));
+        found.forEach((one, k) => {
+          if (one.reason || one.value < low || one.value > high) return;
+          plot.append(make("span", { class: "dot", style: `left:${px(one.t)}%;top:${py(one.value)}%;background:${ink(group[k])}` }));
+        });
+      });
       readout.replaceChildren(...items);
     }
 
@@ -159,23 +234,35 @@
     const margin = 0.02 * Math.max(width, height), size = Math.max(width, height);
     const polyline = (points) => "M" + points.map(([a, b]) => `${a} ${-b}`).join("L");
     const dots = draw("g", {});
+    const together = figure.querySelector(".together");
+
+    // At its place, or at the edge nearest to it.
+    function cross(a, b, colour) {
+      const arm = 0.02 * size;
+      const u = Math.min(x + width - arm, Math.max(x + arm, a)), v = Math.min(-y - arm, Math.max(-y - height + arm, b));
+      return draw("path", { class: "stop", stroke: colour, d: `M${u - arm} ${v - arm}l${2 * arm} ${2 * arm}m0 ${-2 * arm}l${-2 * arm} ${2 * arm}` });
+    }
 
     function paint() {
+      const crosses = draw("g", {});
       const box = [x - margin, -y - height - margin, width + 2 * margin, height + 5 * margin];
       const svg = draw("svg", { viewBox: box.join(" ") });
       svg.append(draw("path", { class: "edge", style: "fill:var(--raised)", d: `${polyline(plan.edge)}Z` }));
       for (const points of plan.lines) svg.append(draw("path", { class: "ground", d: polyline(points) }));
+      const groups = findGroups(plan.trails, ["x", "y"], 0.01 * size);
+      together.textContent = describeGroups(groups);
       for (const [engine, trail] of Object.entries(plan.trails)) {
         if (hidden.has(Number(engine)) || !trail.t.length) continue;
-        svg.append(line(engine, polyline(trail.x.map((a, k) => [a, trail.y[k]])), true));
+        svg.append(line(Number(engine), polyline(trail.x.map((a, k) => [a, trail.y[k]])), groups));
         svg.append(draw("circle", { cx: trail.x[0], cy: -trail.y[0], r: 0.013 * size, fill: "none", stroke: ink(engine), "stroke-width": 0.004 * size }));
+        if (stop(engine)) crosses.append(cross(trail.x.at(-1), -trail.y.at(-1), ink(engine)));
       }
-      const { step } = steps(0, width, 5);
+      const { step } = steps(0, width, 4);
       const foot = -y + 1.2 * margin;
       svg.append(draw("path", { class: "cursor", d: `M${x} ${foot}v${margin / 2}h${step}v${-margin / 2}` }));
-      const text = draw("text", { x: x + step + margin / 2, y: foot + margin, "font-size": 0.026 * size });
+      const text = draw("text", { x: x + step + margin / 2, y: foot + margin * 0.8, "font-size": 0.045 * size });
       text.textContent = `${step} m`;
-      svg.append(text, dots);
+      svg.append(text, dots, crosses);
       map.replaceChildren(svg);
       point();
     }

@@ -13,6 +13,8 @@ from .curves import round_values
 
 MOST_TRAIL_POINTS = 1200  # largest number of points of a trail: about a hundred a turn
 ALL_TRAIL_POINTS = 12_000  # largest number of points of all trails together: a quarter of a megabyte of the page
+_MARGIN = 0.08  # around the trails, relative to their longer side
+_SHORTEST_SIDE = 0.3  # relative to the longer one: a straight ride has ground beside it
 _DIGITS = 5  # significant digits: a millimetre in a hundred metres
 
 
@@ -21,7 +23,7 @@ def draw_trail(run: Trajectory) -> np.ndarray:
     return run.q[:, :2] if run.contact_point is None else run.contact_point[:, 0, :2]
 
 
-def draw_plan(ride: RideData, names: Sequence[str]) -> dict[str, Any] | None:
+def draw_plan(ride: RideData, names: Sequence[str], ruling: Sequence[str]) -> dict[str, Any] | None:
     """Return trails and the ground's lines as JSON for the page's script; None where there is nothing to draw.
 
     Parameters
@@ -29,22 +31,26 @@ def draw_plan(ride: RideData, names: Sequence[str]) -> dict[str, Any] | None:
     ride : RideData
     names : sequence of str
         Engines; the key of a trail is the index of its engine.
+    ruling : sequence of str
+        Engines whose trails the part to show holds; trails of others may leave it. All where these have none.
 
     Returns
     -------
     dict or None
         ``edge`` and ``lines`` as lists of [x, y]; ``trails`` as ``{t, x, y}`` by engine; ``box`` as
-        [x, y, width, height], the part to show, y up [m].
+        [x, y, width, height], the part to show, y up [m], which the ground may exceed.
     """
     paths = {name: draw_trail(run) for name, run in ride.trajectories.items()}
-    places = [path[np.isfinite(path).all(axis=1)] for path in paths.values()]
-    if not any(len(path) for path in places):
+    places = {name: path[np.isfinite(path).all(axis=1)] for name, path in paths.items()}
+    shown = [places[name] for name in ruling if len(places[name])] or [path for path in places.values() if len(path)]
+    if not shown:
         return None
-    ground = make_ground(ride.surface, np.concatenate(places))
-    low, high = ground.edge[:, :2].min(axis=0), ground.edge[:, :2].max(axis=0)
+    ridden = np.concatenate(shown)
+    ground = make_ground(ride.surface, ridden)
+    corner, size = _frame_places(ridden)
     most = max(4, min(MOST_TRAIL_POINTS, ALL_TRAIL_POINTS // len(paths)))
     return {
-        "box": [round_values(v, _DIGITS) for v in (*low, *(high - low))],
+        "box": [round_values(v, _DIGITS) for v in (*corner, *size)],
         "edge": _project_points(ground.edge),
         "lines": [_project_points(line) for line in ground.lines],
         "trails": {
@@ -52,6 +58,14 @@ def draw_plan(ride: RideData, names: Sequence[str]) -> dict[str, Any] | None:
             for name, path in paths.items()
         },
     }
+
+
+def _frame_places(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least corner and the size of a box around places (n, 2), with a margin and no thin side."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    longest = float((high - low).max()) or 1.0
+    size = np.maximum(high - low, _SHORTEST_SIDE * longest) + 2 * _MARGIN * longest
+    return (low + high - size) / 2, size
 
 
 def _project_points(line: np.ndarray) -> list[list[float]]:

@@ -10,8 +10,22 @@ from ...engines.engine import REFERENCE
 from ..drawing import COLUMNS
 from ..measure import QUANTITIES
 
-COLUMN_MEANINGS = {metric: QUANTITIES[metric].meaning for _, _, metric, _ in COLUMNS}
-HORIZON = QUANTITIES["horizon"].meaning
+# Metrics that the figures condense to, beside the table's columns.
+_OF_FIGURES = ("rear_rate_error", "max_gap", "min_normal_force")
+
+
+def list_meanings(horizon: bool) -> list[tuple[str, str, str, str]]:
+    """Return key, title, unit and meaning of the metrics that a page names: the table's columns, then the figures'.
+
+    Parameters
+    ----------
+    horizon : bool
+        Whether the page shows the horizon.
+    """
+    titles = {metric: title for title, _, metric, _ in COLUMNS}
+    others = (*(("horizon",) if horizon else ()), *_OF_FIGURES)
+    titles |= {metric: metric.replace("_", " ") for metric in others}
+    return [(key, title, QUANTITIES[key].unit, QUANTITIES[key].meaning) for key, title in titles.items()]
 
 
 def explain_columns(

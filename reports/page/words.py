@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from datetime import datetime
 from typing import Any
+
+from markupsafe import Markup, escape
 
 from ...reference.bicycle import Bicycle
 from ...reference.inputs import NO_INPUTS, Inputs
 
 _LONGEST = 80  # largest number of characters for a field with a list of numbers
+_ROUNDING_OF_STEPS = 0.01  # relative: a whole number of steps between samples need not meet a setting to the digit
 _UNITS = {
     "x": "m",
     "y": "m",
@@ -50,9 +54,14 @@ def list_facts(manifest: Mapping[str, Any], scenario: Mapping[str, Any]) -> list
         ("Growth rate", f"{start['growth_rate']:.4g} 1/s"),
         ("Duration", f"{simulation['duration']:g} s, {simulation['output_rate']:g} samples a second"),
         ("Bicycle", describe_bicycle(scenario.get("bicycle", {}))),
-        ("Run on", f"{datetime.fromisoformat(manifest['created']):%Y-%m-%d, %H:%M:%S %Z}"),
+        ("Run on", describe_date(manifest["created"])),
         ("State", "complete" if manifest["complete"] else "interrupted: the engines that had finished are shown"),
     ]
+
+
+def describe_date(created: str) -> str:
+    """Format a date as documents have it."""
+    return f"{datetime.fromisoformat(created):%Y-%m-%d, %H:%M:%S %Z}"
 
 
 def _list_inputs(table: Mapping[str, float]) -> list[tuple[str, str]]:
@@ -91,6 +100,34 @@ def describe_bicycle(changes: Mapping[str, float]) -> str:
     others = {key: value for key, value in changes.items() if value != getattr(benchmark, key, None)}
     changed = ", ".join(f"{key.replace('_', ' ')} {value:g}" for key, value in others.items())
     return f"{name} with {changed}" if changed else name
+
+
+def keep_whole(text: str, names: Iterable[str]) -> Markup:
+    """Return text as HTML in which no line breaks within one of the names, although they contain hyphens."""
+    longest_first = sorted(names, key=len, reverse=True)
+    if not longest_first:
+        return escape(text)
+    parts = re.split("(" + "|".join(map(re.escape, longest_first)) + ")", text)
+    whole = Markup('<span class="whole">{}</span>')
+    # A split by one group returns the text between and the names in turn.
+    return Markup("").join(whole.format(part) if k % 2 else escape(part) for k, part in enumerate(parts))
+
+
+def describe_own_steps(engines: Mapping[str, Mapping[str, Any]], duration: float) -> dict[str, str]:
+    """Describe the steps of engines that did not take those of their setting ``step``, by engine.
+
+    Methods with steps of their own have such a setting too, for studies of convergence. Rides that ended early are
+    left out, as their mean step is not known from the manifest.
+    """
+    found = {}
+    for name, engine in engines.items():
+        step, steps = (engine.get("settings") or {}).get("step"), engine.get("steps")
+        if not isinstance(step, float) or not steps or engine.get("ended") is not None:
+            continue
+        mean = duration / steps
+        if abs(mean / step - 1) > _ROUNDING_OF_STEPS:
+            found[name] = f"Its steps were not those of its setting: {mean:.2g} s on average."
+    return found
 
 
 def describe_setting(value: Any) -> str:

@@ -84,6 +84,7 @@ def check_command(
     ] = False,
     junit: Annotated[Path | None, typer.Option(help="Write the verdicts as JUnit XML.")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Write the verdicts as Markdown, worst first.")] = None,
+    page: Annotated[Path | None, typer.Option(help="Write the verdicts as an HTML page.")] = None,
     traceback: TracebackOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -94,6 +95,7 @@ def check_command(
         UNFINISHED_MARKDOWN,
         GivenBaselines,
         check_gate,
+        html_page,
         junit_xml,
         list_bicycle_warnings,
         list_left_out,
@@ -116,11 +118,13 @@ def check_command(
     histories = find_stored_histories(HISTORIES if history is None else history, named=history is not None)
     if baselines is not None and not baselines.exists() and not update:
         raise ScenarioError(f"--baselines {baselines}: there is no such folder; with --update it is made")
-    for option, path in (("--junit", junit), ("--markdown", markdown)):
+    for option, path in (("--junit", junit), ("--markdown", markdown), ("--page", page)):
         if path is not None:
             _check_path(option, path)
     files = [(junit, junit_xml), (markdown, markdown_page)]
-    unfinished = _mark_unfinished({junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN})
+    unfinished = _mark_unfinished(
+        {junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN} | ({} if page is None else {page: html_page([])})
+    )
     with showing_traceback(traceback), unfinished, ProgressBars() as progress:
         trace = print_traceback if traceback else None
         held: Path | GivenBaselines | None = baselines
@@ -130,9 +134,9 @@ def check_command(
         if histories:
             after = {name: one["engines"] for name, one in fresh.items()}
             verdicts = name_origins(verdicts, scenario or (), read_baselines(held, scenario), after, histories)
-    for path, page in files:
+    for path, write in files:
         if path is not None:
-            write_text(path, page(verdicts))
+            write_text(path, write(verdicts))
     written = []
     if update:
         # Engines that are no longer installed are removed from the baselines; engines that failed must not be.
@@ -148,6 +152,8 @@ def check_command(
     refused = refused_verdicts(verdicts) if update else []
     warnings = list_bicycle_warnings(scenario)
     left_out = {} if engine or baseline_of else list_left_out(baselines, scenario)
+    if page is not None:
+        write_text(page, html_page(verdicts, left_out))
     others = [] if engine or not isinstance(held, GivenBaselines) else list_unjudged_engines(held)
     passes = not refused if update else all(verdict.passes for _, verdict in verdicts)
     with ending_with(0 if passes else 1):

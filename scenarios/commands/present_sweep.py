@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.text import Text
 
 from ...reports.drawing import format_numbers
-from ..sweep import RESULTS, ROW_STYLES
+from ..sweep import PAGE, RESULTS, ROW_STYLES
 from .tables import Column, print_table
 
 _DIGITS = 3
@@ -40,6 +40,7 @@ def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> 
             _print_line(console, f"{name} {reason}", ROW_STYLES[reason.partition(":")[0]])
     if document["stopped"] is None:
         _print_line(console, f"data set: {document['folder']}/{RESULTS}")
+        _print_line(console, f"page:     {document['folder']}/{PAGE}")
         return
     missing = f"{document['missing']} of {document['tasks']} runs are missing, finished runs are kept"
     _print_line(console, f"{document['stopped']}: {missing}", "yellow")

@@ -19,6 +19,7 @@ from ..sweep import (
     run_sweep,
     status_of,
     summarise_sweep,
+    write_sweep_page,
 )
 from .options import ending_with, print_json
 from .present_sweep import show_summary
@@ -83,6 +84,8 @@ def run_sweep_command(
     with SweepView(len(plan.tasks)) as view:
         outcome = run_sweep(plan, FOLDER / plan.name if out is None else out, work, resume, view.watch, retry)
     document = summarise_sweep(plan, outcome)
+    if document["complete"]:
+        write_sweep_page(plan, outcome, document)
     with ending_with(0):
         show_summary(make_console(stderr=as_json), document, resume_command(plan, outcome, retry))
         if as_json:

@@ -26,7 +26,9 @@ def diff_command(
             autocompletion=complete_engine,
         ),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for diff.json, diff.md and the recording diff.rrd.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for diff.json, diff.md, the page diff.html and the recording diff.rrd.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Two stored runs of one scenario against each other: what moved by more than round-off."""

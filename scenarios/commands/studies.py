@@ -77,7 +77,7 @@ def precision_command(
         ),
     ] = 5,
     eigenvalues: Annotated[bool, typer.Option(help="Measure each engine's own eigenvalues too.")] = True,
-    out: Annotated[Path | None, typer.Option(help="Folder for the document and its figure.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the document, its page and its figure.")] = None,
     traceback: TracebackOption = False,
     as_json: JsonOption = False,
 ) -> None:

@@ -14,7 +14,7 @@ from ...engines.engine import REFERENCE, Trajectory, why_failed
 from ...engines.names import suggest_name
 from ...engines.registry import load_engine
 from ...reports.drawing import assign_colours, find_unsteadiness
-from ...reports.measure import ROUND_OFF, START_ERROR, Scale, cut_at_fall, evaluate_ride
+from ...reports.measure import ROUND_OFF, START_ERROR, Scale, cut_at_fall, evaluate_ride, position_errors
 from ..error import ScenarioError
 from ..files import make_folder, write_json, write_text
 from ..run import (
@@ -27,7 +27,7 @@ from ..run import (
 )
 from ..scenario import OF_THE_MOTION, CircularTable, Scenario, make_start
 from .differences import DIFFERS, StoredGround, StoredRun, diff_document
-from .markdown import diff_markdown
+from .markdown import diff_markdown, diff_remarks
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ def _step_noise(name: str, settings: Mapping[str, Any]) -> float | str:
 
 
 def write_diff(pair: Pair, found: Mapping[str, Any], out: Path) -> list[Path]:
-    """Write ``diff.json``, ``diff.md`` and the recording ``diff.rrd``, and return their paths.
+    """Write ``diff.json``, ``diff.md``, the page ``diff.html`` and the recording ``diff.rrd``, and return their paths.
 
     Raises
     ------
@@ -184,14 +184,45 @@ def write_diff(pair: Pair, found: Mapping[str, Any], out: Path) -> list[Path]:
         If the folder cannot be made.
     """
     make_folder(out)
-    paths = [out / name for name in ("diff.json", "diff.md", "diff.rrd")]
+    paths = [out / name for name in ("diff.json", "diff.md", "diff.html", "diff.rrd")]
     write_json(paths[0], found)
     page = diff_markdown(found)
     write_text(paths[1], page)
+    write_text(paths[2], _make_page(pair, found))
     if not pair.before.trajectories and not pair.after.trajectories:
-        return paths[:2]
-    _record(paths[2], pair, found, page)
+        return paths[:3]
+    _record(paths[3], pair, found, page)
     return paths
+
+
+def _make_page(pair: Pair, found: Mapping[str, Any]) -> str:
+    """Write the page of two runs, with the distances of their rides over time."""
+    from ...reports.page import describe_stop, make_diff_page
+
+    distances, stops = {}, {}
+    for engine in found["engines"]:
+        rides = [run.trajectories.get(engine) for run in (pair.before, pair.after)]
+        if rides[0] is None or rides[1] is None:
+            continue
+        before, after = (_follow(ride, pair.ground) for ride in (rides[0], rides[1]))
+        apart = position_errors(after, before)
+        distances[engine] = after.time[: len(apart)], apart
+        told = {
+            when: stop
+            for when, run, ride in (("before", pair.before, before), ("after", pair.after, after))
+            if (stop := describe_stop(run.metrics[engine], float(ride.time[-1])))
+        }
+        if told:
+            both = len(told) == 2 and len(set(told.values())) == 1
+            stops[engine] = told["after"] if both else ", ".join(f"{when}: {stop}" for when, stop in told.items())
+    remarks = {engine: diff_remarks(entry) for engine, entry in found["engines"].items()}
+    machine = {part: pair.after.manifest[part] for part in ("libraries", "platform")}
+    return make_diff_page(found, distances, remarks, stops, machine)
+
+
+def _follow(ride: Trajectory, ground: StoredGround) -> Trajectory:
+    """Return what follows from the coordinates of a stored ride, up to its fall."""
+    return cut_at_fall(evaluate_ride(ride, ground.bicycle, ground.surface), ground.bicycle, ground.surface)
 
 
 def _record(path: Path, pair: Pair, found: Mapping[str, Any], page: str) -> None:
@@ -208,8 +239,7 @@ def _record(path: Path, pair: Pair, found: Mapping[str, Any], page: str) -> None
             (pair.before, pair.after), labels, (brighten(hues[engine]), hues[engine]), strict=True
         ):
             if engine in run.trajectories:
-                followed = evaluate_ride(run.trajectories[engine], ground.bicycle, ground.surface)
-                rides[label] = cut_at_fall(followed, ground.bicycle, ground.surface)
+                rides[label] = _follow(run.trajectories[engine], ground)
                 paint[label] = hue
         if labels[0] != labels[1] and all(label in rides for label in labels):
             earlier[labels[1]] = labels[0]

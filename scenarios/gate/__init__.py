@@ -14,7 +14,7 @@ from .checks import (
     refused_verdicts,
     update_baselines,
 )
-from .ci_files import UNFINISHED_JUNIT, UNFINISHED_MARKDOWN, junit_xml, markdown_page
+from .ci_files import UNFINISHED_JUNIT, UNFINISHED_MARKDOWN, html_page, junit_xml, markdown_page
 from .exact import Exact, find_exact
 from .given import GivenBaselines
 from .sample import take_sample
@@ -52,6 +52,7 @@ __all__ = [
     "gate_settings",
     "gated_content",
     "gated_names",
+    "html_page",
     "judge_sample",
     "junit_xml",
     "list_bicycle_warnings",

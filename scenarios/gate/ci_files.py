@@ -1,12 +1,13 @@
-"""Write the gate's verdicts as files for a CI service: JUnit XML and Markdown."""
+"""Write the gate's verdicts as files for a CI service and for readers: JUnit XML, Markdown and a page."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 from xml.etree import ElementTree
 
 from ...reports.drawing import escape_markdown, make_printable
+from ..run import library_versions
 from .verdict import CHANGES, NEW, Verdict, count_held, count_statuses, find_outcome, status_word
 
 Verdicts = Sequence[tuple[str, Verdict]]
@@ -70,11 +71,8 @@ def markdown_page(verdicts: Verdicts) -> str:
     -------
     str
     """
-    found = [verdict for _, verdict in verdicts]
-    held = count_held(found)
-    counts = [f"{held} quantities hold" if held else "", count_statuses(found)]
-    title = _TITLES[find_outcome(found)]
-    lines = [f"# Drift gate: {title}", "", f"{'; '.join(filter(None, counts))}.", ""]
+    title = _TITLES[find_outcome([verdict for _, verdict in verdicts])]
+    lines = [f"# Drift gate: {title}", "", _describe_counts(verdicts), ""]
     ordered = sorted(verdicts, key=lambda item: _WORST_FIRST.index(item[1].status))
     moved = [(name, verdict) for name, verdict in ordered if verdict.told]
     for name, verdict in moved:
@@ -93,6 +91,41 @@ def markdown_page(verdicts: Verdicts) -> str:
         cells = (escape_markdown(name), escape_markdown(verdict.engine), verdict.quantity, *numbers, verdict.status)
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
+
+
+def html_page(verdicts: Verdicts, left_out: Mapping[str, str] | None = None) -> str:
+    """Return the page of the verdicts; without verdicts it states that the check is not finished.
+
+    Parameters
+    ----------
+    verdicts : sequence of (scenario, Verdict)
+        Grouped by scenario.
+    left_out : mapping of str to str, optional
+        How to install engines that are not judged, by engine.
+
+    Returns
+    -------
+    str
+    """
+    # Imported here: it loads jinja, which only this file needs.
+    from ...reports.page import make_gate_page
+
+    rows = [
+        {"scenario": name} | verdict.as_json() | {"reason": make_printable(verdict.reason)}
+        for name, verdict in verdicts
+    ]
+    told = [row for row, (_, verdict) in zip(rows, verdicts, strict=True) if verdict.told]
+    title = _TITLES[find_outcome([verdict for _, verdict in verdicts])] if verdicts else "not finished"
+    counts = _describe_counts(verdicts) if verdicts else ""
+    return make_gate_page(title, counts, rows, told, left_out or {}, library_versions())
+
+
+def _describe_counts(verdicts: Verdicts) -> str:
+    """Return how many quantities hold, and how many have which other status, in a sentence."""
+    found = [verdict for _, verdict in verdicts]
+    held = count_held(found)
+    counts = [f"{held} quantities hold" if held else "", count_statuses(found)]
+    return f"{'; '.join(filter(None, counts))}."
 
 
 def _number(value: float | None) -> str:

@@ -17,7 +17,7 @@ from ...reports.drawing import find_unsteadiness
 from ...reports.measure import IDENTIFY_LEVELS as IDENTIFY_LEVELS
 from ...reports.measure import Identified, Level, comparison_horizon, eigenvalue_document, engine_document, identify
 from ..error import ScenarioError
-from ..files import make_folder, write_json
+from ..files import make_folder, write_json, write_text
 from ..run import RunPlan, RunWatch, Trace, claimed_noise, library_versions, measure_one, plan_run
 from ..scenario import Scenario, Start, name_bicycle
 
@@ -327,7 +327,7 @@ def _make_document(
 
 
 def write_precision(document: Mapping[str, Any], out: Path) -> list[Path]:
-    """Write the document and its figure into a folder, which is made if it does not exist.
+    """Write the document, its page and its figure into a folder, which is made if it does not exist.
 
     Raises
     ------
@@ -335,9 +335,11 @@ def write_precision(document: Mapping[str, Any], out: Path) -> list[Path]:
         If the folder cannot be made.
     """
     from ...reports.figures import precision_figure
+    from ...reports.page import make_precision_page
 
     make_folder(out)
-    files = [out / f"precision-{document['scenario']}.json", out / f"precision-{document['scenario']}.png"]
+    files = [out / f"precision-{document['scenario']}.{kind}" for kind in ("json", "html", "png")]
     write_json(files[0], document)
-    precision_figure(files[1], document)
+    write_text(files[1], make_precision_page(document))
+    precision_figure(files[2], document)
     return files

@@ -3,6 +3,7 @@
 from .cluster import on_cluster
 from .file import SweepFile
 from .live import ROW_STYLES, SweepView
+from .page import PAGE, write_sweep_page
 from .plan import plan_sweep
 from .rows import STATUSES
 from .run import Work, locally, run_sweep
@@ -10,6 +11,7 @@ from .store import RESULTS
 from .summary import resume_command, status_of, summarise_sweep
 
 __all__ = [
+    "PAGE",
     "RESULTS",
     "ROW_STYLES",
     "STATUSES",
@@ -23,4 +25,5 @@ __all__ = [
     "run_sweep",
     "status_of",
     "summarise_sweep",
+    "write_sweep_page",
 ]

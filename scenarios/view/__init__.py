@@ -1,5 +1,5 @@
 """Views of a stored run, in the native viewer or in a browser."""
 
-from .viewing import RECORDING, open_native, serve
+from .viewing import RECORDING, open_native, serve, stored_page
 
-__all__ = ["RECORDING", "open_native", "serve"]
+__all__ = ["RECORDING", "open_native", "serve", "stored_page"]

@@ -112,13 +112,15 @@ def page_server(folder: Path, port: int) -> RunPageServer:
         raise ScenarioError(f"--port {port}: cannot listen on it: {error.strerror}; 0 takes a free one") from error
 
 
-def stored_page(folder: Path) -> str:
+def stored_page(folder: Path, docs: str | None = None) -> str:
     """Make the page of a stored run from its files.
 
     Parameters
     ----------
     folder : Path
         A run folder.
+    docs : str, optional
+        As `velodrome.reports.page.make_page` takes it.
 
     Returns
     -------
@@ -141,7 +143,7 @@ def stored_page(folder: Path) -> str:
         rides = {name: evaluate_ride(read_ride(folder, manifest, measured, name), *where) for name in measured}
         runs = {name: cut_at_fall(ride, *where) for name, ride in rides.items()}
         verdicts = manifest.get("verdicts", [])
-        return make_page(manifest, scenario.model_dump(), measured, verdicts, runs, where[1])
+        return make_page(manifest, scenario.model_dump(), measured, verdicts, runs, where[1], docs)
     except ScenarioError:
         raise
     except (LookupError, TypeError, AttributeError, ArithmeticError, ValueError, TemplateError) as error:

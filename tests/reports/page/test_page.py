@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import json
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from parsed_page import Parsed, check_accessible_names
 from PIL import Image
 
 from velodrome.engines.engine import REFERENCE, Trajectory
@@ -24,20 +22,39 @@ from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.height_field import HeightField
 from velodrome.reference.surface import Paraboloid
 from velodrome.reports.drawing.palette import PALETTE, assign_colours
-from velodrome.reports.drawing.plots import PLOTS
+from velodrome.reports.drawing.plots import PLOTS, RideData
 from velodrome.reports.drawing.summary import COLUMNS, format_table, format_verdict
 from velodrome.reports.measure.metrics import compute_metrics
 from velodrome.reports.page import make_page
-from velodrome.reports.page.curves import GROUPS, choose_samples, make_curve
+from velodrome.reports.page.curves import (
+    GROUPS,
+    NOT_FINITE,
+    NOT_GIVEN,
+    THE_MEASURE,
+    TOO_SMALL,
+    choose_samples,
+    make_curve,
+)
 from velodrome.reports.page.document import list_engine_styles
+from velodrome.reports.page.findings import (
+    NEVER,
+    NOTED,
+    describe_growth,
+    explain_error,
+    list_findings,
+    write_headline,
+)
 from velodrome.reports.page.ink import CONTRAST, DASHES, line_dashes, luminance, make_css, paper_colour
-from velodrome.reports.page.trust import COLUMN_MEANINGS, explain_columns
+from velodrome.reports.page.plan import draw_plan
+from velodrome.reports.page.trust import explain_columns, list_meanings
 from velodrome.reports.page.words import (
     describe_bicycle,
     describe_disturbance,
     describe_ground,
     describe_motion,
+    describe_own_steps,
     describe_setting,
+    keep_whole,
 )
 
 BOWL = Paraboloid(0.005)
@@ -122,39 +139,8 @@ def made(runs: dict[str, Trajectory] | None = None, verdicts: Any = (), **change
         "perturbation": {"lean_rate": 0.1},
         "simulation": {"duration": 3.0, "output_rate": 100.0},
     } | changes.pop("tables", {})
-    surface = changes.pop("surface", BOWL)
-    return make_page(manifest | changes, scenario, measured(runs), verdicts, runs, surface)
-
-
-class Parsed(HTMLParser):
-    """Elements with their attributes, and their text."""
-
-    VOID = ("meta", "link", "br", "input", "img", "line")
-
-    def __init__(self, text: str) -> None:
-        super().__init__(convert_charrefs=True)
-        self.elements: list[tuple[str, dict[str, str | None], list[str]]] = []
-        self._open: list[int] = []
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, dict(attrs), []))
-        if tag not in self.VOID:
-            self._open.append(len(self.elements) - 1)
-
-    def handle_endtag(self, tag: str) -> None:
-        if tag not in self.VOID:
-            assert self.elements[self._open.pop()][0] == tag, f"</{tag}> closes another element"
-
-    def handle_data(self, data: str) -> None:
-        for index in self._open:
-            self.elements[index][2].append(data)
-
-    def all(self, *tags: str) -> list[tuple[dict[str, str | None], str]]:
-        return [(attrs, " ".join("".join(t).split())) for tag, attrs, t in self.elements if tag in tags]
-
-    def data(self) -> dict[str, Any]:
-        return next(json.loads(text) for attrs, text in self.all("script") if attrs.get("id") == "data")
+    surface, docs = changes.pop("surface", BOWL), changes.pop("docs", None)
+    return make_page(manifest | changes, scenario, measured(runs), verdicts, runs, surface, docs)
 
 
 @pytest.fixture(scope="module")
@@ -175,7 +161,7 @@ def test_the_table_has_the_summarys_figures(parsed: Parsed) -> None:
         assert any(cells[k : k + len(row)] == row for k in range(len(cells))), name
     heads = [found for _, found in parsed.all("th")]
     assert {title for title, *_ in COLUMNS} <= set(heads)
-    assert {metric for _, _, metric, _ in COLUMNS} == set(COLUMN_MEANINGS)
+    assert {metric for _, _, metric, _ in COLUMNS} <= {key for key, *_ in list_meanings(False)}
 
 
 def test_input_is_text_and_never_markup() -> None:
@@ -211,21 +197,8 @@ def test_the_page_needs_nothing_from_elsewhere(text: str, parsed: Parsed) -> Non
 
 
 def test_the_page_can_be_read_without_eyes(parsed: Parsed) -> None:
-    levels = [int(tag[1]) for tag, _, _ in parsed.elements if re.fullmatch("h[1-6]", tag)]
-    assert levels[0] == 1
-    assert levels.count(1) == 1
-    assert all(after <= before + 1 for before, after in pairwise(levels))
-    assert len(parsed.all("caption")) == len(parsed.all("table"))
-    assert all(attrs.get("scope") in ("row", "col") for attrs, _ in parsed.all("th"))
-    ids = [attrs["id"] for _, attrs, _ in parsed.elements if "id" in attrs]
-    assert len(ids) == len(set(ids))
-    links = [(a.get("href") or "")[1:] for a, _ in parsed.all("a") if (a.get("href") or "").startswith("#")]
-    named = [attrs["aria-labelledby"] for _, attrs, _ in parsed.elements if "aria-labelledby" in attrs]
-    assert set(links) | set(named) <= set(ids)
-    assert "main" in links  # past the header
-    assert all(attrs.get("aria-label") for _, attrs, _ in parsed.elements if attrs.get("role") in ("img", "region"))
+    check_accessible_names(parsed)
     assert all(attrs.get("aria-pressed") == "true" for attrs, _ in parsed.all("button"))
-    assert next(attrs for tag, attrs, _ in parsed.elements if tag == "html").get("lang") == "en"
 
 
 def test_what_went_wrong_is_said() -> None:
@@ -251,7 +224,7 @@ def test_what_went_wrong_is_said() -> None:
 
 def test_a_run_without_a_trajectory_has_a_page() -> None:
     parsed = Parsed(made({}, engines={"broken": {"version": "9", "settings": {"step": 1.0}, "failed": "no luck"}}))
-    assert parsed.data() == {"duration": 3.0, "engines": [], "panels": [], "plan": None}
+    assert parsed.data() == {"duration": 3.0, "engines": [], "stops": {}, "panels": [], "plan": None}
     assert not parsed.all("figure")
 
 
@@ -289,12 +262,23 @@ def test_a_curve_in_the_page_is_the_trajectorys(parsed: Parsed) -> None:
     np.testing.assert_allclose(np.hypot(trail["x"], trail["y"]), 2.4, rtol=1e-4)  # five digits of each
 
 
-def test_the_horizon_is_marked_on_the_error(parsed: Parsed) -> None:
+def test_the_horizon_is_shown_where_it_says_something(parsed: Parsed) -> None:
+    # All horizons lie beyond the end of this run: nothing is shown.
     error = next(panel for panel in parsed.data()["panels"] if panel["key"] == "log_position_error")
-    horizons = [values["horizon"] for values in measured(RUNS).values()]
-    assert {mark["engine"]: mark["t"] for mark in error["marks"]} == {
-        k: horizon for k, horizon in enumerate(horizons) if horizon is not None
-    }
+    assert all(values["horizon"] > 3.0 for name, values in measured(RUNS).items() if name != REFERENCE)
+    assert error["marks"] == []
+    assert "horizon" not in [found for _, found in parsed.all("th")]
+    # It is off by the size of the motion before the end.
+    q = RUNS["bare"].q.copy()
+    q[200:, :2] *= -1
+    far = RUNS | {"far": replace(RUNS["bare"], engine="far", q=q)}
+    values = measured(far)
+    assert values["far"]["horizon"] < 3.0
+    shown = Parsed(made(far))
+    error = next(panel for panel in shown.data()["panels"] if panel["key"] == "log_position_error")
+    assert error["marks"] == [{"engine": list(far).index("far"), "t": values["far"]["horizon"]}]
+    assert "horizon" in [found for _, found in shown.all("th")]
+    assert f"up to {values['far']['horizon']:.2f} s" in [found for _, found in shown.all("td")]
 
 
 @given(
@@ -403,9 +387,131 @@ def test_a_fall_is_said_where_the_figures_count_a_sample_more() -> None:
     lying = RUNS["one"].q.copy()
     lying[200:, 2] -= 1.0
     fallen = made({REFERENCE: RUNS[REFERENCE], "one": replace(RUNS["one"], q=lying)})
-    words = "What fell (one) is drawn up to the first sample after its fall"
-    assert words in " ".join(fallen.split())
-    assert "What fell" not in made()
+    said = " ".join(fallen.split())
+    assert "what fell or ended early (one) is drawn to its end" in said
+    assert "up to the first sample after its fall" in said
+    assert "what fell or ended early (" not in made()
+    rows = [found for _, found in Parsed(fallen).all("th")]
+    assert rows.count("one ✕ fell at 1.99 s") == 1 + len(GROUPS[0][1]) + len(GROUPS[1][1]) + len(GROUPS[2][1])
+
+
+def test_the_first_lines_tell_who_drifts_from_when_why_and_how_far() -> None:
+    runs = {name: run for name, run in RUNS.items() if name != "short"}
+    ride_data, values = RideData(BOWL, runs), measured(runs)
+    found = {row.name: row for row in list_findings(values, ride_data, 3.0)}
+    assert list(found) == list(format_table(values))
+    for name in ("one", "bare"):
+        error = np.linalg.norm(RUNS[name].q[:, :3] - RUNS[REFERENCE].q[: len(RUNS[name].time), :3], axis=1)
+        first = np.flatnonzero(error > NOTED)
+        assert found[name].since == (f"{RUNS[name].time[first[0]]:.2f}" if len(first) else NEVER)
+        assert float(found[name].error) == pytest.approx(error.max(), rel=0.1)
+    assert found["one"].since == NEVER
+    assert found[REFERENCE].cause.startswith("the measure of the others")
+    said = write_headline(values, ride_data, GROWTH, 3.0)
+    assert said.startswith("bare drifts most: ")
+    assert f"from {found['bare'].since} s on" in said
+    assert f"What goes with it: {found['bare'].cause}." in said
+    assert "one stays closest" in said
+    assert [text for attrs, text in Parsed(made(runs)).all("p") if attrs.get("class") == "headline"] == [said]
+    # Equal errors are told together: both turn by 0.03 rad too far or too little.
+    assert write_headline(measured(RUNS), RideData(BOWL, RUNS), GROWTH, 3.0).startswith("short and bare drift most: ")
+    without = measured({"one": RUNS["one"]})
+    assert "no reference in this run" in write_headline(without, RideData(BOWL, {"one": RUNS["one"]}), GROWTH, 3.0)
+
+
+def test_what_fell_drifts_least_and_most_of_all_never() -> None:
+    values = measured(RUNS)
+    values["bare"] |= {"fell_at": 1.0}
+    values["short"] |= {"ended": "it gave up"}
+    said = write_headline(values, RideData(BOWL, RUNS), GROWTH, 3.0)
+    assert said.startswith("one drifts most: ")
+    assert "bare fell at 1.00 s." in said
+    assert "short ended at 0.60 s." in said
+    found = {row.name: row for row in list_findings(values, RideData(BOWL, RUNS), 3.0)}
+    assert found["bare"].until.endswith("fell at 1.00 s")
+    assert not found["bare"].stays_up
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({}, "its steps or its model; slip is 0.02 m in all"),
+        ({"mean_slip": 0.03}, "its wheels slip, 0.3 m in all"),  # 0.3 m are half of the error and more
+        ({"friction_left_at": 0.1, "required_friction": 1.01, "friction": 0.7}, "needs a friction of 1.01, it has 0.7"),
+        ({"unconverged_steps": 3, "steps": 100}, "not converged in 3 of 100 steps"),
+        ({"position_error": {"max": 0.0}}, "to the last digit"),
+        ({"position_error": None}, "–"),
+        ({"mean_slip": None}, "not known"),
+    ],
+)
+def test_what_goes_with_an_error_follows_from_the_metrics(changes: dict[str, Any], says: str) -> None:
+    assert says in explain_error({"position_error": {"max": 0.6}, "mean_slip": 0.002} | changes, 10.0)
+
+
+def test_growth_is_told_where_it_matters() -> None:
+    assert describe_growth(0.1, 20.0) is None  # 7.4
+    assert describe_growth(-1.0, 20.0) is None
+    assert describe_growth(0.3845, 20.0) == "The motion itself multiplies any error by 2200 in 20 s."
+    assert "by 1.0e+304 in" in str(describe_growth(1e6, 20.0))  # and does not overflow
+
+
+def test_nothing_given_too_small_and_fallen_are_told_apart() -> None:
+    exact = replace(RUNS["one"], gap=np.zeros_like(RUNS["one"].gap))
+    lost = replace(RUNS["one"], gap=np.full_like(RUNS["one"].gap, np.nan))
+    parsed = Parsed(made({REFERENCE: RUNS[REFERENCE], "exact": exact, "lost": lost, "bare": RUNS["bare"]}))
+    absent = {panel["key"]: panel["absent"] for panel in parsed.data()["panels"]}
+    assert absent["rear_log_gap"] == {"1": TOO_SMALL, "2": NOT_FINITE, "3": NOT_GIVEN}
+    assert absent["log_position_error"] == {"0": THE_MEASURE}
+    assert absent["lean"] == {}
+    cells = [found for _, found in parsed.all("td")]
+    assert {TOO_SMALL, NOT_GIVEN, NOT_FINITE, THE_MEASURE} <= set(cells)
+
+
+def test_the_plan_holds_the_rides_that_stay_up() -> None:
+    away = RUNS["one"].q.copy()
+    away[:, :2] *= 50
+    runs = {REFERENCE: RUNS[REFERENCE], "away": replace(RUNS["bare"], q=away)}
+    shown = draw_plan(RideData(BOWL, runs), list(runs), [REFERENCE])
+    alone = draw_plan(RideData(BOWL, {REFERENCE: RUNS[REFERENCE]}), [REFERENCE], [REFERENCE])
+    assert shown is not None
+    assert alone is not None
+    assert shown["box"] == alone["box"]
+    assert len(shown["trails"]["1"]["x"]) > 0
+    everything = draw_plan(RideData(BOWL, runs), list(runs), list(runs))
+    none_up = draw_plan(RideData(BOWL, runs), list(runs), [])
+    assert everything is not None
+    assert none_up is not None
+    assert everything["box"] == none_up["box"]
+    assert everything["box"][2] > 10 * shown["box"][2]
+
+
+def test_steps_that_are_not_the_settings_are_told() -> None:
+    engines = {
+        "own": {"settings": {"step": 0.001}, "steps": 300, "ended": None},
+        "fixed": {"settings": {"step": 0.01}, "steps": 300, "ended": None},
+        "short": {"settings": {"step": 0.001}, "steps": 3, "ended": "it gave up"},
+        "failed": {"settings": {"step": 0.001}, "failed": "no luck"},
+    }
+    assert list(describe_own_steps(engines, 3.0)) == ["own"]
+    assert "0.01 s on average" in describe_own_steps(engines, 3.0)["own"]
+    assert "Its steps were not those of its setting: 0.01 s on average." in made()  # 301 steps in 3 s; it says 0.001
+
+
+def test_quantities_lead_to_their_definitions_and_to_the_documentation() -> None:
+    parsed = Parsed(made())
+    ids = {attrs["id"] for _, attrs, _ in parsed.elements if "id" in attrs}
+    for _, _, metric, _ in COLUMNS:
+        assert f"meaning-{metric}" in ids
+    documented = Parsed(made(docs="https://velodrome.example/docs"))
+    links = {attrs.get("href") for attrs, _ in documented.all("a")}
+    for key, *_ in list_meanings(False):
+        assert f"https://velodrome.example/docs/reference/metrics.html#metric-{key}" in links
+
+
+def test_names_are_kept_whole() -> None:
+    found = keep_whole("a-b and a-b-c: <", ["a-b", "a-b-c"])
+    assert found == '<span class="whole">a-b</span> and <span class="whole">a-b-c</span>: &lt;'
+    assert keep_whole("<", []) == "&lt;"
 
 
 # In a browser.
@@ -452,7 +558,8 @@ def test_a_view_can_be_passed_on_by_its_address(address: str) -> None:
     slider = next(attrs for attrs, _ in parsed.all("input"))
     assert slider["aria-valuetext"] == "1.50 s"
     lean = f"{RUNS['one'].q[150, 4]:#.6g}"
-    assert any(found == f"one {lean}" for _, found in parsed.all("li"))
+    # It lies on the reference, within a hundredth of the axis.
+    assert any(found == f"{REFERENCE} = one 0.740000 / {lean}" for _, found in parsed.all("li"))
     # Not served by the suite's own server, it asks for no viewer.
     assert not parsed.all("iframe")
 
@@ -469,3 +576,85 @@ def test_complaints_of_a_page_are_heard(tmp_path: Path, text: str) -> None:
     # A script that is not the page's own does not run.
     broken.write_text(text.replace("<h1>", "<script>document.title = 'no'</script><h1>"), encoding="utf-8")
     assert "Content Security Policy" in said()
+
+
+def with_a_fallen_one(wild: float) -> dict[str, Trajectory]:
+    """Five rides, two of them the same, and one that falls at 2 s after it has leaned by a wild angle."""
+    q, qd = RUNS["bare"].q.copy(), RUNS["bare"].qd.copy()
+    q[150:, 4] += wild
+    q[150:, :2] *= 1 + wild
+    qd[150:, 7] -= 100 * wild
+    q[200:, 2] -= 1.0
+    twin = replace(RUNS["one"], engine="twin")
+    return RUNS | {"twin": twin, "fallen": replace(RUNS["bare"], engine="fallen", q=q, qd=qd).first(201)}
+
+
+_LOOKING = """
+const figures = [...document.querySelectorAll("figure[data-panel]")];
+const each = (look) => Object.fromEntries(figures.map((figure) => [figure.dataset.panel, look(figure)]));
+const texts = (where, selector) => [...where.querySelectorAll(selector)].map((found) => found.textContent.trim());
+const bottom = (selector) => document.querySelector(selector).getBoundingClientRect().bottom;
+const lean = figures.find((figure) => figure.dataset.panel === "lean");
+return {
+  ticks: each((figure) => texts(figure, ".tick.y")),
+  crosses: each((figure) => figure.querySelectorAll(".stop").length),
+  curves: each((figure) => figure.querySelectorAll("svg path[stroke^=var]").length),
+  dashes: [...lean.querySelectorAll("path[stroke-dashoffset]")].map((path) =>
+    ["stroke", "stroke-dasharray", "stroke-dashoffset"].map((name) => path.getAttribute(name))),
+  readout: texts(lean, ".readout li"),
+  together: texts(lean, ".together")[0],
+  box: document.querySelector(".map svg").getAttribute("viewBox"),
+  mapCrosses: document.querySelectorAll(".map .stop").length,
+  bottoms: [".headline", ".findings", ".map svg", "figure[data-panel=log_position_error] .plot"].map(bottom),
+  wide: document.documentElement.scrollWidth,
+};"""
+
+
+@needs_browser
+def test_a_ride_that_falls_rules_no_axis_and_engines_that_coincide_are_shown(tmp_path: Path) -> None:
+    runs = with_a_fallen_one(3.0)
+    upright = {name: run for name, run in runs.items() if name != "fallen"}
+    seen, without = (headless.examine(made(each), _LOOKING, tmp_path) for each in (runs, upright))
+    assert seen["ticks"] == without["ticks"]
+    assert seen["box"] == without["box"]
+    for key in ("log_position_error", "lean", "steer", "rear_rate", "radius"):
+        assert seen["crosses"][key] == 1, key
+        assert without["crosses"][key] == 0, key
+        assert seen["curves"][key] == without["curves"][key] + 1, key
+    assert seen["mapCrosses"] == 1
+    # The fallen one is told where the others have values, and those that coincide stand together.
+    assert any(line.startswith("fallen ✕ fell at 1.4") for line in seen["readout"])
+    together = f"{REFERENCE} = one = twin"
+    assert any(line.startswith(together) for line in seen["readout"])
+    assert seen["together"] == f"On one another: {REFERENCE}, one, twin."
+    # Both have turns of their own: equal dashes, each in the other's gap.
+    assert [dash for _, *dash in seen["dashes"]] == [["9 9", "0"], ["9 9", "-9"]]
+    assert len({ink for ink, *_ in seen["dashes"]}) == 2
+    # All of this is on the first screen.
+    assert all(bottom <= 900 for bottom in seen["bottoms"])
+
+
+@needs_browser
+def test_the_page_fits_into_400_pixels_and_is_printed_on_four_sheets(tmp_path: Path) -> None:
+    runs = with_a_fallen_one(0.5) | {f"engine-of-a-long-name-{k}": ride("bare", error=1e-3 * k) for k in (1, 2)}
+    page = made(runs)
+    assert headless.examine(page, _LOOKING, tmp_path, size=(500, 900))["wide"] <= 500
+    path = tmp_path / "report.html"
+    path.write_text(page, encoding="utf-8")
+    assert headless.count_printed_pages(path.as_uri(), tmp_path / "report.pdf") <= 4
+
+
+@pytest.mark.skipif(headless.missing_axe() is not None, reason=str(headless.missing_axe()))
+@pytest.mark.parametrize("dark", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["light", "dark"])
+def test_the_page_can_be_used_by_everyone(dark: bool, tmp_path: Path) -> None:
+    verdicts = [
+        {"engine": "one", "quantity": "energy_variation", "value": 2.0, "limit": 1.0, "holds": False},
+        {"engine": REFERENCE, "quantity": "energy_variation", "value": 1e-9, "limit": 1.0, "holds": True},
+    ]
+    page = made(with_a_fallen_one(0.5), verdicts, docs="https://velodrome.example")
+    assert headless.find_violations(page, tmp_path, dark) == []
+    # The judge judges: a faint text and a nameless button are found.
+    broken = page.replace("<h1>", '<p style="color: #888; background: #777">faint</p><button></button><h1>')
+    assert {line.partition(":")[0] for line in headless.find_violations(broken, tmp_path, dark)} == {
+        *("color-contrast", "button-name")
+    }

@@ -326,15 +326,17 @@ def test_update_accepts_what_has_become_worse(velodrome, monkeypatch: pytest.Mon
 
 def test_check_writes_its_verdicts_for_a_ci_service(velodrome, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     judged(monkeypatch, WORSE)
-    junit, markdown = tmp_path / "gate.xml", tmp_path / "gate.md"
-    assert velodrome("check", "--junit", str(junit), "--markdown", str(markdown)).status == 1
+    junit, markdown, page = tmp_path / "gate.xml", tmp_path / "gate.md", tmp_path / "gate.html"
+    files = ["--junit", str(junit), "--markdown", str(markdown), "--page", str(page)]
+    assert velodrome("check", *files).status == 1
+    assert "Drift gate: fails" in page.read_text(encoding="utf-8")
     assert 'failures="1"' in junit.read_text(encoding="utf-8")
     assert markdown.read_text(encoding="utf-8").startswith("# Drift gate: fails")
     result = velodrome("check", "--junit", str(tmp_path / "nowhere" / "gate.xml"))
     assert (result.status, result.stdout) == (2, "")
 
 
-@pytest.mark.parametrize("option", ["--junit", "--markdown"])
+@pytest.mark.parametrize("option", ["--junit", "--markdown", "--page"])
 def test_check_refuses_a_file_without_a_folder_before_its_work(
     velodrome, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, option: str
 ) -> None:

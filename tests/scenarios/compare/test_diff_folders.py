@@ -95,10 +95,13 @@ def test_document_page_and_recording_are_written(folder: Path, halved: Path, tmp
     pair = read_pair(folder, halved)
     found = diff_runs(pair)
     paths = write_diff(pair, found, tmp_path / "out")
-    assert [path.name for path in paths] == ["diff.json", "diff.md", "diff.rrd"]
+    assert [path.name for path in paths] == ["diff.json", "diff.md", "diff.html", "diff.rrd"]
     assert contents(paths[0]) == found
     assert f"## {NATIVE}: differs" in paths[1].read_text()
-    entities = {chunk.entity_path for chunk in RrdReader(str(paths[2])).stream()}
+    page = paths[2].read_text(encoding="utf-8")
+    assert f'Differs by more than round-off: <span class="whole">{NATIVE}</span> (by up to ' in page
+    assert "Distance between both rides" in page  # the figure
+    entities = {chunk.entity_path for chunk in RrdReader(str(paths[3])).stream()}
     roots = {re.split(r"(?<!\\)/", entity)[2] for entity in entities if entity.startswith("/world/")}
     # The runs' names, with every sign that a path gives a meaning of its own escaped. Folders that were made in the
     # same second have their parents' names too.

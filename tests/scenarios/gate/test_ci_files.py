@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from xml.etree import ElementTree
 
-from velodrome.scenarios.gate.ci_files import junit_xml, markdown_page
+from velodrome.scenarios.gate.ci_files import html_page, junit_xml, markdown_page
 from velodrome.scenarios.gate.verdict import CHANGES, NEW, Verdict, missing_verdict
 
 HOLDS = Verdict("exudyn", "short_error", 1e-5, 1e-5, 1e-7, "holds", "1e-05 -> 1e-05, limit 1e-07")
@@ -58,3 +59,21 @@ def test_a_first_baseline_is_new_and_no_fault() -> None:
     # Where something fails as well, the gate fails.
     page = markdown_page([("q2", FIRST), ("q2", WORSE)])
     assert page.startswith("# Drift gate: fails\n\n0 of 1 quantities hold; 1 worse, 1 new.")
+
+
+def test_the_page_has_every_verdict_and_the_worst_first() -> None:
+    page = html_page([*VERDICTS, ("plane-circle", CHANGE)], {"drake": "pip install 'velodrome[drake]'"})
+    text = " ".join(re.sub(r"<[^>]*>", " ", page[page.index("<body>") :]).split())
+    assert "Drift gate: fails" in text
+    assert "1 of 3 quantities hold; 1 missing, 1 worse." in text
+    missing = text.index("plane-circle, warp, run: missing: did not run: &lt;no&gt;")
+    worse = text.index("q2, mujoco-native, max slip: worse: 0.1 -&gt; 0.2")
+    assert missing < worse < text.index("plane-circle, mujoco-native: since the baseline: version 1.0 -&gt; 1.1")
+    assert "drake was not judged, its library is not installed: pip install &#39;velodrome[drake]&#39;" in text
+    assert "mujoco-native ✗ worse max slip 1e+02" in text  # against its limit, in the table of engines
+    assert "not ridden" in text
+    assert "\x07" not in page
+    held = " ".join(re.sub(r"<[^>]*>", " ", html_page([("q2", HOLDS)])).split())
+    assert "Drift gate: holds" in held
+    assert "Every quantity of every engine is as before." in held
+    assert "not come to its verdicts" in html_page([])

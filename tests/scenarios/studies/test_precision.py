@@ -164,9 +164,10 @@ def test_steps_that_share_no_output_interval_are_refused_in_one_line() -> None:
 
 def test_document_and_figure_are_written(tmp_path: Path) -> None:
     written = write_precision(soft(), tmp_path / "found")
-    assert [path.name for path in written] == ["precision-q1.json", "precision-q1.png"]
+    assert [path.name for path in written] == ["precision-q1.json", "precision-q1.html", "precision-q1.png"]
     assert contents(written[0]) == soft()
-    assert written[1].read_bytes().startswith(b"\x89PNG")
+    assert "Steps and errors on q1" in written[1].read_text(encoding="utf-8")
+    assert written[2].read_bytes().startswith(b"\x89PNG")
     assert sorted(tmp_path.rglob("*.*")) == sorted(written)
     blocked = tmp_path / "file"
     blocked.write_text("")

@@ -7,6 +7,7 @@ import json
 from collections.abc import Generator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rich.console import Console
 from sweeping import UPRIGHT, here, planned, written
@@ -14,6 +15,7 @@ from sweeping import UPRIGHT, here, planned, written
 from velodrome.scenarios.commands import run_sweep as command
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.sweep.live import SweepView
+from velodrome.scenarios.sweep.page import group_medians
 from velodrome.scenarios.sweep.pool import Done
 
 THREE = UPRIGHT + "perturbation.lean_rate = [0.0, 0.1, 0.2]\n"
@@ -35,6 +37,9 @@ def test_the_summary_is_the_only_thing_on_stdout(in_process: Path, capsys: pytes
     assert (document["tasks"], document["missing"], document["complete"]) == (3, 0, True)
     assert document["engines"]["reference"]["rows"] == {"done": 3}
     assert "data set: sweeps/small/results" in said.err
+    assert "page:     sweeps/small/sweep.html" in said.err
+    page = (in_process / "sweeps" / "small" / "sweep.html").read_text(encoding="utf-8")
+    assert "No parameter has several numbers" in page  # the reference alone has no errors
 
 
 def test_rows_that_broke_are_named_with_their_reason(in_process: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -102,3 +107,21 @@ def test_no_live_view_where_there_is_no_terminal(tmp_path: Path) -> None:
     with SweepView(3, Console(file=file)) as view:
         view.watch(planned(tmp_path, THREE).tasks[0], Done(0, {"status": "done", "reason": None}, {}), fresh=True)
     assert file.getvalue() == ""
+
+
+def test_a_sweeps_page_draws_the_errors_over_its_parameters(in_process: Path) -> None:
+    path = written(in_process, THREE.replace("[grid]", 'engines = ["mujoco-native"]\n[grid]', 1))
+    assert command.run_sweep_command(path, None, None, in_process / "out", resume=False, as_json=False) == 0
+    page = (in_process / "out" / "sweep.html").read_text(encoding="utf-8")
+    assert "Median position error over perturbation.lean_rate, one line per engine" in page
+    assert "No parameter has several numbers" not in page
+
+
+def test_many_values_are_taken_together() -> None:
+    values, errors = np.array([2.0, 0.0, 1.0, 0.0]), np.array([5.0, 1.0, 4.0, 3.0])
+    np.testing.assert_array_equal(group_medians(values, errors), [[0, 1, 2], [2, 4, 5]])
+    drawn = np.random.default_rng(0).permutation(1000) / 1000
+    found, medians = group_medians(drawn, drawn**2)
+    assert len(found) == 40
+    assert np.all(np.diff(found) > 0)
+    np.testing.assert_allclose(medians, found**2, atol=1e-3)  # between neighbours a thousandth apart
