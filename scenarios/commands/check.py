@@ -88,48 +88,50 @@ def check_command(
     as_json: JsonOption = False,
 ) -> None:
     """The drift gate: run the gated scenarios and hold them against the committed baselines."""
-    from ..files import write_text
-    from ..gate import (
-        UNFINISHED_JUNIT,
-        UNFINISHED_MARKDOWN,
-        GivenBaselines,
-        check_gate,
-        junit_xml,
-        list_bicycle_warnings,
-        list_left_out,
-        list_unjudged_engines,
-        markdown_page,
-        read_baselines,
-        refused_verdicts,
-        update_baselines,
-    )
-    from ..history import find_stored_histories, name_origins
-    from ..run import configure_engine, installed_engines
-    from .present_gate import show_verdicts
-    from .progress import ProgressBars
+    from .progress import COMPUTING, ProgressBars
     from .terminal import make_console
 
-    if reason is not None and not update:
-        raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
-    # Checked first, so that minutes of work are not lost.
-    _check_baseline_options(baseline_of, wheel, baselines, update, hold_cpu)
-    histories = find_stored_histories(HISTORIES if history is None else history, named=history is not None)
-    if baselines is not None and not baselines.exists() and not update:
-        raise ScenarioError(f"--baselines {baselines}: there is no such folder; with --update it is made")
-    for option, path in (("--junit", junit), ("--markdown", markdown)):
-        if path is not None:
-            _check_path(option, path)
-    files = [(junit, junit_xml), (markdown, markdown_page)]
-    unfinished = _mark_unfinished({junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN})
-    with showing_traceback(traceback), unfinished, ProgressBars() as progress:
-        trace = print_traceback if traceback else None
-        held: Path | GivenBaselines | None = baselines
-        if baseline_of is not None:
-            held = _ride_baselines(progress, baseline_of, scenario, engine, wheel, cache)
-        verdicts, fresh = check_gate(progress.watch, scenario, engine, held, configure_engine, trace, hold_cpu)
-        if histories:
-            after = {name: one["engines"] for name, one in fresh.items()}
-            verdicts = name_origins(verdicts, scenario or (), read_baselines(held, scenario), after, histories)
+    with showing_traceback(traceback), ProgressBars() as progress:
+        from ..files import write_text
+        from ..gate import (
+            UNFINISHED_JUNIT,
+            UNFINISHED_MARKDOWN,
+            GivenBaselines,
+            check_gate,
+            junit_xml,
+            list_bicycle_warnings,
+            list_left_out,
+            list_unjudged_engines,
+            markdown_page,
+            read_baselines,
+            refused_verdicts,
+            update_baselines,
+        )
+        from ..history import find_stored_histories, name_origins
+        from ..run import configure_engine, installed_engines
+        from .present_gate import show_verdicts
+
+        if reason is not None and not update:
+            raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
+        # Checked first, so that minutes of work are not lost.
+        _check_baseline_options(baseline_of, wheel, baselines, update, hold_cpu)
+        histories = find_stored_histories(HISTORIES if history is None else history, named=history is not None)
+        if baselines is not None and not baselines.exists() and not update:
+            raise ScenarioError(f"--baselines {baselines}: there is no such folder; with --update it is made")
+        for option, path in (("--junit", junit), ("--markdown", markdown)):
+            if path is not None:
+                _check_path(option, path)
+        files = [(junit, junit_xml), (markdown, markdown_page)]
+        with _mark_unfinished({junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN}):
+            trace = print_traceback if traceback else None
+            held: Path | GivenBaselines | None = baselines
+            if baseline_of is not None:
+                held = _ride_baselines(progress, baseline_of, scenario, engine, wheel, cache)
+            progress.say(COMPUTING)
+            verdicts, fresh = check_gate(progress.watch, scenario, engine, held, configure_engine, trace, hold_cpu)
+            if histories:
+                after = {name: one["engines"] for name, one in fresh.items()}
+                verdicts = name_origins(verdicts, scenario or (), read_baselines(held, scenario), after, histories)
     for path, page in files:
         if path is not None:
             write_text(path, page(verdicts))

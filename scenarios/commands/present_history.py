@@ -1,4 +1,4 @@
-"""Progress and terminal output of `velodrome history`."""
+"""Terminal output of `velodrome history`, and the count of its rides."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich import progress as bars
 from rich.console import Console
 
 from ...reports.page import describe_run, group_releases
 from ..history import HistoryPlan, PlannedRide
+from .progress import ProgressBars
 from .tables import Column, print_table
 
 _MOST_QUANTITIES = 4  # of a turning point, in the table; the document has all of them
@@ -20,50 +20,32 @@ _UNMOVED = {"same-bits": "same to the bit", "round-off": "same within round-off"
 _STYLES = {"worse": "red", "changed": "yellow", "better": "cyan"}
 
 
-class HistoryProgress:
-    """Finished rides, remaining time and failures on stderr; a context. Bars are shown on a terminal only.
+class HistoryCounter:
+    """Counts a history's rides on a command's bars, and tells failures, each once.
 
     Parameters
     ----------
+    progress : ProgressBars
     plan : HistoryPlan
     bisect : bool
         Whether only some of the rides are needed, so that their number is not known.
     """
 
-    def __init__(self, plan: HistoryPlan, bisect: bool) -> None:
-        columns = (
-            bars.TextColumn("{task.description}"),
-            bars.BarColumn(),
-            bars.MofNCompleteColumn(),
-            bars.TimeElapsedColumn(),
-            bars.TimeRemainingColumn(),
-        )
-        self._console = Console(stderr=True)
-        self._bars = bars.Progress(*columns, console=self._console, transient=True)
+    def __init__(self, progress: ProgressBars, plan: HistoryPlan, bisect: bool) -> None:
+        self._progress, self._package = progress, plan.package
+        self._rides, self._total = 0, None if bisect else len(plan.rides)
         self._told: set[str] = set()
-        self._task = self._bars.add_task(plan.package, total=None if bisect else len(plan.rides))
-
-    def __enter__(self) -> HistoryProgress:
-        if self._console.is_terminal:
-            self._bars.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._console.is_terminal:
-            self._bars.stop()
+        progress.say("installing releases")
 
     def watch(self, ride: PlannedRide, row: Mapping[str, Any], fresh: bool) -> None:
         """Count a row; a row of an earlier session is not told again."""
-        self._bars.update(self._task, advance=1, description=f"{ride.release.package} {ride.release.label}")
+        self._rides += 1
+        self._progress.watch(self._package, self._rides, self._total, "rides")
         line = f"{ride.release.label} {ride.engine}: {row['status']}: {row['reason']}"
         # The same reason on every scenario is told once.
         if fresh and row["reason"] is not None and line not in self._told:
             self._told.add(line)
-            self.note(line)
-
-    def note(self, line: str) -> None:
-        """Print a line above the bar."""
-        self._console.print(line, soft_wrap=True, highlight=False, markup=False)
+            self._progress.note(line)
 
 
 def show_history(console: Console, document: Mapping[str, Any]) -> None:

@@ -11,7 +11,6 @@ import typer
 from ..error import MissingMotionError, ScenarioError
 from .completion import complete_engine, complete_scenario
 from .options import (
-    STARTING,
     BicycleOption,
     ChangesOption,
     DurationOption,
@@ -33,16 +32,35 @@ if TYPE_CHECKING:
 
 def list_command(as_json: JsonOption = False) -> None:
     """Scenarios of the library, and engines with the commands that install those that are not there."""
-    from ...engines.engine import describe_engine
-    from ...engines.registry import load_engine, uninstalled_engines
-    from ...engines.releases import find_reach
-    from ..run import installed_engines
+    from .progress import ProgressBars
+
+    with ProgressBars():
+        scenarios, engines = _list_scenarios(), _list_engines()
+    with ending_with(0):
+        if as_json:
+            print_json({"scenarios": scenarios, "engines": engines})
+        else:
+            _show_list(scenarios, engines)
+
+
+def _list_scenarios() -> list[dict[str, Any]]:
+    """Return the scenarios of the library as JSON objects."""
     from ..scenario import library_names, load_scenario
 
     scenarios = []
     for name in library_names():
         _, scenario = load_scenario(name)
         scenarios.append({"name": name, "title": scenario.title, "tags": list(scenario.tags)})
+    return scenarios
+
+
+def _list_engines() -> list[dict[str, Any]]:
+    """Return the engines as JSON objects, those whose libraries are not installed last."""
+    from ...engines.engine import describe_engine
+    from ...engines.registry import load_engine, uninstalled_engines
+    from ...engines.releases import find_reach
+    from ..run import installed_engines
+
     engines: list[dict[str, Any]] = []
     for name in installed_engines():
         try:
@@ -54,15 +72,10 @@ def list_command(as_json: JsonOption = False) -> None:
             engines.append({"name": name, **described, **given, **({} if refusal is None else {"error": refusal})})
         except ValueError as error:
             engines.append({"name": name, "version": None, "gives": [], "error": " ".join(str(error).split())})
-    engines += [
+    return engines + [
         {"name": name, "version": None, "gives": [], "install": command}
         for name, command in uninstalled_engines().items()
     ]
-    with ending_with(0):
-        if as_json:
-            print_json({"scenarios": scenarios, "engines": engines})
-        else:
-            _show_list(scenarios, engines)
 
 
 def _show_list(scenarios: list[dict[str, Any]], engines: list[dict[str, Any]]) -> None:
@@ -117,23 +130,25 @@ def run_command(
 
     --bicycle replaces a scenario's bicycle; --set bicycle.KEY=VALUE then changes single parameters of it.
     """
-    from ..run import installed_engines, run_plan
-    from .present_run import outcome_json, show_outcome
-    from .progress import ProgressBars, show_working
+    from .progress import COMPUTING, RIDING, ProgressBars
     from .terminal import make_console
 
-    sources = [*(scenario or []), *(_find_tagged(tag) if tag is not None else [])]
-    if not sources:
-        raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
-    changes = parse_changes(change, duration)
-    installed_engines()  # raises here if two packages announce one engine, which is not a fault of a scenario
-    other = None if bicycle is None else load_bicycle(bicycle).bicycle
-    with answering_missing_motion(as_json), showing_traceback(traceback), show_working(STARTING):
+    with answering_missing_motion(as_json), showing_traceback(traceback), ProgressBars() as progress:
+        from ..run import installed_engines, run_plan
+        from .present_run import outcome_json, show_outcome
+
+        sources = [*(scenario or []), *(_find_tagged(tag) if tag is not None else [])]
+        if not sources:
+            raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
+        changes = parse_changes(change, duration)
+        installed_engines()  # raises here if two packages announce one engine, which is not a fault of a scenario
+        other = None if bicycle is None else load_bicycle(bicycle).bicycle
+        progress.say(COMPUTING)
         plans = [_plan_source(source, changes, engine, other) for source in dict.fromkeys(sources)]
     console = make_console(stderr=as_json)
     outcomes = []
     for plan in plans:
-        with ProgressBars() as progress:
+        with ProgressBars(RIDING) as progress:
             outcome = run_plan(plan, out, progress.watch, progress.note, print_traceback if traceback else None)
         outcomes.append((plan, outcome))
         with ending_with(0):  # the next run goes on if the reader of this table has closed the pipe
