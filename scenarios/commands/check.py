@@ -89,7 +89,7 @@ def check_command(
 ) -> None:
     """The drift gate: run the gated scenarios and hold them against the committed baselines."""
     from .progress import COMPUTING, ProgressBars
-    from .terminal import make_console
+    from .terminal import make_console, print_line, print_words
 
     with showing_traceback(traceback), ProgressBars() as progress:
         from ..files import write_text
@@ -171,22 +171,22 @@ def check_command(
             show_verdicts(console, verdicts, renewed=update)
             if isinstance(held, GivenBaselines) and others:
                 line = f"not judged, not of the package {held.package}: {', '.join(others)}"
-                console.print(line, markup=False, highlight=False, soft_wrap=True)
+                print_words(console, line)
             if left_out:
                 install = "; ".join(dict.fromkeys(left_out.values()))
                 line = f"not judged, their libraries are not installed: {', '.join(left_out)}; install: {install}"
-                console.print(line, markup=False, highlight=False, soft_wrap=True)
+                print_words(console, line)
             for name, lines in warnings.items():
                 for line in lines:
                     text = f"warning: {name}: {line}"
-                    console.print(text, style="yellow", markup=False, soft_wrap=True)
+                    print_words(console, text, "yellow")
             if update and not written and not refused:
                 console.print("no baseline written: nothing moved beyond its limit")
             for name in written:
-                console.print(f"baseline written: {name}", soft_wrap=True)
+                print_line(console, f"baseline written: {name}")
             for name, verdict in refused:
                 line = f"no baseline written of {verdict.engine} on {name}: {verdict.reason}"
-                console.print(line, style="red", markup=False, soft_wrap=True)
+                print_words(console, line, "red")
 
 
 def _check_baseline_options(

@@ -14,6 +14,7 @@ from ...reports.page import describe_run, group_releases
 from ..history import HistoryPlan, PlannedRide
 from .progress import ProgressBars
 from .tables import Column, print_table
+from .terminal import print_words
 
 _MOST_QUANTITIES = 4  # of a turning point, in the table; the document has all of them
 _UNMOVED = {"same-bits": "same to the bit", "round-off": "same within round-off"}
@@ -56,7 +57,7 @@ def show_history(console: Console, document: Mapping[str, Any]) -> None:
     slow = {(move["scenario"], move["engine"], move["release"]) for move in document["gradual_moves"]}
     for (scenario, engine), rows in by_pair.items():
         console.print()
-        console.print(f"{scenario}: {engine}", style="bold", markup=False, soft_wrap=True)
+        print_words(console, f"{scenario}: {engine}", "bold")
         found = group_releases(rows)
         columns = [
             Column("releases", [_name_releases(group) for group in found], right=False),
@@ -68,10 +69,10 @@ def show_history(console: Console, document: Mapping[str, Any]) -> None:
     console.print()
     builds = {row["release"]: [row["wheel"], *row["companions"]] for row in document["releases"] if row["wheel"]}
     for release, wheels in builds.items():
-        console.print(f"{release}: {', '.join(wheels)}", style="dim", markup=False, highlight=False, soft_wrap=True)
+        print_words(console, f"{release}: {', '.join(wheels)}", "dim")
     _show_turning_points(console, document)
     for line in document["remarks"]:
-        console.print(line, style="yellow", markup=False, highlight=False, soft_wrap=True)
+        print_words(console, line, "yellow")
 
 
 def _name_releases(group: Sequence[Mapping[str, Any]]) -> str:
@@ -87,7 +88,7 @@ def _describe_inside(group: Sequence[Mapping[str, Any]], slow: Collection[tuple[
     if not inside:
         return "rode"
     if any((row["scenario"], row["engine"], row["release"]) in slow for row in group[1:]):
-        return "each within round-off of the one before, moved gradually"
+        return "moved gradually, each step round-off"
     return "same to the bit" if inside == {"same-bits"} else "same within round-off"
 
 
@@ -130,13 +131,13 @@ def _show_turning_points(console: Console, document: Mapping[str, Any]) -> None:
 
 def _show_moves(console: Console, line: str, point: Mapping[str, Any]) -> None:
     """Print a line, and below it what moved most."""
-    console.print(line, style=_STYLES.get(point["verdict"]), markup=False, highlight=False, soft_wrap=True)
+    print_words(console, line, _STYLES.get(point["verdict"], ""))
     moved = sorted(point["quantities"], key=_rank_move)
     for move in moved[:_MOST_QUANTITIES]:
-        console.print(f"  {_describe_move(move)}", markup=False, highlight=False, soft_wrap=True)
+        print_words(console, f"  {_describe_move(move)}")
     if len(moved) > _MOST_QUANTITIES:
         more = ", ".join(move["quantity"] for move in moved[_MOST_QUANTITIES:])
-        console.print(f"  and {more}", markup=False, highlight=False, soft_wrap=True)
+        print_words(console, f"  and {more}")
 
 
 def _rank_move(move: Mapping[str, Any]) -> float:

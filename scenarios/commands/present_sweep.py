@@ -14,6 +14,7 @@ from ...reports.drawing import format_numbers
 from ..sweep import BROKEN, COMPUTED, REFUSED, RESULTS, Done, Task
 from .progress import ProgressBars
 from .tables import Column, print_table
+from .terminal import print_line, print_words
 
 ROW_STYLES = dict.fromkeys(COMPUTED, "cyan") | {"done": "green", REFUSED: "yellow"} | dict.fromkeys(BROKEN, "red")
 _DIGITS = 3
@@ -82,14 +83,10 @@ def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> 
     print_table(console, columns)
     for name, entry in entries.items():
         for reason in entry.get("reasons", ()):
-            _print_line(console, f"{name} {reason}", ROW_STYLES[reason.partition(":")[0]])
+            print_words(console, f"{name} {reason}", ROW_STYLES[reason.partition(":")[0]])
     if document["stopped"] is None:
-        _print_line(console, f"data set: {document['folder']}/{RESULTS}")
+        print_line(console, f"data set: {document['folder']}/{RESULTS}")
         return
     missing = f"{document['missing']} of {document['tasks']} runs are missing, finished runs are kept"
-    _print_line(console, f"{document['stopped']}: {missing}", "yellow")
-    _print_line(console, f"continue with: {resume}")
-
-
-def _print_line(console: Console, line: str, style: str | None = None) -> None:
-    console.print(line, style=style, markup=False, soft_wrap=True)
+    print_words(console, f"{document['stopped']}: {missing}", "yellow")
+    print_line(console, f"continue with: {resume}")

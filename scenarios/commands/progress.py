@@ -26,7 +26,6 @@ SILENCE = "VELODROME_PROGRESS"  # environment variable: off for no progress
 # its input, writes nothing but its result. Then the time doubles until a line comes a minute.
 _FIRST_LINE, _LONGEST_PAUSE = 5.0, 60.0
 _WIDEST_BAR, _NARROWEST_BAR = 40, 5
-_MOST_IN_A_LINE = 4  # parts of the work that are told in one plain line
 # Loaded by commands that need it. It is looked up here because its import, with numba's, takes half a second.
 _COMPILATION = f"{__name__.partition('.scenarios.')[0]}.reference.kernels.compilation"
 
@@ -49,6 +48,7 @@ class ProgressBars:
         wanted = os.environ.get(SILENCE) != "off"
         self._animated = wanted and self._console.is_terminal and not self._console.is_dumb_terminal
         self._doing: str | None = doing
+        self._latest: str | None = None  # what was counted last
         self._since = time.monotonic()
         self._spinner = Spinner("dots")
         self._tasks: dict[str, bars.TaskID] = {}
@@ -94,13 +94,14 @@ class ProgressBars:
         unit : str
             What is counted.
         """
-        self._doing = None
         # Parts of a second, or of another number with decimals; pieces are counted as a whole.
         shown = f"{done:.1f}" if unit in ("s", "1/m") else f"{done:.0f}"
         count = f"{shown}{'' if total is None else f' of {total:g}'} {unit}"
         if name not in self._tasks:
             self._tasks[name] = self._bars.add_task(name, total=total, count=count)
         self._bars.update(self._tasks[name], completed=done, total=total, count=count)
+        self._latest = f"{name} {count}"
+        self._doing = None
 
     def note(self, line: str) -> None:
         """Print a line above the bars."""
@@ -140,11 +141,9 @@ class ProgressBars:
 
     def _describe_now(self) -> str:
         """Return what is being done in one line."""
-        tasks = list(self._bars.tasks)
-        running = [task for task in tasks if not task.finished] or tasks[-1:]
-        counts = [f"{task.description} {task.fields['count']}" for task in running[-_MOST_IN_A_LINE:]]
-        parts = [describe_compilation() or self._doing, *counts]
-        return "; ".join(part for part in parts if part is not None)
+        # Something that is said is done before or after what the bars count, so that only one of both goes on.
+        now = self._latest if self._doing is None else self._doing
+        return "; ".join(part for part in (describe_compilation(), now) if part is not None)
 
 
 def describe_compilation() -> str | None:

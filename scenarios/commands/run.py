@@ -26,6 +26,8 @@ from .options import (
 )
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ...reference.bicycle import Bicycle
     from ..run import RunOutcome, RunPlan
 
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
 def list_command(as_json: JsonOption = False) -> None:
     """Scenarios of the library, and engines with the commands that install those that are not there."""
     from .progress import ProgressBars
+    from .terminal import make_console
 
     with ProgressBars():
         scenarios, engines = _list_scenarios(), _list_engines()
@@ -40,7 +43,7 @@ def list_command(as_json: JsonOption = False) -> None:
         if as_json:
             print_json({"scenarios": scenarios, "engines": engines})
         else:
-            _show_list(scenarios, engines)
+            show_list(make_console(), scenarios, engines)
 
 
 def _list_scenarios() -> list[dict[str, Any]]:
@@ -78,13 +81,13 @@ def _list_engines() -> list[dict[str, Any]]:
     ]
 
 
-def _show_list(scenarios: list[dict[str, Any]], engines: list[dict[str, Any]]) -> None:
+def show_list(console: Console, scenarios: list[dict[str, Any]], engines: list[dict[str, Any]]) -> None:
+    """Print the tables of `velodrome list`, and the commands that install the libraries of further engines."""
     from rich.table import Table
     from rich.text import Text
 
-    from .terminal import make_console
+    from .terminal import print_line
 
-    console = make_console()
     table = Table(box=None, pad_edge=False)
     for title in ("scenario", "title", "tags"):
         table.add_column(title, no_wrap=title == "scenario")
@@ -96,14 +99,18 @@ def _show_list(scenarios: list[dict[str, Any]], engines: list[dict[str, Any]]) -
     for title in ("engine", "version", "what it is"):
         table.add_column(title, no_wrap=title == "engine")
     for entry in engines:
-        if "error" in entry:
-            words = Text(entry["error"], "red")
-        elif "install" in entry:
-            words = Text(f"not installed: {entry['install']}", "dim")
-        else:
-            words = Text(entry["description"])
+        if "install" in entry:
+            continue
+        words = Text(entry["error"], "red") if "error" in entry else Text(entry["description"])
         table.add_row(entry["name"], entry["version"] or "–", words)
     console.print(table)
+    installs: dict[str, list[str]] = {}
+    for entry in engines:
+        if "install" in entry:
+            installs.setdefault(entry["install"], []).append(entry["name"])
+    for command, names in installs.items():
+        print_line(console, f"not installed: {', '.join(names)}", "dim")
+        print_line(console, f"  {command}", "dim")
 
 
 def run_command(
@@ -149,7 +156,8 @@ def run_command(
     outcomes = []
     for plan in plans:
         with ProgressBars(RIDING) as progress:
-            outcome = run_plan(plan, out, progress.watch, progress.note, print_traceback if traceback else None)
+            trace = print_traceback if traceback else None
+            outcome = run_plan(plan, out, progress.watch, progress.note, trace, progress.say)
         outcomes.append((plan, outcome))
         with ending_with(0):  # the next run goes on if the reader of this table has closed the pipe
             show_outcome(console, plan, outcome)

@@ -160,7 +160,12 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
 
 
 def run_plan(
-    plan: RunPlan, out: Path, watch: RunWatch, note: Callable[[str], None], trace: Trace | None = None
+    plan: RunPlan,
+    out: Path,
+    watch: RunWatch,
+    note: Callable[[str], None],
+    trace: Trace | None = None,
+    say: Callable[[str], None] = lambda _: None,
 ) -> RunOutcome:
     """Run every engine of a plan and write the run folder.
 
@@ -178,17 +183,24 @@ def run_plan(
         Called with a line of text for warnings and failures.
     trace : callable, optional
         Called with the name of an engine that failed and its exception.
+    say : callable
+        Called after the rides with what is being done.
 
     Returns
     -------
     RunOutcome
     """
-    folder, result = store_run(plan, out, watch, note, trace)
+    folder, result = store_run(plan, out, watch, note, trace, say)
     return RunOutcome(folder, result.metrics, result.failures, result.verdicts, result.interrupted)
 
 
 def store_run(
-    plan: RunPlan, out: Path, watch: RunWatch, note: Callable[[str], None], trace: Trace | None = None
+    plan: RunPlan,
+    out: Path,
+    watch: RunWatch,
+    note: Callable[[str], None],
+    trace: Trace | None = None,
+    say: Callable[[str], None] = lambda _: None,
 ) -> tuple[Path, RunResult]:
     """Run every engine of a plan and write the run folder; return the folder and all results.
 
@@ -206,7 +218,9 @@ def store_run(
 
     rides = ride_plan(plan, watch, note, trace, store)
     with _block_interrupts():
+        say("measuring the rides")
         result = measure_run(plan, rides)
+        say("writing the recording and the report")
         write_sealed(folder / "metrics.json", result.metrics, RUN_VERSION)
         write_run_recording(folder, plan, result.shown, result.metrics, result.failures, result.verdicts)
         complete = not result.interrupted

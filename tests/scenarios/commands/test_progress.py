@@ -136,4 +136,4 @@ def test_compilation_is_told(
         kernel(2.5)
     ((compiled, most),) = found
     assert compiled < most
-    assert f"compiling kernels, once on this machine: {compiled} of at most {most} (" in text.getvalue()
+    assert f"compiling kernels, once on this machine: {compiled} of at most {most}" in text.getvalue()

@@ -106,7 +106,7 @@ def show_all_families(console: Console) -> None:
 def show_critical_shapes(console: Console) -> None:
     keys = ("alpha", "rear_rate", "lean", "steer")
     shape: dict[str, Any] = dict(zip(keys, NUMBERS, strict=True))
-    shape |= {"physical": False, "unphysical_because": ["the ground pulls the rear wheel: -1 N"]}
+    shape |= {"physical": False, "unphysical_because": ["the ground would have to pull the rear wheel: -1 N"]}
     show_critical(
         console,
         {
