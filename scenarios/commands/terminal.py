@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from textwrap import wrap
 
 from rich.console import Console
 from rich.text import Text
+
+# The space between a number and its unit, and what stands for it while lines are broken.
+_BEFORE_UNIT, _NO_BREAK = re.compile(r"(?<=\d) (?=(?:m|s|N|J|%|rad|1/s|m/s|rad/s)(?:[\s,;:.)]|$))"), "\u00a0"
 
 
 def make_console(stderr: bool = False) -> Console:
@@ -22,9 +26,10 @@ def print_words(console: Console, words: str, style: str = "") -> None:
     if console.is_terminal:
         # Further lines are indented two letters more than the first.
         indent = " " * (len(words) - len(words.lstrip()) + 2)
-        lines = wrap(words, console.width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+        whole = _BEFORE_UNIT.sub(_NO_BREAK, words)
+        lines = wrap(whole, console.width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     for line in lines:
-        print_line(console, line, style)
+        print_line(console, line.replace(_NO_BREAK, " "), style)
 
 
 def print_line(console: Console, line: str, style: str = "") -> None:

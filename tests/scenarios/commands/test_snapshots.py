@@ -8,16 +8,14 @@ difference.
 from __future__ import annotations
 
 import io
-import json
 import os
 import re
 from collections.abc import Callable
-from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import pytest
 from rich.console import Console
+from stored_documents import HERE, show_stored_run, stored
 
 from velodrome.scenarios.commands.present_diff import show_diff
 from velodrome.scenarios.commands.present_gate import show_verdicts
@@ -25,14 +23,11 @@ from velodrome.scenarios.commands.present_history import show_history
 from velodrome.scenarios.commands.present_league import show_league
 from velodrome.scenarios.commands.present_motions import show_circular, show_critical, show_families
 from velodrome.scenarios.commands.present_precision import show_precision
-from velodrome.scenarios.commands.present_run import show_outcome
 from velodrome.scenarios.commands.present_show import show_document
 from velodrome.scenarios.commands.present_sweep import show_summary
 from velodrome.scenarios.commands.run import show_list
 from velodrome.scenarios.gate import Verdict
-from velodrome.scenarios.run import RunOutcome, RunPlan
 
-HERE = Path(__file__).parent
 WIDTHS = (60, 80, 120)
 COLOURED = 80  # width of the coloured snapshot
 CODES = re.compile(r"\x1b\[([0-9;]*)m")
@@ -41,21 +36,6 @@ POWER = re.compile(r"(?<![\w.])-?\d\.\d+e([+-]\d\d)(?!\w)")
 COPIED = ("run folder: ", "report: ", "recording: ", "data set: ", "continue with: ", "not installed: ")
 
 Show = Callable[[Console], None]
-
-
-def stored(name: str) -> Any:
-    return json.loads((HERE / "stored" / f"{name}.json").read_text(encoding="utf-8"))
-
-
-def show_run(console: Console) -> None:
-    run = stored("run")
-    scenario = SimpleNamespace(title=run["title"], simulation=SimpleNamespace(duration=run["duration"]))
-    plan = SimpleNamespace(name=run["name"], scenario=scenario, left_out=run["left_out"])
-    folder = Path("runs/q2-plus-20260102T030405")
-    outcome = SimpleNamespace(
-        metrics=run["metrics"], verdicts=run["verdicts"], failures=run["failures"], folder=folder, interrupted=False
-    )
-    show_outcome(console, cast(RunPlan, plan), cast(RunOutcome, outcome))
 
 
 def show_gate(name: str) -> Show:
@@ -69,7 +49,7 @@ def show_gate(name: str) -> Show:
 SHOWN: dict[str, Show] = {
     "list": lambda console: show_list(console, **stored("list")),
     "show": lambda console: show_document(console, stored("show")),
-    "run": show_run,
+    "run": lambda console: show_stored_run(console, stored("run")),
     "precision": lambda console: show_precision(console, stored("precision")),
     "league": lambda console: show_league(console, stored("league")),
     "diff": lambda console: show_diff(console, stored("diff")),
