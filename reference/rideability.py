@@ -129,7 +129,7 @@ def explain_obstacles(
     for wheel, margin in zip(WHEELS, margins, strict=False):
         normal = weight * (margin + kernel.PUSHED)
         if not margin > 0:
-            verb = "pulls" if margin < -2 * kernel.PUSHED else "does not push"
+            verb = "would have to pull" if margin < -2 * kernel.PUSHED else "does not push"
             reasons.append(f"the ground {verb} the {wheel} wheel: {normal:.3g} N")
     for k, (wheel, margin) in enumerate(zip(WHEELS, margins[_RIMS], strict=True)):
         if not margin > 0:

@@ -1,3 +1,4 @@
+import os
 import signal
 import sys
 from collections.abc import Iterator
@@ -11,6 +12,10 @@ settings.load_profile("house")
 
 # A background job inherits SIGINT ignored, and tests press Ctrl-C.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+# Progress comes by the clock, and tests state what a command writes. The tests of progress allow it.
+os.environ["VELODROME_PROGRESS"] = "off"
 
 
 @pytest.fixture(autouse=True)

@@ -7,6 +7,7 @@ from typing import Any
 
 from executed import run_commands
 from sphinx.application import Sphinx
+
 from velodrome.scenarios.view import stored_page
 
 RIDE = "velodrome run q2-plus --out runs"

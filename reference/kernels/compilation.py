@@ -20,17 +20,63 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
+from weakref import WeakSet
 
 import numba as nb
-from numba.core import config
+from numba.core import config, event
 
 _lock = threading.Lock()
+
+
+class _CompilationCount(event.Listener):
+    """Count of the kernels that numba compiles, not of those that it loads from the disk.
+
+    numba compiles one at a time, with those that it calls inside it.
+
+    Attributes
+    ----------
+    kernels : WeakSet
+        All that have been declared.
+    compiled : WeakSet
+        Those compiled in this process, for one set of argument types at least.
+    depth : int
+        Number of kernels that are being compiled, each one called by the one before.
+    """
+
+    def __init__(self) -> None:
+        self.kernels: WeakSet[Any] = WeakSet()
+        self.compiled: WeakSet[Any] = WeakSet()
+        self.depth = 0
+
+    def on_start(self, event: Any) -> None:
+        self.depth += event.data["dispatcher"] in self.kernels
+
+    def on_end(self, event: Any) -> None:
+        if event.data["dispatcher"] in self.kernels:
+            self.depth -= 1
+            self.compiled.add(event.data["dispatcher"])
+
+
+_count = _CompilationCount()
+event.register("numba:compile", _count)
+
+
+def find_compilation() -> tuple[int, int] | None:
+    """Return how far the compilation of kernels is, for telling a user who waits.
+
+    Returns
+    -------
+    tuple of int, or None
+        How many kernels have been compiled in this process, and how many there are in the modules that are loaded, not
+        all of which are needed; None if none is being compiled.
+    """
+    return (len(_count.compiled), len(_count.kernels)) if _count.depth > 0 else None
 
 
 def jit(function: Callable[..., Any]) -> Any:
     """Compile a kernel on its first call for each set of argument types."""
     with _cache_folder_set(function):
-        return nb.njit(cache=True, error_model="numpy")(function)
+        return _declare(nb.njit(cache=True, error_model="numpy")(function))
 
 
 def jit_inline(function: Callable[..., Any]) -> Any:
@@ -40,7 +86,13 @@ def jit_inline(function: Callable[..., Any]) -> Any:
     memory costs as much as the arithmetic in it (measured: a quarter of the right-hand side).
     """
     with _cache_folder_set(function):
-        return nb.njit(cache=True, error_model="numpy", forceinline=True)(function)
+        return _declare(nb.njit(cache=True, error_model="numpy", forceinline=True)(function))
+
+
+def _declare(kernel: Any) -> Any:
+    """Count a kernel as one that may be compiled, and return it."""
+    _count.kernels.add(kernel)
+    return kernel
 
 
 def compile_callback(signature: Any, cache: bool = True, **options: Any) -> Callable[[Callable[..., Any]], Any]:

@@ -23,6 +23,7 @@ from .plots import (
     mode_plots,
     to_nanoseconds,
 )
+from .remarks import group_remarks, make_remarks
 from .summary import (
     COLUMNS,
     describe_required_friction,
@@ -30,7 +31,7 @@ from .summary import (
     find_unsteadiness,
     format_table,
     format_verdict,
-    make_remarks,
+    is_whole_ride,
     make_summary,
     rank_engines,
 )
@@ -67,6 +68,8 @@ __all__ = [
     "format_table",
     "format_verdict",
     "ground_disc",
+    "group_remarks",
+    "is_whole_ride",
     "lift_points",
     "make_ground",
     "make_printable",

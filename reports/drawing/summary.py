@@ -9,9 +9,9 @@ from typing import Any
 from ...engines.engine import REFERENCE
 from ...reference.inputs import Inputs
 from ...reference.surface import Surface, SurfaceOfRevolution
-from ..measure import describe_mismatch
 from .markdown import escape_markdown
 from .numbers import format_numbers
+from .remarks import group_remarks
 
 # (title, unit, metric, part of a metric that has parts)
 COLUMNS: tuple[tuple[str, str, str, str | None], ...] = (
@@ -55,71 +55,29 @@ def rank_engines(measured: Mapping[str, Mapping[str, Any]]) -> list[str]:
     return sorted(measured, key=rank)
 
 
+def is_whole_ride(metrics: Mapping[str, Any]) -> bool:
+    """Return whether an engine rode to the end: it neither fell nor ended early."""
+    # Folders of earlier versions do not have every metric.
+    return metrics.get("fell_at") is None and metrics.get("ended") is None
+
+
 def format_table(measured: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
     """Format the table of a run: the cells of `COLUMNS` by engine, in the order of `rank_engines`.
 
-    Each column has one notation, see `format_numbers`; a dash stands where there is no value.
+    Each column has one notation, see `format_numbers`, which the whole rides decide; a dash stands where there is no
+    value.
     """
     names = rank_engines(measured)
+    whole = [is_whole_ride(measured[name]) for name in names]
     columns = [
-        format_numbers([_pick(measured[name].get(metric), part) for name in names]) for _, _, metric, part in COLUMNS
+        format_numbers([_pick(measured[name].get(metric), part) for name in names], deciding=whole)
+        for _, _, metric, part in COLUMNS
     ]
     return {name: [cells[k] for cells in columns] for k, name in enumerate(names)}
 
 
 def _pick(value: Any, part: str | None) -> Any:
     return value.get(part) if isinstance(value, Mapping) else value
-
-
-def make_remarks(name: str, metrics: Mapping[str, Any], duration: float) -> list[str]:
-    """List what a reader must know before trusting an engine's row."""
-    lines = []
-    if metrics["fell_at"] is not None:
-        lines.append(f"{name} fell at {metrics['fell_at']:.2f} s; its figures are those up to there")
-    if metrics["friction_left_at"] is not None:
-        needed, there = metrics["required_friction"], metrics["friction"]
-        most = "the ground to pull" if needed is None else f"a coefficient of friction of up to {needed:.3g}"
-        lines.append(
-            f"{name}: rolling needs {most}, its contacts have {there:.3g}: too little from "
-            f"{metrics['friction_left_at']:.2f} s on"
-        )
-    if metrics["min_normal_force"] is not None and metrics["min_normal_force"] < 0:
-        pull = -metrics["min_normal_force"]
-        lines.append(f"{name}: the ground pulls a wheel, by up to {pull:.3g} N; no contact could")
-    if metrics["ended"] is not None:
-        lines.append(f"{name} ended early: {metrics['ended']}")
-    if _equals_reference(metrics):
-        lines.append(f"{name}: its ride equals the reference's to the last bit, so nothing was compared")
-    # Folders of earlier versions do not have this metric.
-    if metrics.get("unconverged_steps"):
-        residual = metrics.get("largest_residual")
-        left = "" if residual is None else f", with a relative residual of up to {residual:.2g}"
-        lines.append(
-            f"{name}: its iterations did not converge in {metrics['unconverged_steps']} of {metrics['steps']} steps"
-            f"{left}; its figures are not those of its equations"
-        )
-    # Of a whole ride the rate is absent only where the drift is lost in the error of the damping's work.
-    lost = metrics.get("energy_drift") is not None and metrics["energy_drift_rate"] is None
-    if lost and metrics["ended"] is None:
-        lines.append(
-            f"{name}: its energy drift is no more than {metrics['energy_drift']:.2g}, the error of the damping's work "
-            "between samples; a higher output rate shows more"
-        )
-    # Before the errors that may come of it. Folders of earlier versions do not have this metric.
-    lines += [f"{name}, for this release: {text}" for text in metrics.get("adaptations") or ()]
-    if metrics["contact_force_error_at"] == 0:
-        later = metrics["settled_force_error"]
-        rest = "" if later is None else f"; once settled it is {later:.2g}"
-        lines.append(f"{name}: the force error is largest in the first sample{rest}")
-    # Folders of earlier versions do not have this metric.
-    lines += [f"{name}: {describe_mismatch(report)}" for report in metrics.get("inconsistent_reports") or ()]
-    if metrics["not_finite"]:
-        lines.append(f"{name}: not finite in some samples: {', '.join(metrics['not_finite'])}")
-    if metrics["horizon"] is not None and metrics["horizon"] < duration:
-        lines.append(
-            f"{name}: beyond {metrics['horizon']:.2f} s the motion's own instability makes the error meaningless"
-        )
-    return lines
 
 
 def describe_required_friction(measured: Mapping[str, Mapping[str, Any]]) -> str | None:
@@ -129,13 +87,6 @@ def describe_required_friction(measured: Mapping[str, Mapping[str, Any]]) -> str
     """
     needed = measured.get(REFERENCE, {}).get("required_friction")
     return None if needed is None else f"Rolling without slip needs a coefficient of friction of up to {needed:.3g}."
-
-
-def _equals_reference(metrics: Mapping[str, Any]) -> bool:
-    """Return whether path, orientation of the frame and rate of the wheel have no error over the whole ride."""
-    errors = [metrics.get("position_error"), metrics.get("orientation_error"), {"max": metrics.get("rear_rate_error")}]
-    whole = metrics["ended"] is None and metrics["fell_at"] is None
-    return whole and all(error is not None and error["max"] == 0 for error in errors)
 
 
 def make_summary(
@@ -184,8 +135,8 @@ def make_summary(
     lines += [] if friction is None else [friction, ""]
     lines += [f"- {escape_markdown(format_verdict(verdict))}" for verdict in verdicts]
     lines += [f"- {escape_markdown(f'{engine} did not run: {reason}')}" for engine, reason in failures.items()]
-    for engine in table:
-        lines += [f"- {escape_markdown(line)}" for line in make_remarks(engine, measured[engine], duration)]
+    ranked = {engine: measured[engine] for engine in table}
+    lines += [f"- {escape_markdown(line)}" for line in group_remarks(ranked, duration)]
     return "\n".join(lines).rstrip() + "\n"
 
 

@@ -31,7 +31,7 @@ _SLOW, _FAST = 0.1, 100.0  # growth rates of the colour scale [1/s]
 _NORM, _COLOURS = LogNorm(_SLOW, _FAST), "YlOrRd"
 _CAUSE_LINES = {"hopf": "-", "energy": ":", "end": "--"}
 _CAUSE_LABELS = {"hopf": "a complex pair crosses (Hopf)", "energy": "the energy is extreme", "end": "the family ends"}
-_NOT_RIDDEN = "cannot be ridden: a wheel is pulled or a rim inside the ground"
+_NOT_RIDDEN = "cannot be ridden: contact lost, or a rim inside the ground"
 _TICKS = (0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
 
 

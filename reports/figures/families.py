@@ -40,7 +40,7 @@ _UNRIDDEN: dict[str, dict[str, Any]] = {
     "touching": {"lw": 1.4, "dashes": (1, 1.6), "alpha": 0.6},
 }
 _UNRIDDEN_STABLE: dict[str, Any] = {"lw": _STABLE, "alpha": 0.25}
-_UNRIDDEN_MEANINGS = {"pulled": "a wheel pulled", "touching": "a rim in the ground"}
+_UNRIDDEN_MEANINGS = {"pulled": "contact lost", "touching": "a rim in the ground"}
 
 
 def family_figure(

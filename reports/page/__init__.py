@@ -5,7 +5,7 @@ from .document import make_page
 from .findings import describe_stop
 from .gate import make_gate_page
 from .history import describe_run, group_releases, make_history_page
-from .league import LEAGUE_COLUMNS, find_creeping, make_league_page, rank_rides
+from .league import LEAGUE_COLUMNS, LeagueColumn, find_creeping, make_league_page, rank_rides
 from .precision import make_precision_page
 from .ride_pair import make_ride_pair_page
 from .run_diff import make_diff_page
@@ -14,6 +14,7 @@ from .sweep import make_sweep_page
 __all__ = [
     "LEAGUE_COLUMNS",
     "AnchorNames",
+    "LeagueColumn",
     "describe_run",
     "describe_stop",
     "find_creeping",

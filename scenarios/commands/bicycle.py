@@ -31,16 +31,20 @@ def bicycle_command(
     as_json: JsonOption = False,
 ) -> None:
     """A bicycle by itself: canonical matrices, eigenvalues over speed, weave and capsize speeds."""
-    import numpy as np
-
-    from ..scenario import find_bicycle
-    from ..studies import study_bicycle, write_bicycle
-    from .present_bicycle import show_bicycle
+    from .progress import ProgressBars
     from .terminal import make_console
 
-    damping = make_inputs(0.0, 0.0, steer_damping).steer_damping
-    study = study_bicycle(find_bicycle(source), np.array(parse_speeds(speeds)), damping)
-    written = [] if out is None else write_bicycle(study, out)
+    with ProgressBars() as progress:
+        import numpy as np
+
+        from ..scenario import find_bicycle
+        from ..studies import study_bicycle, write_bicycle
+        from .present_bicycle import show_bicycle
+
+        damping = make_inputs(0.0, 0.0, steer_damping).steer_damping
+        progress.say("computing the eigenvalues")
+        study = study_bicycle(find_bicycle(source), np.array(parse_speeds(speeds)), damping)
+        written = [] if out is None else write_bicycle(study, out)
     with ending_with(0):
         if as_json:
             print_json(study.as_json())

@@ -89,51 +89,52 @@ def check_command(
     as_json: JsonOption = False,
 ) -> None:
     """The drift gate: run the gated scenarios and hold them against the committed baselines."""
-    from ..files import write_text
-    from ..gate import (
-        UNFINISHED_JUNIT,
-        UNFINISHED_MARKDOWN,
-        GivenBaselines,
-        check_gate,
-        html_page,
-        junit_xml,
-        list_bicycle_warnings,
-        list_left_out,
-        list_unjudged_engines,
-        markdown_page,
-        read_baselines,
-        refused_verdicts,
-        update_baselines,
-    )
-    from ..history import find_stored_histories, name_origins
-    from ..run import configure_engine, installed_engines
-    from .present_gate import show_verdicts
-    from .progress import ProgressBars
-    from .terminal import make_console
+    from .progress import COMPUTING, ProgressBars
+    from .terminal import make_console, print_line, print_words
 
-    if reason is not None and not update:
-        raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
-    # Checked first, so that minutes of work are not lost.
-    _check_baseline_options(baseline_of, wheel, baselines, update, hold_cpu)
-    histories = find_stored_histories(HISTORIES if history is None else history, named=history is not None)
-    if baselines is not None and not baselines.exists() and not update:
-        raise ScenarioError(f"--baselines {baselines}: there is no such folder; with --update it is made")
-    for option, path in (("--junit", junit), ("--markdown", markdown), ("--page", page)):
-        if path is not None:
-            _check_path(option, path)
-    files = [(junit, junit_xml), (markdown, markdown_page)]
-    unfinished = _mark_unfinished(
-        {junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN} | ({} if page is None else {page: html_page([])})
-    )
-    with showing_traceback(traceback), unfinished, ProgressBars() as progress:
-        trace = print_traceback if traceback else None
-        held: Path | GivenBaselines | None = baselines
-        if baseline_of is not None:
-            held = _ride_baselines(progress, baseline_of, scenario, engine, wheel, cache)
-        verdicts, fresh = check_gate(progress.watch, scenario, engine, held, configure_engine, trace, hold_cpu)
-        if histories:
-            after = {name: one["engines"] for name, one in fresh.items()}
-            verdicts = name_origins(verdicts, scenario or (), read_baselines(held, scenario), after, histories)
+    with showing_traceback(traceback), ProgressBars() as progress:
+        from ..files import write_text
+        from ..gate import (
+            UNFINISHED_JUNIT,
+            UNFINISHED_MARKDOWN,
+            GivenBaselines,
+            check_gate,
+            html_page,
+            junit_xml,
+            list_bicycle_warnings,
+            list_left_out,
+            list_unjudged_engines,
+            markdown_page,
+            read_baselines,
+            refused_verdicts,
+            update_baselines,
+        )
+        from ..history import find_stored_histories, name_origins
+        from ..run import configure_engine, installed_engines
+        from .present_gate import show_verdicts
+
+        if reason is not None and not update:
+            raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
+        # Checked first, so that minutes of work are not lost.
+        _check_baseline_options(baseline_of, wheel, baselines, update, hold_cpu)
+        histories = find_stored_histories(HISTORIES if history is None else history, named=history is not None)
+        if baselines is not None and not baselines.exists() and not update:
+            raise ScenarioError(f"--baselines {baselines}: there is no such folder; with --update it is made")
+        for option, path in (("--junit", junit), ("--markdown", markdown), ("--page", page)):
+            if path is not None:
+                _check_path(option, path)
+        files = [(junit, junit_xml), (markdown, markdown_page)]
+        unfinished = {junit: UNFINISHED_JUNIT, markdown: UNFINISHED_MARKDOWN}
+        with _mark_unfinished(unfinished | ({} if page is None else {page: html_page([])})):
+            trace = print_traceback if traceback else None
+            held: Path | GivenBaselines | None = baselines
+            if baseline_of is not None:
+                held = _ride_baselines(progress, baseline_of, scenario, engine, wheel, cache)
+            progress.say(COMPUTING)
+            verdicts, fresh = check_gate(progress.watch, scenario, engine, held, configure_engine, trace, hold_cpu)
+            if histories:
+                after = {name: one["engines"] for name, one in fresh.items()}
+                verdicts = name_origins(verdicts, scenario or (), read_baselines(held, scenario), after, histories)
     for path, write in files:
         if path is not None:
             write_text(path, write(verdicts))
@@ -175,22 +176,22 @@ def check_command(
             show_verdicts(console, verdicts, renewed=update)
             if isinstance(held, GivenBaselines) and others:
                 line = f"not judged, not of the package {held.package}: {', '.join(others)}"
-                console.print(line, markup=False, highlight=False, soft_wrap=True)
+                print_words(console, line)
             if left_out:
                 install = "; ".join(dict.fromkeys(left_out.values()))
                 line = f"not judged, their libraries are not installed: {', '.join(left_out)}; install: {install}"
-                console.print(line, markup=False, highlight=False, soft_wrap=True)
+                print_words(console, line)
             for name, lines in warnings.items():
                 for line in lines:
                     text = f"warning: {name}: {line}"
-                    console.print(text, style="yellow", markup=False, soft_wrap=True)
+                    print_words(console, text, "yellow")
             if update and not written and not refused:
                 console.print("no baseline written: nothing moved beyond its limit")
             for name in written:
-                console.print(f"baseline written: {name}", soft_wrap=True)
+                print_line(console, f"baseline written: {name}")
             for name, verdict in refused:
                 line = f"no baseline written of {verdict.engine} on {name}: {verdict.reason}"
-                console.print(line, style="red", markup=False, soft_wrap=True)
+                print_words(console, line, "red")
 
 
 def _check_baseline_options(

@@ -12,7 +12,6 @@ from .completion import complete_engine, complete_scenario
 from .options import (
     HISTORIES,
     LONGEST_RIDE,
-    STARTING,
     CacheOption,
     JsonOption,
     TracebackOption,
@@ -90,31 +89,33 @@ def history_command(
     Every release is installed with pip into a folder of its own, which is laid over the suite's environment for a
     process that rides it. The suite's own environment does not change.
     """
-    from rich.console import Console
+    from .progress import COMPUTING, ProgressBars
+    from .terminal import make_console
 
-    from ..history import Children, HistoryFolder, HistoryOptions, find_cache_folder, plan_history, run_history
-    from .present_history import HistoryProgress, resume_history_command, show_history
-    from .progress import show_working
+    with answering_missing_motion(as_json), showing_traceback(traceback), ProgressBars() as progress:
+        from ..history import Children, HistoryFolder, HistoryOptions, find_cache_folder, plan_history, run_history
+        from .present_history import HistoryCounter, resume_history_command, show_history
 
-    environments = find_cache_folder(cache)
-    children = Children()
-    with answering_missing_motion(as_json), showing_traceback(traceback), show_working(STARTING):
+        environments = find_cache_folder(cache)
+        children = Children()
+        progress.say(COMPUTING)
         plan = plan_history(releases, scenario or (), engine or (), wheel or (), cache=environments, children=children)
-    where = HISTORIES / plan.package if out is None else out
-    folder = HistoryFolder(where, resume)
-    options = HistoryOptions(environments, workers or min(2, len(os.sched_getaffinity(0))), time_limit, bisect)
-    with HistoryProgress(plan, bisect) as progress:
+        where = HISTORIES / plan.package if out is None else out
+        folder = HistoryFolder(where, resume)
+        options = HistoryOptions(environments, workers or min(2, len(os.sched_getaffinity(0))), time_limit, bisect)
         for line in plan.remarks:
             progress.note(line)
-        document, written = run_history(plan, folder, options, progress.watch, children)
+        counter = HistoryCounter(progress, plan, bisect)
+        document, written = run_history(plan, folder, options, counter.watch, children)
     rode = any(row["status"] == "rode" for row in document["releases"])
     with ending_with(130 if not document["complete"] else 0 if rode else 1):
         if as_json:
             print_json(document)
         else:
-            show_history(Console(), document)
+            console = make_console()
+            show_history(console, document)
             show_written(written)
             if not document["complete"]:
-                Console().print(
+                console.print(
                     f"interrupted; continue with: {resume_history_command(where)}", markup=False, soft_wrap=True
                 )

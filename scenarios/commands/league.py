@@ -9,7 +9,6 @@ import typer
 
 from .completion import complete_engine, complete_scenario, complete_toml
 from .options import (
-    STARTING,
     ChangesOption,
     DurationOption,
     JsonOption,
@@ -65,20 +64,21 @@ def league_command(
 
     An engine rides all scenarios with the same settings: its defaults, or those of --settings.
     """
-    from ..scenario import load_scenario
-    from ..studies import LEAGUE_SCENARIOS, LeagueFolder, all_rode, plan_league, read_league_settings, run_league
-    from .present_league import show_league
-    from .progress import ProgressBars, show_working
+    from .progress import COMPUTING, ProgressBars
     from .terminal import make_console
 
-    changes = parse_changes(change, duration)
-    chosen = None if settings is None else read_league_settings(settings)
-    sources = dict.fromkeys(scenario or LEAGUE_SCENARIOS)
-    with answering_missing_motion(as_json), showing_traceback(traceback), show_working(STARTING):
+    with answering_missing_motion(as_json), showing_traceback(traceback), ProgressBars() as progress:
+        from ..scenario import load_scenario
+        from ..studies import LEAGUE_SCENARIOS, LeagueFolder, all_rode, plan_league, read_league_settings, run_league
+        from .present_league import show_league
+
+        changes = parse_changes(change, duration)
+        chosen = None if settings is None else read_league_settings(settings)
+        sources = dict.fromkeys(scenario or LEAGUE_SCENARIOS)
+        progress.say(COMPUTING)
         loaded = [load_scenario(source, changes, "--set") for source in sources]
         league = plan_league(loaded, engine, chosen, levels)
-    folder = LeagueFolder(out)  # before the rides, so that no work is lost if it cannot be made
-    with showing_traceback(traceback), ProgressBars() as progress:
+        folder = LeagueFolder(out)  # before the rides, so that no work is lost if it cannot be made
         document = run_league(league, progress.watch, folder.store, print_traceback if traceback else None)
     written = folder.finish(document)
     with ending_with(0 if all_rode(document) else 1 if document["complete"] else 130):

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from .options import (
-    STARTING,
     AlphaOption,
     BicycleOption,
     GroundOption,
@@ -45,17 +44,19 @@ def circular_command(
 
     If there is no such motion, the exit status is 1; --json then gives the reason, no-such-motion or search-failed.
     """
-    from ..motions import solve_circular
-    from ..scenario import make_bowl
-    from .present_motions import show_circular
-    from .progress import show_working
+    from .progress import COMPUTING, ProgressBars
     from .terminal import make_console
 
-    angles, ground, source = parse_angles(near), parse_ground(alpha, surface), load_bicycle(bicycle)
-    inputs = make_inputs(steer_torque, rear_wheel_torque, steer_damping)
-    with answering_missing_motion(as_json), show_working(STARTING):
+    with answering_missing_motion(as_json), ProgressBars() as progress:
+        from ..motions import solve_circular
+        from ..scenario import make_bowl
+        from .present_motions import show_circular
+
+        angles, ground, source = parse_angles(near), parse_ground(alpha, surface), load_bicycle(bicycle)
+        inputs = make_inputs(steer_torque, rear_wheel_torque, steer_damping)
+        progress.say(COMPUTING)
         solution = solve_circular(source.bicycle, make_bowl(ground), rear_rate, family, angles, inputs)
-    found = solution.as_json(source.name)
+        found = solution.as_json(source.name)
     with ending_with(0):
         if as_json:
             print_json(found)
@@ -74,18 +75,27 @@ def families_command(
     as_json: JsonOption = False,
 ) -> None:
     """The four solution families by continuation: special points, stable sections."""
-    from ..motions import follow_families, write_families
-    from ..scenario import make_bowl
-    from .present_motions import show_families
-    from .progress import show_working
+    from .progress import ProgressBars
     from .terminal import make_console
 
-    ground, source = parse_ground(alpha, surface), load_bicycle(bicycle)
-    inputs = make_inputs(steer_torque, rear_wheel_torque, steer_damping)
-    with answering_missing_motion(as_json), show_working(STARTING):
-        document = follow_families(source.bicycle, make_bowl(ground), inputs).as_json(source.name)
-    if out is not None:
-        write_families(document, out)
+    with answering_missing_motion(as_json), ProgressBars() as progress:
+        from ..motions import follow_families, write_families
+        from ..scenario import make_bowl
+        from .present_motions import show_families
+
+        ground, source = parse_ground(alpha, surface), load_bicycle(bicycle)
+        inputs = make_inputs(steer_torque, rear_wheel_torque, steer_damping)
+        progress.say("following the curves of circular motions")
+        families = follow_families(
+            source.bicycle,
+            make_bowl(ground),
+            inputs,
+            lambda done, curves: progress.watch("stability", done, curves, "curves"),
+        )
+        document = families.as_json(source.name)
+        if out is not None:
+            progress.say("drawing the figure")
+            write_families(document, out)
     with ending_with(0):
         if as_json:
             print_json(document)
@@ -95,13 +105,14 @@ def families_command(
 
 def critical_command(bicycle: BicycleOption = None, as_json: JsonOption = False) -> None:
     """The critical α: cusps collide, families merge, their last stable sections vanish."""
-    from ..motions import MERGING, find_critical_shapes
-    from .present_motions import show_critical
     from .progress import ProgressBars
     from .terminal import make_console
 
-    source = load_bicycle(bicycle)
     with ProgressBars() as progress:
+        from ..motions import MERGING, find_critical_shapes
+        from .present_motions import show_critical
+
+        source = load_bicycle(bicycle)
 
         def watch(stage: str, done: float, total: float) -> None:
             progress.watch(stage, done, total, "1/m" if stage == MERGING else "families")
@@ -124,13 +135,14 @@ def atlas_command(
     as_json: JsonOption = False,
 ) -> None:
     """Stability of all circular motions over alpha and rear rate: data, boundaries, figures (half a minute)."""
-    from ..motions import make_atlas
-    from .present_motions import show_atlas
     from .progress import ProgressBars
     from .terminal import make_console
 
-    source = load_bicycle(bicycle)
     with answering_missing_motion(as_json), ProgressBars() as progress:
+        from ..motions import make_atlas
+        from .present_motions import show_atlas
+
+        source = load_bicycle(bicycle)
         document = make_atlas(
             source, out, size, largest, lambda done: progress.watch("atlas", done * size, size, "motions")
         )

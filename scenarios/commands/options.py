@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from ...reference.surface import Surface
     from ..scenario import BicycleFile
 
-STARTING = "computing the motion (the first time on a machine, kernels are compiled: half a minute)"
-
 AlphaOption = Annotated[
     float | None, typer.Option("--alpha", help="Shape of the bowl z = alpha (x² + y²) [1/m]; 0 is the plane.")
 ]

@@ -11,6 +11,7 @@ from rich.table import Table
 from ..scenario import PARAMETERS
 from ..studies import BicycleStudy
 from .tables import Column, print_table
+from .terminal import print_words
 
 _SHOWN_SPEEDS = 11
 
@@ -28,9 +29,9 @@ def show_bicycle(console: Console, study: BicycleStudy) -> None:
         table.add_row(parameter.name, value, f"± {deviation:.2g}" if deviation else "", unit)
     console.print(table)
     for line in source.bicycle.warnings():
-        console.print(line, style="yellow", markup=False, soft_wrap=True)
+        print_words(console, line, "yellow")
     if source.ignored:
-        console.print(f"not used: {', '.join(source.ignored)}", style="dim", markup=False, soft_wrap=True)
+        print_words(console, f"not used: {', '.join(source.ignored)}", "dim")
     console.print()
     matrices = Table("", "", "", box=None, pad_edge=False, show_header=False)
     for name in ("M", "C1", "K0", "K2"):

@@ -7,8 +7,10 @@ from itertools import groupby
 from rich.console import Console
 from rich.text import Text
 
+from ...reports.drawing import format_numbers
 from ..gate import CHANGES, NEW, SHOWN, Verdict, count_held, count_statuses, find_outcome, status_word
 from .tables import Column, print_table
+from .terminal import print_words
 
 STATUS_STYLES = {
     "holds": "green",
@@ -33,9 +35,9 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed
         engines, held, friction, cpu, moved = zip(*rows, strict=True)
         columns = [
             Column("engine", engines, right=False),
-            Column("hold", held),
-            Column("friction\nneeded", friction),
-            Column("CPU time,\nreference 1", cpu),
+            Column("quantities\nthat hold", held),
+            Column("friction\nneeded", format_numbers(friction), "1"),
+            Column("CPU time,\nreference 1", format_numbers(cpu), "1"),
             Column("moved most,\nagainst its limit", moved, right=False),
         ]
         print_table(console, columns)
@@ -44,9 +46,7 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed
             # That the version or a setting is another is no verdict on a quantity.
             what = "" if verdict.quantity == CHANGES else f"{verdict.quantity}: {status_word(verdict)}: "
             style = "default" if verdict.quantity == CHANGES else STATUS_STYLES[verdict.status]
-            console.print(
-                f"{name}: {verdict.engine}: {what}{verdict.reason}", style=style, markup=False, soft_wrap=True
-            )
+            print_words(console, f"{name}: {verdict.engine}: {what}{verdict.reason}", style)
     if not renewed:
         _show_outcome(console, [verdict for _, verdict in verdicts])
 
@@ -62,17 +62,22 @@ def _show_outcome(console: Console, verdicts: list[Verdict]) -> None:
         line, style = f"no verdict, without a baseline yet: {', '.join(engines)}{rest}", "bold yellow"
     else:
         line, style = f"the gate fails: {failing}", "bold red"
-    console.print(line, style=style, markup=False, highlight=False, soft_wrap=True)
+    print_words(console, line, style)
 
 
-def _format_engine_row(engine: str, verdicts: list[Verdict]) -> tuple[str, Text, str, str, str]:
+def _format_engine_row(engine: str, verdicts: list[Verdict]) -> tuple[str, Text, float | None, float | None, str]:
     held = ", ".join(filter(None, [count_held(verdicts), count_statuses(verdicts)]))
     style = {"holds": "green", NEW: "cyan"}.get(find_outcome(verdicts), "red")
     shares = {verdict.quantity: share for verdict in verdicts if (share := verdict.share) is not None}
     moved = "nothing moved" if shares else "–"
     if any(shares.values()):
         most = max(shares, key=lambda quantity: shares[quantity])
-        moved = f"{most}, {shares[most]:.2g}"
+        moved = f"{most}, {_format_share(shares[most])}"
     values = {verdict.quantity: verdict.value for verdict in verdicts}
-    friction, cpu = ("–" if (value := values.get(name)) is None else f"{value:.2g}" for name in SHOWN)
+    friction, cpu = (values.get(name) for name in SHOWN)
     return engine, Text(held, style), friction, cpu, moved
+
+
+def _format_share(share: float) -> str:
+    """Format how many times its limit something moved."""
+    return f"{share:.2g}" if share < 100 else f"{share:.0f}"

@@ -1,4 +1,4 @@
-"""Progress and terminal output of `velodrome history`."""
+"""Terminal output of `velodrome history`, and the count of its rides."""
 
 from __future__ import annotations
 
@@ -8,62 +8,45 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich import progress as bars
 from rich.console import Console
 
 from ...reports.page import describe_run, group_releases
 from ..history import HistoryPlan, PlannedRide
+from .progress import ProgressBars
 from .tables import Column, print_table
+from .terminal import print_words
 
 _MOST_QUANTITIES = 4  # of a turning point, in the table; the document has all of them
 _UNMOVED = {"same-bits": "same to the bit", "round-off": "same within round-off"}
 _STYLES = {"worse": "red", "changed": "yellow", "better": "cyan"}
 
 
-class HistoryProgress:
-    """Finished rides, remaining time and failures on stderr; a context. Bars are shown on a terminal only.
+class HistoryCounter:
+    """Counts a history's rides on a command's bars, and tells failures, each once.
 
     Parameters
     ----------
+    progress : ProgressBars
     plan : HistoryPlan
     bisect : bool
         Whether only some of the rides are needed, so that their number is not known.
     """
 
-    def __init__(self, plan: HistoryPlan, bisect: bool) -> None:
-        columns = (
-            bars.TextColumn("{task.description}"),
-            bars.BarColumn(),
-            bars.MofNCompleteColumn(),
-            bars.TimeElapsedColumn(),
-            bars.TimeRemainingColumn(),
-        )
-        self._console = Console(stderr=True)
-        self._bars = bars.Progress(*columns, console=self._console, transient=True)
+    def __init__(self, progress: ProgressBars, plan: HistoryPlan, bisect: bool) -> None:
+        self._progress, self._package = progress, plan.package
+        self._rides, self._total = 0, None if bisect else len(plan.rides)
         self._told: set[str] = set()
-        self._task = self._bars.add_task(plan.package, total=None if bisect else len(plan.rides))
-
-    def __enter__(self) -> HistoryProgress:
-        if self._console.is_terminal:
-            self._bars.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._console.is_terminal:
-            self._bars.stop()
+        progress.say("installing releases")
 
     def watch(self, ride: PlannedRide, row: Mapping[str, Any], fresh: bool) -> None:
         """Count a row; a row of an earlier session is not told again."""
-        self._bars.update(self._task, advance=1, description=f"{ride.release.package} {ride.release.label}")
+        self._rides += 1
+        self._progress.watch(self._package, self._rides, self._total, "rides")
         line = f"{ride.release.label} {ride.engine}: {row['status']}: {row['reason']}"
         # The same reason on every scenario is told once.
         if fresh and row["reason"] is not None and line not in self._told:
             self._told.add(line)
-            self.note(line)
-
-    def note(self, line: str) -> None:
-        """Print a line above the bar."""
-        self._console.print(line, soft_wrap=True, highlight=False, markup=False)
+            self._progress.note(line)
 
 
 def show_history(console: Console, document: Mapping[str, Any]) -> None:
@@ -74,7 +57,7 @@ def show_history(console: Console, document: Mapping[str, Any]) -> None:
     slow = {(move["scenario"], move["engine"], move["release"]) for move in document["gradual_moves"]}
     for (scenario, engine), rows in by_pair.items():
         console.print()
-        console.print(f"{scenario}: {engine}", style="bold", markup=False, soft_wrap=True)
+        print_words(console, f"{scenario}: {engine}", "bold")
         found = group_releases(rows)
         columns = [
             Column("releases", [_name_releases(group) for group in found], right=False),
@@ -86,10 +69,10 @@ def show_history(console: Console, document: Mapping[str, Any]) -> None:
     console.print()
     builds = {row["release"]: [row["wheel"], *row["companions"]] for row in document["releases"] if row["wheel"]}
     for release, wheels in builds.items():
-        console.print(f"{release}: {', '.join(wheels)}", style="dim", markup=False, highlight=False, soft_wrap=True)
+        print_words(console, f"{release}: {', '.join(wheels)}", "dim")
     _show_turning_points(console, document)
     for line in document["remarks"]:
-        console.print(line, style="yellow", markup=False, highlight=False, soft_wrap=True)
+        print_words(console, line, "yellow")
 
 
 def _name_releases(group: Sequence[Mapping[str, Any]]) -> str:
@@ -105,7 +88,7 @@ def _describe_inside(group: Sequence[Mapping[str, Any]], slow: Collection[tuple[
     if not inside:
         return "rode"
     if any((row["scenario"], row["engine"], row["release"]) in slow for row in group[1:]):
-        return "each within round-off of the one before, moved gradually"
+        return "moved gradually, each step round-off"
     return "same to the bit" if inside == {"same-bits"} else "same within round-off"
 
 
@@ -148,13 +131,13 @@ def _show_turning_points(console: Console, document: Mapping[str, Any]) -> None:
 
 def _show_moves(console: Console, line: str, point: Mapping[str, Any]) -> None:
     """Print a line, and below it what moved most."""
-    console.print(line, style=_STYLES.get(point["verdict"]), markup=False, highlight=False, soft_wrap=True)
+    print_words(console, line, _STYLES.get(point["verdict"], ""))
     moved = sorted(point["quantities"], key=_rank_move)
     for move in moved[:_MOST_QUANTITIES]:
-        console.print(f"  {_describe_move(move)}", markup=False, highlight=False, soft_wrap=True)
+        print_words(console, f"  {_describe_move(move)}")
     if len(moved) > _MOST_QUANTITIES:
         more = ", ".join(move["quantity"] for move in moved[_MOST_QUANTITIES:])
-        console.print(f"  and {more}", markup=False, highlight=False, soft_wrap=True)
+        print_words(console, f"  and {more}")
 
 
 def _rank_move(move: Mapping[str, Any]) -> float:

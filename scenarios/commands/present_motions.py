@@ -15,15 +15,18 @@ from rich.text import Text
 from ...reference.stability import are_zero
 from ..scenario import BENCHMARK
 from .tables import Column, print_table
+from .terminal import print_line, print_words
+
+_UNITS = {"rear_rate": "rad/s", "front_rate": "rad/s", "lean": "rad", "steer": "rad"}
 
 
 def show_bicycle_name(console: Console, document: Mapping[str, Any]) -> None:
     """Print the name of a document's bicycle, unless it is the benchmark, and what is remarkable about it."""
     name = document["bicycle"]["name"]
     if name != BENCHMARK:
-        console.print(f"bicycle: {name or 'not the benchmark'}", markup=False, soft_wrap=True)
+        print_words(console, f"bicycle: {name or 'not the benchmark'}")
     for line in document["warnings"]:
-        console.print(f"warning: {line}", style="yellow", markup=False, soft_wrap=True)
+        print_words(console, f"warning: {line}", "yellow")
 
 
 def show_circular(console: Console, found: dict[str, Any]) -> None:
@@ -66,9 +69,9 @@ def show_circular(console: Console, found: dict[str, Any]) -> None:
     console.print("Lyapunov stable" if found["lyapunov_stable"] else "unstable")
     if found["physical"]:
         friction = f"{found['required_friction']:.6g}"
-        console.print(f"it can be ridden: rolling needs a coefficient of friction of {friction}", soft_wrap=True)
+        print_words(console, f"it can be ridden: rolling needs a coefficient of friction of {friction}")
     for reason in found["unphysical_because"]:
-        console.print(f"it cannot be ridden: {reason}", style="yellow", markup=False, soft_wrap=True)
+        print_words(console, f"it cannot be ridden: {reason}", "yellow")
 
 
 def _print_rows(console: Console, rows: Sequence[tuple[str, str, str]]) -> None:
@@ -103,7 +106,7 @@ def _format_value(value: Any) -> str:
 
 def _make_number_columns(points: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> list[Column]:
     """Return a column for each key, with nine decimals; a negative number that rounds to zero has no sign."""
-    return [Column(key.replace("_", " "), [f"{point[key]:z.9f}" for point in points]) for key in keys]
+    return [Column(key.replace("_", " "), [f"{point[key]:z.9f}" for point in points], _UNITS[key]) for key in keys]
 
 
 def show_families(console: Console, document: Mapping[str, Any]) -> None:
@@ -111,11 +114,10 @@ def show_families(console: Console, document: Mapping[str, Any]) -> None:
     show_bicycle_name(console, document)
     for family in document["families"]:
         points = family["points"]
-        console.print(
+        print_words(
+            console,
             f"{_curve_name(family)}: {len(points['lean'])} points, from {family['ends'][0]} to {family['ends'][1]}",
-            style="bold",
-            markup=False,
-            highlight=False,
+            "bold",
         )
         specials = family["special_points"]
         if specials:
@@ -129,23 +131,23 @@ def show_families(console: Console, document: Mapping[str, Any]) -> None:
         for section in family["stable_sections"]:
             line = _format_section(section)
             style = "yellow" if section["rideable"] == "not" else "green"
-            console.print(f"Lyapunov stable: rear rate {line}", style=style, markup=False)
+            print_words(console, f"Lyapunov stable: rear rate {line}", style)
             if section["rideable"] != "wholly":
                 ridden = [_format_section(part) for part in section["rideable_parts"]]
                 words = f"only {' and '.join(ridden)} of it can be ridden" if ridden else "none of it can be ridden"
-                console.print(f"  {words}", style="yellow", markup=False, soft_wrap=True)
+                print_words(console, f"  {words}", "yellow")
         if not all(points["physical"]):
             ridden = [_format_section(part) for part in family["rideable_parts"]]
             words = f"can be ridden: rear rate {', '.join(ridden)}" if ridden else "cannot be ridden"
-            console.print(words, style="yellow", markup=False, soft_wrap=True)
+            print_words(console, words, "yellow")
     for number, reason in document["absent"].items():
-        console.print(f"family {number}: no curve: {reason}", style="yellow", markup=False, soft_wrap=True)
+        print_words(console, f"family {number}: no curve: {reason}", "yellow")
 
 
 def _format_section(section: Mapping[str, Any]) -> str:
     """Format the rear rates at both ends of a section, each with what ends it."""
     ends = zip(section["rear_rate"], section["cause"], strict=True)
-    return " to ".join(f"{rate:z.9f} ({cause})" for rate, cause in ends)
+    return " to ".join(f"{rate:z.9f} rad/s ({cause})" for rate, cause in ends)
 
 
 def _make_physical_column(points: Sequence[Mapping[str, Any]]) -> Column:
@@ -172,7 +174,7 @@ def show_critical(console: Console, document: Mapping[str, Any]) -> None:
         columns = [
             Column("families", families, right=False),
             Column("what happens", what, right=False),
-            Column("alpha", [f"{point['alpha']:.11f}" for point in points]),
+            Column("alpha", [f"{point['alpha']:.11f}" for point in points], "1/m"),
             *_make_number_columns(points, ("rear_rate", "lean", "steer")),
             _make_physical_column(points),
         ]
@@ -180,7 +182,7 @@ def show_critical(console: Console, document: Mapping[str, Any]) -> None:
         for point in points:
             for reason in point["unphysical_because"]:
                 line = f"at alpha {point['alpha']:.11f} the motion cannot be ridden: {reason}"
-                console.print(line, style="yellow", markup=False, soft_wrap=True)
+                print_words(console, line, "yellow")
     if collision is None:
         console.print("no cusps of families 2 and 4 meet", markup=False)
     for number, point in document["last_stable"].items():
@@ -193,14 +195,14 @@ def show_critical(console: Console, document: Mapping[str, Any]) -> None:
 def _show_not_found(console: Console, reasons: Mapping[str, str]) -> None:
     for number, reason in reasons.items():
         line = f"family {number}: not followed: {reason}"
-        console.print(line, style="yellow", markup=False, soft_wrap=True)
+        print_words(console, line, "yellow")
 
 
 def _show_unnumbered_remark(console: Console, document: Mapping[str, Any]) -> None:
     """Say for another bicycle what is not looked at: the families are curves of the benchmark bicycle."""
     if document["bicycle"]["name"] != BENCHMARK:
         line = "curves without a number are not followed over alpha; velodrome families finds them at one alpha"
-        console.print(line, style="yellow", markup=False, soft_wrap=True)
+        print_words(console, line, "yellow")
 
 
 def show_atlas(console: Console, document: Mapping[str, Any], out: Path) -> None:
@@ -210,9 +212,9 @@ def show_atlas(console: Console, document: Mapping[str, Any], out: Path) -> None
     ends = [region["vanishing"] for region in regions]
     columns = [
         Column("family", [str(region["family"]) for region in regions], right=False),
-        Column("stable from alpha", [f"{region['alpha'][0]:g}" for region in regions]),
-        Column("to alpha", [_format_end(region, document["alphas"][-1]) for region in regions]),
-        Column("where at rear rate", ["" if end is None else f"{end['rear_rate']:.6f}" for end in ends]),
+        Column("stable from alpha", [f"{region['alpha'][0]:g}" for region in regions], "1/m"),
+        Column("to alpha", [_format_end(region, document["alphas"][-1]) for region in regions], "1/m"),
+        Column("where at rear rate", ["" if end is None else f"{end['rear_rate']:.6f}" for end in ends], "rad/s"),
     ]
     if regions:
         print_table(console, columns)
@@ -220,7 +222,7 @@ def show_atlas(console: Console, document: Mapping[str, Any], out: Path) -> None
         console.print("no family has a stable motion", markup=False)
     _show_not_found(console, _sum_up_absences(document))
     _show_unnumbered_remark(console, document)
-    console.print(f"{document['motions']} motions in {out}", markup=False, soft_wrap=True)
+    print_line(console, f"{document['motions']} motions in {out}")
 
 
 def _format_end(region: Mapping[str, Any], largest: float) -> str:

@@ -10,6 +10,7 @@ from rich.console import Console
 from ...reports.drawing import format_numbers
 from ...reports.measure import compared_time
 from .tables import Column, print_table
+from .terminal import print_words
 
 # (title, unit, key of a point)
 _COLUMNS = (
@@ -26,9 +27,9 @@ def show_precision(console: Console, document: Mapping[str, Any]) -> None:
     """Print a work-precision study: one table per engine."""
     limit = "" if document["horizon"] is None else "; beyond, the motion's own instability leaves nothing to compare"
     title = f"{document['scenario']}: errors over {compared_time(document):.4g} s{limit}"
-    console.print(title, style="bold", markup=False, soft_wrap=True)
+    print_words(console, title, "bold")
     for line in document["warnings"]:
-        console.print(f"warning: {line}", style="yellow", markup=False, soft_wrap=True)
+        print_words(console, f"warning: {line}", "yellow")
     for name, entry in document["engines"].items():
         console.print()
         console.print(name, style="bold", markup=False)
@@ -41,10 +42,10 @@ def show_precision(console: Console, document: Mapping[str, Any]) -> None:
         columns.append(Column("order", orders[: len(points)], "1"))
         print_table(console, columns)
         for line in _precision_lines(entry):
-            console.print(line, markup=False, soft_wrap=True)
+            print_words(console, line)
         for failure in entry["failures"]:
             what = "" if failure["step"] is None else f"step {failure['step']:g}: "
-            console.print(f"{what}{failure['reason']}", style="yellow", markup=False, soft_wrap=True)
+            print_words(console, f"{what}{failure['reason']}", "yellow")
 
 
 def _precision_lines(entry: Mapping[str, Any]) -> Iterator[str]:

@@ -8,8 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from ...reports.drawing import COLUMNS, describe_required_friction, format_table, format_verdict, make_remarks
+from ...reports.drawing import (
+    COLUMNS,
+    describe_required_friction,
+    format_numbers,
+    format_table,
+    format_verdict,
+    group_remarks,
+)
 from .tables import Column, print_table
+from .terminal import print_line, print_words
 
 if TYPE_CHECKING:
     from ..run import RunOutcome
@@ -21,32 +29,35 @@ def show_outcome(console: Console, name: str, scenario: Scenario, outcome: RunOu
     duration = scenario.simulation.duration
     ridden = "" if outcome.release is None else f", with {outcome.release}"
     console.print()
-    console.print(f"{name}: {scenario.title}, {duration:g} s{ridden}", style="bold", markup=False)
+    print_words(console, f"{name}: {scenario.title}, {duration:g} s{ridden}", "bold")
     table = format_table(outcome.metrics)
+    ranked = {engine: outcome.metrics[engine] for engine in table}
     columns = [Column("engine", list(table), right=False)]
+    falls = [metrics["fell_at"] for metrics in ranked.values()]
+    if any(fell is not None for fell in falls):
+        columns.append(Column("fell\nat", format_numbers(falls), "s"))
     for k, (title, unit, _, _) in enumerate(COLUMNS):
         columns.append(Column(title.replace(" ", "\n"), [cells[k] for cells in table.values()], unit))
     print_table(console, columns)
     for verdict in outcome.verdicts:
         style = "green" if verdict["holds"] else "red"
-        console.print(format_verdict(verdict), style=style, markup=False, soft_wrap=True)
+        print_words(console, format_verdict(verdict), style)
     for engine, reason in outcome.failures.items():
-        console.print(f"{engine} did not run: {reason}", style="red", markup=False, soft_wrap=True)
-    for engine in table:
-        for line in make_remarks(engine, outcome.metrics[engine], duration):
-            console.print(line, style="yellow", markup=False, soft_wrap=True)
+        print_words(console, f"{engine} did not run: {reason}", "red")
+    for line in group_remarks(ranked, duration):
+        print_words(console, line, "yellow")
     friction = describe_required_friction(outcome.metrics)
     if friction is not None:
-        console.print(friction, style="dim", markup=False, soft_wrap=True)
+        print_words(console, friction, "dim")
     for engine, reason in outcome.left_out.items():
-        console.print(f"{engine} left out: {reason}", style="dim", markup=False, soft_wrap=True)
+        print_words(console, f"{engine} left out: {reason}", "dim")
     command = Path(sys.executable).with_name("velodrome")
     if command.is_relative_to(Path.cwd()):
         command = command.relative_to(Path.cwd())
-    console.print(f"run folder: {outcome.folder}", markup=False, soft_wrap=True)
-    console.print(f"report:     {outcome.folder / 'report.html'}", markup=False, soft_wrap=True)
+    print_line(console, f"run folder: {outcome.folder}")
+    print_line(console, f"report:     {outcome.folder / 'report.html'}")
     if (outcome.folder / "comparison.rrd").exists():
-        console.print(f"recording:  {command} view {outcome.folder}", markup=False, soft_wrap=True)
+        print_line(console, f"recording:  {command} view {outcome.folder}")
 
 
 def outcome_json(name: str, outcome: RunOutcome) -> dict[str, Any]:

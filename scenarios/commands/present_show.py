@@ -10,6 +10,8 @@ from typing import Any
 from rich.console import Console
 from rich.text import Text
 
+from .terminal import print_line
+
 _LONGEST = 6  # items of a list that are printed; --json has all
 
 
@@ -27,7 +29,7 @@ def show_document(console: Console, document: Mapping[str, Any]) -> None:
 
 
 def _show_engine(console: Console, document: Mapping[str, Any]) -> None:
-    _print_line(console, f"{document['name']} {document['version'] or ''}".rstrip(), "bold")
+    print_line(console, f"{document['name']} {document['version'] or ''}".rstrip(), "bold")
     _print_below(console, document["description"], indent=0)
     if document["install"] is not None:
         _print_below(console, f"its library is not installed; install: {document['install']}", indent=0)
@@ -40,7 +42,7 @@ def _show_engine(console: Console, document: Mapping[str, Any]) -> None:
     if document["releases"] is not None:
         _show_releases(console, document["releases"])
     console.print()
-    _print_line(console, f"[engines.{document['name']}]", "bold")
+    print_line(console, f"[engines.{document['name']}]", "bold")
     _show_fields(console, document["settings"])
 
 
@@ -54,26 +56,26 @@ def _show_releases(console: Console, releases: Mapping[str, Any]) -> None:
 
 
 def _show_bicycle(console: Console, document: Mapping[str, Any]) -> None:
-    _print_line(console, f"{document['name']} bicycle", "bold")
+    print_line(console, f"{document['name']} bicycle", "bold")
     _print_below(console, document["description"], indent=0)
     console.print()
-    _print_line(console, "[bicycle]", "bold")
+    print_line(console, "[bicycle]", "bold")
     for name, value in document["parameters"].items():
-        _print_line(console, f"{name} = {_format_value(value)} {document['units'][name]}")
+        print_line(console, f"{name} = {_format_value(value)} {document['units'][name]}")
         _print_below(console, document["descriptions"][name])
 
 
 def _show_file(console: Console, document: Mapping[str, Any]) -> None:
-    _print_line(console, f"what a {document['name']} file may hold", "bold")
+    print_line(console, f"what a {document['name']} file may hold", "bold")
     for table in document["tables"]:
         if not table["fields"] and table["table"]:
             continue
         console.print()
         if table["table"]:
-            _print_line(console, f"[{table['table']}]", "bold")
+            print_line(console, f"[{table['table']}]", "bold")
         _print_below(console, table["description"], indent=0)
         if table["kind"] is not None:
-            _print_line(console, f"kind = {_format_value(table['kind'])}")
+            print_line(console, f"kind = {_format_value(table['kind'])}")
         others = {key: field for key, field in table["fields"].items() if key != "kind" or table["kind"] is None}
         _show_fields(console, others)
 
@@ -87,13 +89,13 @@ def _show_fields(console: Console, fields: Mapping[str, Mapping[str, Any]]) -> N
             first = f"{name}{unit and f' in{unit}'}, not set by default"
         else:
             first = f"{name} = {_format_value(field['default'])}{unit}"
-        _print_line(console, first)
+        print_line(console, first)
         _print_below(console, field["range"])
         _print_below(console, field["description"])
 
 
 def _show_scenario(console: Console, document: Mapping[str, Any]) -> None:
-    _print_line(console, document["name"], "bold")
+    print_line(console, document["name"], "bold")
     _print_below(console, document["title"], indent=0)
     if document["tags"]:
         _print_below(console, f"tags: {', '.join(document['tags'])}", indent=0)
@@ -107,10 +109,10 @@ def _show_table(console: Console, name: str, table: Mapping[str, Any], units: Ma
     plain = {key: value for key, value in table.items() if not isinstance(value, Mapping)}
     if plain:
         console.print()
-        _print_line(console, f"[{name}]", "bold")
+        print_line(console, f"[{name}]", "bold")
     for key, value in plain.items():
         unit = units.get(f"{name}.{key}", "")
-        _print_line(console, f"{key} = {_format_value(value)} {unit}".rstrip())
+        print_line(console, f"{key} = {_format_value(value)} {unit}".rstrip())
     for key, value in table.items():
         if isinstance(value, Mapping):
             _show_table(console, f"{name}.{key}", value, units)
@@ -122,11 +124,6 @@ def _format_value(value: Any) -> str:
         shown = ", ".join(_format_value(item) for item in value[:_LONGEST])
         return f"[{shown}]" if len(value) <= _LONGEST else f"[{shown}, ... {len(value)} in all]"
     return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
-
-
-def _print_line(console: Console, line: str, style: str = "") -> None:
-    """Print a line without wrapping."""
-    console.print(Text(line, style), soft_wrap=True)
 
 
 def _print_below(console: Console, words: str, indent: int = 4) -> None:

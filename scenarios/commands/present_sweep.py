@@ -1,7 +1,9 @@
-"""What `velodrome sweep` shows at the end."""
+"""Terminal output of `velodrome sweep`, and the count of its rows."""
 
 from __future__ import annotations
 
+import time
+from collections import Counter, deque
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,10 +11,54 @@ from rich.console import Console
 from rich.text import Text
 
 from ...reports.drawing import format_numbers
-from ..sweep import PAGE, RESULTS, ROW_STYLES
+from ..sweep import BROKEN, COMPUTED, PAGE, REFUSED, RESULTS, Done, Task
+from .progress import ProgressBars
 from .tables import Column, print_table
+from .terminal import print_line, print_words
 
+ROW_STYLES = dict.fromkeys(COMPUTED, "cyan") | {"done": "green", REFUSED: "yellow"} | dict.fromkeys(BROKEN, "red")
 _DIGITS = 3
+_REASONS = 4  # of failures that are shown below the bar
+_RECENT = 500  # rows over which the rate is computed
+
+
+class SweepCounter:
+    """Counts a sweep's rows on a command's bars, with their statuses, the rate, and reasons of failures below.
+
+    Parameters
+    ----------
+    progress : ProgressBars
+    name : str
+        The sweep's name.
+    total : int
+        Number of rows.
+    """
+
+    def __init__(self, progress: ProgressBars, name: str, total: int) -> None:
+        self._progress, self._name, self._total, self._rows = progress, name, total, 0
+        self._counts: Counter[str] = Counter()
+        self._reasons: deque[Text] = deque(maxlen=_REASONS)
+        self._arrivals = deque([time.monotonic()], maxlen=_RECENT)
+        progress.say("starting the workers")
+
+    def watch(self, task: Task, done: Done, fresh: bool) -> None:
+        """Count a row; a row of an earlier session does not count for the rate."""
+        status = done.row["status"]
+        self._rows += 1
+        self._counts[status] += 1
+        if fresh:
+            self._arrivals.append(time.monotonic())
+            self._progress.watch(self._name, self._rows, self._total, "rows")
+        if status in BROKEN:
+            text = f"{task.key} {task.engine} {status}: {done.row['reason']}"
+            self._reasons.append(Text(text, style="red", no_wrap=True, overflow="ellipsis"))
+        counts = [Text(f"{name} {n}", ROW_STYLES[name]) for name, n in sorted(self._counts.items())]
+        self._progress.show_below([Text("  ").join([*counts, *self._describe_rate()]), *self._reasons])
+
+    def _describe_rate(self) -> list[Text]:
+        recent = len(self._arrivals) - 1
+        rate = recent / max(time.monotonic() - self._arrivals[0], 1e-3)
+        return [Text(f"{rate:.3g} rows/s")] if recent else []
 
 
 def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> None:
@@ -37,15 +83,11 @@ def show_summary(console: Console, document: Mapping[str, Any], resume: str) -> 
     print_table(console, columns)
     for name, entry in entries.items():
         for reason in entry.get("reasons", ()):
-            _print_line(console, f"{name} {reason}", ROW_STYLES[reason.partition(":")[0]])
+            print_words(console, f"{name} {reason}", ROW_STYLES[reason.partition(":")[0]])
     if document["stopped"] is None:
-        _print_line(console, f"data set: {document['folder']}/{RESULTS}")
-        _print_line(console, f"page:     {document['folder']}/{PAGE}")
+        print_line(console, f"data set: {document['folder']}/{RESULTS}")
+        print_line(console, f"page:     {document['folder']}/{PAGE}")
         return
     missing = f"{document['missing']} of {document['tasks']} runs are missing, finished runs are kept"
-    _print_line(console, f"{document['stopped']}: {missing}", "yellow")
-    _print_line(console, f"continue with: {resume}")
-
-
-def _print_line(console: Console, line: str, style: str | None = None) -> None:
-    console.print(line, style=style, markup=False, soft_wrap=True)
+    print_words(console, f"{document['stopped']}: {missing}", "yellow")
+    print_line(console, f"continue with: {resume}")

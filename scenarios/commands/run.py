@@ -14,7 +14,6 @@ import typer
 from ..error import MissingMotionError, ScenarioError
 from .completion import complete_engine, complete_scenario
 from .options import (
-    STARTING,
     BicycleOption,
     CacheOption,
     ChangesOption,
@@ -31,6 +30,8 @@ from .options import (
 )
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ...reference.bicycle import Bicycle
     from ..history import OpenedRelease
     from ..run import RunOutcome
@@ -40,16 +41,36 @@ if TYPE_CHECKING:
 
 def list_command(as_json: JsonOption = False) -> None:
     """Scenarios of the library, and engines with the commands that install those that are not there."""
-    from ...engines.engine import describe_engine
-    from ...engines.registry import load_engine, uninstalled_engines
-    from ...engines.releases import find_reach
-    from ..run import installed_engines
+    from .progress import ProgressBars
+    from .terminal import make_console
+
+    with ProgressBars():
+        scenarios, engines = _list_scenarios(), _list_engines()
+    with ending_with(0):
+        if as_json:
+            print_json({"scenarios": scenarios, "engines": engines})
+        else:
+            show_list(make_console(), scenarios, engines)
+
+
+def _list_scenarios() -> list[dict[str, Any]]:
+    """Return the scenarios of the library as JSON objects."""
     from ..scenario import library_names, load_scenario
 
     scenarios = []
     for name in library_names():
         _, scenario = load_scenario(name)
         scenarios.append({"name": name, "title": scenario.title, "tags": list(scenario.tags)})
+    return scenarios
+
+
+def _list_engines() -> list[dict[str, Any]]:
+    """Return the engines as JSON objects, those whose libraries are not installed last."""
+    from ...engines.engine import describe_engine
+    from ...engines.registry import load_engine, uninstalled_engines
+    from ...engines.releases import find_reach
+    from ..run import installed_engines
+
     engines: list[dict[str, Any]] = []
     for name in installed_engines():
         try:
@@ -61,24 +82,19 @@ def list_command(as_json: JsonOption = False) -> None:
             engines.append({"name": name, **described, **given, **({} if refusal is None else {"error": refusal})})
         except ValueError as error:
             engines.append({"name": name, "version": None, "gives": [], "error": " ".join(str(error).split())})
-    engines += [
+    return engines + [
         {"name": name, "version": None, "gives": [], "install": command}
         for name, command in uninstalled_engines().items()
     ]
-    with ending_with(0):
-        if as_json:
-            print_json({"scenarios": scenarios, "engines": engines})
-        else:
-            _show_list(scenarios, engines)
 
 
-def _show_list(scenarios: list[dict[str, Any]], engines: list[dict[str, Any]]) -> None:
+def show_list(console: Console, scenarios: list[dict[str, Any]], engines: list[dict[str, Any]]) -> None:
+    """Print the tables of `velodrome list`, and the commands that install the libraries of further engines."""
     from rich.table import Table
     from rich.text import Text
 
-    from .terminal import make_console
+    from .terminal import print_line
 
-    console = make_console()
     table = Table(box=None, pad_edge=False)
     for title in ("scenario", "title", "tags"):
         table.add_column(title, no_wrap=title == "scenario")
@@ -90,14 +106,18 @@ def _show_list(scenarios: list[dict[str, Any]], engines: list[dict[str, Any]]) -
     for title in ("engine", "version", "what it is"):
         table.add_column(title, no_wrap=title == "engine")
     for entry in engines:
-        if "error" in entry:
-            words = Text(entry["error"], "red")
-        elif "install" in entry:
-            words = Text(f"not installed: {entry['install']}", "dim")
-        else:
-            words = Text(entry["description"])
+        if "install" in entry:
+            continue
+        words = Text(entry["error"], "red") if "error" in entry else Text(entry["description"])
         table.add_row(entry["name"], entry["version"] or "–", words)
     console.print(table)
+    installs: dict[str, list[str]] = {}
+    for entry in engines:
+        if "install" in entry:
+            installs.setdefault(entry["install"], []).append(entry["name"])
+    for command, names in installs.items():
+        print_line(console, f"not installed: {', '.join(names)}", "dim")
+        print_line(console, f"  {command}", "dim")
 
 
 def run_command(
@@ -140,34 +160,35 @@ def run_command(
 
     --bicycle replaces a scenario's bicycle; --set bicycle.KEY=VALUE then changes single parameters of it.
     """
-    from ..run import installed_engines
-    from .present_run import outcome_json, show_outcome
-    from .progress import ProgressBars, show_working
+    from .progress import COMPUTING, RIDING, ProgressBars
     from .terminal import make_console
 
-    sources = [*(scenario or []), *(_find_tagged(tag) if tag is not None else [])]
-    if not sources:
-        raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
-    if wheel and release is None:
-        raise ScenarioError("--wheel: it belongs to --release, e.g. --release mujoco --wheel FILE.whl")
-    changes = parse_changes(change, duration)
-    installed_engines()  # raises here if two packages announce one engine, which is not a fault of a scenario
-    other = None if bicycle is None else load_bicycle(bicycle).bicycle
-    sources = list(dict.fromkeys(sources))
     with ExitStack() as using:
-        with answering_missing_motion(as_json), showing_traceback(traceback):
+        with answering_missing_motion(as_json), showing_traceback(traceback), ProgressBars() as progress:
+            from ..run import installed_engines
+            from .present_run import outcome_json, show_outcome
+
+            sources = [*(scenario or []), *(_find_tagged(tag) if tag is not None else [])]
+            if not sources:
+                raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
+            if wheel and release is None:
+                raise ScenarioError("--wheel: it belongs to --release, e.g. --release mujoco --wheel FILE.whl")
+            changes = parse_changes(change, duration)
+            installed_engines()  # raises here if two packages announce one engine, which is not a fault of a scenario
+            other = None if bicycle is None else load_bicycle(bicycle).bicycle
+            sources = list(dict.fromkeys(sources))
+            progress.say(COMPUTING)
             if release is None:
-                with show_working(STARTING):
-                    rides = [_plan_source(source, changes, engine, other, out, traceback) for source in sources]
+                rides = [_plan_source(source, changes, engine, other, out, traceback) for source in sources]
             else:
-                with show_working(STARTING):
-                    loaded = {source: _load_source(source, changes, other) for source in sources}
-                opened = using.enter_context(_open_release(release, engine, wheel, cache))
+                loaded = {source: _load_source(source, changes, other) for source in sources}
+                progress.say(f"opening the environment of {release}")
+                opened = using.enter_context(_open_release(progress, release, engine, wheel, cache))
                 rides = [_plan_in_release(opened, source, *one, out, traceback) for source, one in loaded.items()]
         console = make_console(stderr=as_json)
         outcomes = []
         for ride in rides:
-            with showing_traceback(traceback), ProgressBars() as progress:
+            with showing_traceback(traceback), ProgressBars(RIDING) as progress:
                 outcome = ride.start(progress)
             outcomes.append((ride, outcome))
             with ending_with(0):  # the next run goes on if the reader of this table has closed the pipe
@@ -212,7 +233,11 @@ def _plan_source(
     with _naming(source):
         plan = plan_run(name, scenario, wanted)
     trace = print_traceback if traceback else None
-    return _Ride(name, plan.scenario, lambda progress: run_plan(plan, out, progress.watch, progress.note, trace))
+    return _Ride(
+        name,
+        plan.scenario,
+        lambda progress: run_plan(plan, out, progress.watch, progress.note, trace, say=progress.say),
+    )
 
 
 def _load_source(source: str, changes: dict[str, Any], bicycle: Bicycle | None) -> tuple[str, Scenario]:
@@ -227,26 +252,16 @@ def _load_source(source: str, changes: dict[str, Any], bicycle: Bicycle | None) 
 
 @contextmanager
 def _open_release(
-    wanted: str, engines: list[str] | None, wheels: list[Path] | None, cache: Path | None
+    progress: ProgressBars, wanted: str, engines: list[str] | None, wheels: list[Path] | None, cache: Path | None
 ) -> Iterator[OpenedRelease]:
     """Install a release, or find it in the cache."""
     from ..history import Children, find_cache_folder, open_release, plan_release_run
-    from .progress import show_working
-    from .terminal import make_console
 
     children, environments = Children(), find_cache_folder(cache)
-    console = make_console(stderr=True)
     try:
         with ExitStack() as using:
-            with show_working(f"opening the environment of {wanted}"):
-                plan = plan_release_run(wanted, engines or (), wheels or (), cache=environments, children=children)
-                opening = open_release(
-                    plan,
-                    lambda line: console.print(line, soft_wrap=True, highlight=False, markup=False),
-                    cache=environments,
-                    children=children,
-                )
-                opened = using.enter_context(opening)
+            plan = plan_release_run(wanted, engines or (), wheels or (), cache=environments, children=children)
+            opened = using.enter_context(open_release(plan, progress.note, cache=environments, children=children))
             yield opened
     finally:
         children.stop()

@@ -11,7 +11,6 @@ from ..error import ScenarioError
 from ..scenario import show_value
 from ..sweep import (
     STATUSES,
-    SweepView,
     Work,
     locally,
     plan_sweep,
@@ -22,8 +21,8 @@ from ..sweep import (
     write_sweep_page,
 )
 from .options import ending_with, print_json
-from .present_sweep import show_summary
-from .progress import show_working
+from .present_sweep import SweepCounter, show_summary
+from .progress import ProgressBars
 from .terminal import make_console
 
 FOLDER = Path("sweeps")
@@ -76,13 +75,11 @@ def run_sweep_command(
             raise ScenarioError(
                 f"--retry {show_value(status)}: no row has such a status ({suggest_name(status, STATUSES)})"
             )
-    with show_working(
-        "checking every run of the sweep (the first time on a machine, kernels are compiled: half a minute)"
-    ):
+    with ProgressBars("checking every run of the sweep") as progress:
         plan = plan_sweep(path)
-    work = _choose_work(scheduler, workers)
-    with SweepView(len(plan.tasks)) as view:
-        outcome = run_sweep(plan, FOLDER / plan.name if out is None else out, work, resume, view.watch, retry)
+        work = _choose_work(scheduler, workers)
+        counter = SweepCounter(progress, plan.name, len(plan.tasks))
+        outcome = run_sweep(plan, FOLDER / plan.name if out is None else out, work, resume, counter.watch, retry)
     document = summarise_sweep(plan, outcome)
     if document["complete"]:
         write_sweep_page(plan, outcome, document)

@@ -24,12 +24,15 @@ def show_command(
     ] = False,
 ) -> None:
     """A scenario as resolved, an engine's settings, the bicycle's parameters, or what a file may hold."""
-    from ..show import kind_of, make_document, make_schema
-    from ..sweep import SweepFile
-    from .present_show import show_document
+    from .progress import ProgressBars
     from .terminal import make_console
 
-    document = make_schema(kind_of(name), name, SweepFile) if schema else make_document(name, SweepFile)
+    with ProgressBars():
+        from ..show import kind_of, make_document, make_schema
+        from ..sweep import SweepFile
+        from .present_show import show_document
+
+        document = make_schema(kind_of(name), name, SweepFile) if schema else make_document(name, SweepFile)
     with ending_with(0):
         if as_json or schema:
             print_json(document)

@@ -32,15 +32,19 @@ def diff_command(
     as_json: JsonOption = False,
 ) -> None:
     """Two stored runs of one scenario against each other: what moved by more than round-off."""
-    from ..compare import diff_runs, read_pair, write_diff
-    from ..run import installed_engines
-    from .present_diff import show_diff
+    from .progress import ProgressBars
     from .terminal import make_console
 
-    installed_engines()  # raises here if two packages announce one engine, which is not a fault of the runs
-    pair = read_pair(before, after, engine)
-    found = diff_runs(pair)
-    written = [] if out is None else write_diff(pair, found, out)
+    with ProgressBars() as progress:
+        from ..compare import diff_runs, read_pair, write_diff
+        from ..run import installed_engines
+        from .present_diff import show_diff
+
+        installed_engines()  # raises here if two packages announce one engine, which is not a fault of the runs
+        progress.say("comparing the runs")
+        pair = read_pair(before, after, engine)
+        found = diff_runs(pair)
+        written = [] if out is None else write_diff(pair, found, out)
     with ending_with(0 if found["same"] else 1):
         if as_json:
             print_json(found)

@@ -34,14 +34,15 @@ def paper_command(
 
     The exit status is 0 if every claim holds but those that are known not to, by the paper's own fault.
     """
-    from ..files import make_folder
-    from ..paper import known_discrepancies, ledger_document, make_ledger, show_ledger, write_paper
     from .progress import ProgressBars
     from .terminal import make_console
 
-    if out is not None:
-        make_folder(out)  # first, so that half a minute of work is not lost if it fails
     with ProgressBars() as progress:
+        from ..files import make_folder
+        from ..paper import known_discrepancies, ledger_document, make_ledger, show_ledger, write_paper
+
+        if out is not None:
+            make_folder(out)  # first, so that half a minute of work is not lost if it fails
         lines = make_ledger(lambda part, done, parts: progress.watch(part, done, parts, "parts of the paper"))
         written = []
         if out is not None:
@@ -82,19 +83,21 @@ def precision_command(
     as_json: JsonOption = False,
 ) -> None:
     """Work-precision: error and CPU time over step sizes, observed order, limit, the engine's own eigenvalues."""
-    from ..files import make_folder
-    from ..scenario import load_scenario
-    from ..studies import all_ran, study_precision, write_precision
-    from .present_precision import show_precision
-    from .progress import ProgressBars
+    from .progress import COMPUTING, ProgressBars
     from .terminal import make_console
 
-    changes = parse_changes(change, duration)
-    other = None if bicycle is None else load_bicycle(bicycle).bicycle
-    name, loaded = load_scenario(scenario, changes, "--set", other)
-    if out is not None:
-        make_folder(out)  # first, so that no work is lost if it fails
     with answering_missing_motion(as_json), showing_traceback(traceback), ProgressBars() as progress:
+        from ..files import make_folder
+        from ..scenario import load_scenario
+        from ..studies import all_ran, study_precision, write_precision
+        from .present_precision import show_precision
+
+        changes = parse_changes(change, duration)
+        other = None if bicycle is None else load_bicycle(bicycle).bicycle
+        name, loaded = load_scenario(scenario, changes, "--set", other)
+        if out is not None:
+            make_folder(out)  # first, so that no work is lost if it fails
+        progress.say(COMPUTING)
         trace = print_traceback if traceback else None
         document = study_precision(name, loaded, engine, levels, eigenvalues, progress.watch, trace)
     written = [] if out is None else write_precision(document, out)

@@ -36,8 +36,10 @@ def sweep_command(
     as_json: JsonOption = False,
 ) -> None:
     """Many runs over a grid, a list or a Latin hypercube, on local processes or a Dask cluster."""
-    from .run_sweep import run_sweep_command
+    from .progress import ProgressBars
 
+    with ProgressBars():
+        from .run_sweep import run_sweep_command
     status = run_sweep_command(file, scheduler, workers, out, resume, as_json, retry or [])
     if status:
         raise typer.Exit(status)

@@ -2,9 +2,36 @@
 
 from __future__ import annotations
 
+import re
+from textwrap import wrap
+
 from rich.console import Console
+from rich.text import Text
+
+# The space between a number and its unit, and what stands for it while lines are broken.
+_BEFORE_UNIT, _NO_BREAK = re.compile(r"(?<=\d) (?=(?:m|s|N|J|%|rad|1/s|m/s|rad/s)(?:[\s,;:.)]|$))"), "\u00a0"
 
 
 def make_console(stderr: bool = False) -> Console:
     """Return the console of stdout, or of stderr, which colours nothing by itself: a digit in a name is no number."""
     return Console(stderr=stderr, highlight=False)
+
+
+def print_words(console: Console, words: str, style: str = "") -> None:
+    """Print a sentence: on a terminal in lines between words, elsewhere in one line, for programs that search it.
+
+    No name is broken, not even at a hyphen. For paths and commands that are to be copied there is `print_line`.
+    """
+    lines = [words]
+    if console.is_terminal:
+        # Further lines are indented two letters more than the first.
+        indent = " " * (len(words) - len(words.lstrip()) + 2)
+        whole = _BEFORE_UNIT.sub(_NO_BREAK, words)
+        lines = wrap(whole, console.width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    for line in lines:
+        print_line(console, line.replace(_NO_BREAK, " "), style)
+
+
+def print_line(console: Console, line: str, style: str = "") -> None:
+    """Print one line whatever its length, such as a path or a command that is to be copied."""
+    console.print(Text(line, style), soft_wrap=True)

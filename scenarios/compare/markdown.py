@@ -28,7 +28,8 @@ def diff_markdown(document: Mapping[str, Any]) -> str:
 
 def _engine_lines(engine: Mapping[str, Any]) -> list[str]:
     """Write the part of one engine: remarks and reasons, then the tables of fields and metrics."""
-    remarks = [f"- {escape_markdown(line)}" for line in [*diff_remarks(engine), *engine["reasons"]]]
+    lines = [*diff_remarks(engine), *_describe_cpu_times(engine["cpu_time"]), *engine["reasons"]]
+    remarks = [f"- {escape_markdown(line)}" for line in lines]
     blocks = [block for block in (remarks, _field_table(engine["fields"]), _metric_table(engine["metrics"])) if block]
     return [line for k, block in enumerate(blocks) for line in ([""] if k else []) + block]
 
@@ -57,18 +58,22 @@ def _metric_table(metrics: Mapping[str, Mapping[str, Any]]) -> list[str]:
 
 
 def diff_remarks(engine: Mapping[str, Any]) -> list[str]:
-    """List changed version and settings of an engine, its CPU times, and how far it was compared."""
+    """List changed version and settings of an engine, and how far it was compared."""
     before, after = engine["version"]
     lines = [f"version {before} -> {after}"] if before != after else []
     lines += [_format_change(name, *pair) for name, pair in engine["settings"].items()]
-    cpu_time, position = engine["cpu_time"], engine["position_difference"]
-    if cpu_time is not None and cpu_time["ratio"] is not None:
-        lines.append(f"CPU time {cpu_time['before']:.3g} s -> {cpu_time['after']:.3g} s, {cpu_time['ratio']:.3g} times")
+    position = engine["position_difference"]
     if position is not None and position["horizon"] is not None:
         lines.append(
             f"compared up to {position['horizon']:.4g} s: beyond, the motion's own growth leaves nothing to compare"
         )
     return lines
+
+
+def _describe_cpu_times(cpu_time: Mapping[str, Any] | None) -> list[str]:
+    if cpu_time is None or cpu_time["ratio"] is None:
+        return []
+    return [f"CPU time {cpu_time['before']:.3g} s -> {cpu_time['after']:.3g} s, {cpu_time['ratio']:.3g} times"]
 
 
 def _format_change(name: str, before: Any, after: Any) -> str:

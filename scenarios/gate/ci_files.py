@@ -88,7 +88,13 @@ def markdown_page(verdicts: Verdicts) -> str:
     ]
     for name, verdict in ordered:
         numbers = (_number(value) for value in (verdict.value, verdict.baseline, verdict.limit))
-        cells = (escape_markdown(name), escape_markdown(verdict.engine), verdict.quantity, *numbers, verdict.status)
+        cells = (
+            escape_markdown(name),
+            escape_markdown(verdict.engine),
+            verdict.quantity,
+            *numbers,
+            status_word(verdict),
+        )
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 

@@ -217,7 +217,12 @@ class CriticalShapes:
         }
 
 
-def follow_families(bicycle: Bicycle, surface: SurfaceOfRevolution, inputs: Inputs = NO_INPUTS) -> SolutionFamilies:
+def follow_families(
+    bicycle: Bicycle,
+    surface: SurfaceOfRevolution,
+    inputs: Inputs = NO_INPUTS,
+    watch: Callable[[int, int], None] = lambda *_: None,
+) -> SolutionFamilies:
     """Follow every curve of the four families on a ground, with special points and stable sections.
 
     Parameters
@@ -226,6 +231,8 @@ def follow_families(bicycle: Bicycle, surface: SurfaceOfRevolution, inputs: Inpu
     surface : SurfaceOfRevolution
     inputs : Inputs
         Held constant.
+    watch : callable
+        Called with the number of curves that have been examined, and that of all.
 
     Returns
     -------
@@ -243,9 +250,11 @@ def follow_families(bicycle: Bicycle, surface: SurfaceOfRevolution, inputs: Inpu
         curves, absent = trace_all(bicycle, surface, LONGEST_DRAWN_STEP, inputs)
     except NoSuchMotion as error:
         raise describe_missing_motion(error) from error
-    return SolutionFamilies(
-        bicycle=bicycle, surface=surface, curves=tuple(map(examine_curve, curves)), absent=absent, inputs=inputs
-    )
+    examined: list[FamilyCurve] = []
+    for curve in curves:
+        watch(len(examined), len(curves))
+        examined.append(examine_curve(curve))
+    return SolutionFamilies(bicycle=bicycle, surface=surface, curves=tuple(examined), absent=absent, inputs=inputs)
 
 
 def check_inertia(bicycle: Bicycle) -> None:

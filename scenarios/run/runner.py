@@ -181,6 +181,7 @@ def run_plan(
     note: Callable[[str], None],
     trace: Trace | None = None,
     accept: Callable[[str], None] | None = None,
+    say: Callable[[str], None] = lambda _: None,
 ) -> RunOutcome:
     """Run every engine of a plan and write the run folder.
 
@@ -200,12 +201,14 @@ def run_plan(
         Called with the name of an engine that failed and its exception.
     accept : callable, optional
         Called with the name of an engine that has finished; what it raises is that engine's failure.
+    say : callable
+        Called after the rides with what is being done.
 
     Returns
     -------
     RunOutcome
     """
-    folder, result = store_run(plan, out, watch, note, trace, accept)
+    folder, result = store_run(plan, out, watch, note, trace, accept, say)
     return RunOutcome(
         folder,
         result.metrics,
@@ -224,6 +227,7 @@ def store_run(
     note: Callable[[str], None],
     trace: Trace | None = None,
     accept: Callable[[str], None] | None = None,
+    say: Callable[[str], None] = lambda _: None,
 ) -> tuple[Path, RunResult]:
     """Run every engine of a plan and write the run folder; return the folder and all results.
 
@@ -241,7 +245,9 @@ def store_run(
 
     rides = ride_plan(plan, watch, note, trace, store, accept)
     with _block_interrupts():
+        say("measuring the rides")
         result = measure_run(plan, rides)
+        say("writing the recording and the report")
         write_sealed(folder / "metrics.json", result.metrics, RUN_VERSION)
         write_run_recording(folder, plan, result.shown, result.metrics, result.failures, result.verdicts)
         complete = not result.interrupted

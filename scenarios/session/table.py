@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from ...engines.frames import import_pandas
-from ...reports.drawing import COLUMNS, format_table, make_remarks, rank_engines
+from ...reports.drawing import COLUMNS, format_table, group_remarks, rank_engines
 from ...reports.measure import flatten_metrics
 
 if TYPE_CHECKING:
@@ -83,8 +83,8 @@ class MetricsTable(Mapping[str, Mapping[str, Any]]):
     @property
     def remarks(self) -> tuple[str, ...]:
         """Warnings about rows: falls, early ends, and reports that contradict the coordinates."""
-        names = rank_engines(self._rows)
-        return tuple(line for name in names for line in make_remarks(name, self._rows[name], self._duration))
+        ranked = {name: self._rows[name] for name in rank_engines(self._rows)}
+        return tuple(group_remarks(ranked, self._duration))
 
     def to_pandas(self) -> pd.DataFrame:
         """Return all columns as a data frame with the engines as index.

@@ -2,21 +2,24 @@
 
 from .cluster import on_cluster
 from .file import SweepFile
-from .live import ROW_STYLES, SweepView
 from .page import PAGE, write_sweep_page
-from .plan import plan_sweep
-from .rows import STATUSES
+from .plan import Task, plan_sweep
+from .pool import Done
+from .rows import BROKEN, COMPUTED, REFUSED, STATUSES
 from .run import Work, locally, run_sweep
 from .store import RESULTS
 from .summary import resume_command, status_of, summarise_sweep
 
 __all__ = [
+    "BROKEN",
+    "COMPUTED",
     "PAGE",
+    "REFUSED",
     "RESULTS",
-    "ROW_STYLES",
     "STATUSES",
+    "Done",
     "SweepFile",
-    "SweepView",
+    "Task",
     "Work",
     "locally",
     "on_cluster",

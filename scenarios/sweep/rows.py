@@ -11,7 +11,8 @@ import pyarrow as pa
 from ...engines.storage import versioned_metadata
 from .plan import Task
 
-COMPUTED = ("done", "fell", "ended", "no-motion")
+DONE = "done"  # a ride to its end
+COMPUTED = (DONE, "fell", "ended", "no-motion")
 REFUSED = "refused"  # an impossible point: its values contradict each other, or a drawn value is out of range
 BROKEN = ("failed", "timeout", "killed", "memory")
 STATUSES = (*COMPUTED, REFUSED, *BROKEN)

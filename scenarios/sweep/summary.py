@@ -6,10 +6,11 @@ from collections.abc import Collection
 from typing import Any
 
 import numpy as np
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from .plan import SweepPlan
-from .rows import BROKEN, REFUSED
+from .rows import BROKEN, DONE, REFUSED
 from .run import SweepOutcome
 from .store import TIMINGS, part_of
 
@@ -28,8 +29,8 @@ def summarise_sweep(plan: SweepPlan, outcome: SweepOutcome) -> dict[str, Any]:
     -------
     dict
         ``sweep, folder, tasks, missing, complete, stopped`` and ``engines``: by engine ``rows`` by status and, for
-        a complete sweep, ``position_error`` (median and worst of the largest errors), ``rows_per_second`` of one
-        worker, and ``reasons`` of rows that broke or were refused.
+        a complete sweep, ``position_error`` (median and worst of whole rides' largest errors), ``rows_per_second``
+        of one worker, and ``reasons`` of rows that broke or were refused.
     """
     complete = outcome.stopped is None
     engines: dict[str, Any] = {}
@@ -51,7 +52,9 @@ def summarise_sweep(plan: SweepPlan, outcome: SweepOutcome) -> dict[str, Any]:
 def _summarise_results(outcome: SweepOutcome, engine: str) -> dict[str, Any]:
     columns = ["status", "reason", "position_error_max"]
     table = pq.ParquetFile(part_of(outcome.folder, engine)).read(columns=columns)
-    errors = table.column("position_error_max").drop_null().to_numpy()
+    # A ride that fell or ended early has an error up to there only.
+    whole = table.filter(pc.field("status") == DONE)
+    errors = whole.column("position_error_max").drop_null().to_numpy()
     error = {"median": float(np.median(errors)), "worst": float(errors.max())} if len(errors) else None
     timing = pq.read_table(outcome.folder / TIMINGS, filters=[("engine", "=", engine)], columns=["task_time"])
     seconds = timing.column("task_time").drop_null().to_numpy()

@@ -71,7 +71,7 @@ def test_the_figures_and_remarks_are_those_of_a_run(tmp_path: Path) -> None:
                 assert math.isclose(value, expected, rel_tol=TWO_DIGITS), f"{engine}: {found} is not {printed}"
             else:
                 assert abs(value) < 10 * abs(expected), f"{engine}: {found} is far above {printed}"
-    remarks = [line for line in PRINTED.splitlines()[1:] if re.match(r"[a-z-]+(:| fell| left)", line)]
+    remarks = [line for line in PRINTED.splitlines()[1:] if ": " in line]
     assert len(remarks) > 3
     for line in remarks:
         assert line in ridden.splitlines(), line

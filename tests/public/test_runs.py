@@ -146,9 +146,9 @@ def test_the_table_shows_every_engine_and_escapes_what_it_is_told(stored: velodr
     assert "q2-plus: Q2, disturbed to the right, 0.2 s" in text
     row = dict(stored.metrics[NATIVE]) | {"ended": "<script>"}
     table = velodrome.MetricsTable({"<b>": row}, 0.2)
-    assert "<b> ended early: <script>" in repr(table)
+    assert "ended early: <b> (<script>)" in repr(table)
     assert "<b>" not in table.to_html()
-    assert "&lt;b&gt; ended early: &lt;script&gt;" in table.to_html()
+    assert "ended early: &lt;b&gt; (&lt;script&gt;)" in table.to_html()
 
 
 def test_settings_and_changes_reach_the_engines() -> None:

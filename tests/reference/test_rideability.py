@@ -173,7 +173,7 @@ def test_an_unridden_motion_says_what_and_how_much() -> None:
     assert found.steer == pytest.approx(motion.steer, abs=1e-9)
     pulled, inside = explain_motion(BICYCLE, surface, found)
     normal = found.force[1] @ unit_normals(surface, *found.contact[1, :2])
-    assert pulled == f"the ground pulls the front wheel: {normal:.3g} N"
+    assert pulled == f"the ground would have to pull the front wheel: {normal:.3g} N"
     turn, height = rim_heights(surface, found.state()[0], found.contact.ravel(), 0)
     centre, x, _, z, radius = wheels(found.state()[0], constants(BICYCLE))[0]
     angle = found.contact[0, 2] + turn
@@ -226,7 +226,7 @@ def test_stable_sections_of_the_benchmark_are_ridden_wholly() -> None:
 def test_special_points_say_why_they_cannot_be_ridden() -> None:
     found = {point.name: point for curve in curves(1.0) for point in special_points(curve)}
     (why,) = found["G (H)"].unphysical_because
-    assert why.startswith("the ground pulls the front wheel: -749 N")
+    assert why.startswith("the ground would have to pull the front wheel: -749 N")
     assert not any(point.unphysical_because for curve in curves(0.005) for point in special_points(curve))
 
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
+from velodrome.reports.drawing.remarks import group_remarks, make_remarks
 from velodrome.reports.drawing.summary import (
     COLUMNS,
     format_table,
     format_verdict,
-    make_remarks,
     make_summary,
     rank_engines,
 )
@@ -93,36 +93,65 @@ def test_no_news_is_no_remark() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"fell_at": 2.5}, ["exudyn fell at 2.50 s; its figures are those up to there"]),
-        ({"min_normal_force": -12.34}, ["exudyn: the ground pulls a wheel, by up to 12.3 N; no contact could"]),
+        ({"fell_at": 2.5}, ["fell, figures are those up to there: exudyn at 2.50 s"]),
+        (
+            {"min_normal_force": -12.34},
+            ["contact lost, but for wheels that", "the ground would have to pull a wheel: exudyn by up to 12.3 N"],
+        ),
         (
             {"friction": 0.5, "friction_left_at": 1.234},
-            [
-                "exudyn: rolling needs a coefficient of friction of up to 0.7, its contacts have 0.5: "
-                "too little from 1.23 s on"
-            ],
+            ["contacts with too little friction to roll: exudyn from 1.23 s on (needs up to 0.7, has 0.5)"],
         ),
-        ({"fell_at": 0.0}, ["exudyn fell at 0.00 s; its figures are those up to there"]),
-        ({"ended": "Newton failed"}, ["exudyn ended early: Newton failed"]),
-        ({"unconverged_steps": 3}, ["exudyn: its iterations did not converge in 3 of 20000 steps", "up to 1e-09"]),
+        ({"fell_at": 0.0}, ["fell, figures are those up to there: exudyn at 0.00 s"]),
+        ({"ended": "Newton failed"}, ["ended early: exudyn (Newton failed)"]),
+        ({"unconverged_steps": 3}, ["did not converge", "exudyn in 3 of 20000 steps, relative residual up to 1e-09"]),
         (
             {"unconverged_steps": 1, "largest_residual": None},
-            ["exudyn: its iterations did not converge in 1 of 20000 steps; its figures are not those of its equations"],
+            ["so that figures are not those of the engine's equations: exudyn in 1 of 20000 steps"],
         ),
         (
             {"position_error": {"max": 0.0}, "orientation_error": {"max": 0.0}, "rear_rate_error": 0.0},
-            ["exudyn: its ride equals the reference's to the last bit, so nothing was compared"],
+            ["rides equal to the reference's to the last bit, so that nothing was compared: exudyn"],
         ),
         ({"horizon": 7.25}, ["exudyn", "7.25 s", "instability"]),
-        ({"energy_drift_rate": None}, ["exudyn: its energy drift is no more than 6.2e-08, the error of the damping's"]),
+        ({"energy_drift_rate": None}, ["energy drift below the error of the damping's work", "exudyn 6.2e-08"]),
         ({"contact_force_error_at": 0.0}, ["exudyn", "first sample"]),
-        ({"adaptations": ["it keeps no forces of the start"]}, ["exudyn, for this release: it keeps no forces"]),
+        (
+            {"adaptations": ["it keeps no forces of the start"]},
+            ["for this release, it keeps no forces of the start: exudyn"],
+        ),
     ],
 )
 def test_what_spoils_a_row_is_said(change: dict[str, Any], words: list[str]) -> None:
     (line,) = make_remarks("exudyn", MEASURED | change, 20.0)
     assert all(word in line for word in words)
     assert f"- {line}" in text(**change)
+
+
+def test_the_same_remark_on_several_engines_is_one_line_and_falls_come_first() -> None:
+    late = {"contact_force_error_at": 0.0, "settled_force_error": 0.5}
+    measured = {
+        "near": MEASURED | {"contact_force_error_at": 0.0},
+        "far": MEASURED | late,
+        "late": MEASURED | {"fell_at": 5.0} | late,
+        "soon": MEASURED | {"fell_at": 0.5},
+    }
+    assert group_remarks(measured, 20.0) == [
+        "fell, figures are those up to there: late at 5.00 s, soon at 0.50 s",
+        "force error largest in the first sample; once settled: near 1.2e-05, far 5.0e-01, late 5.0e-01",
+    ]
+
+
+def test_a_fallen_engine_decides_no_notation() -> None:
+    near = MEASURED | {"position_error": {"max": 0.012}, "cpu_time": 0.5}
+    far = MEASURED | {"position_error": {"max": 0.25}, "cpu_time": 0.25}
+    fell = MEASURED | {"position_error": {"max": 123.0}, "fell_at": 1.0, "cpu_time": 1e-7}
+    table = format_table({"near": near, "far": far, "fell": fell})
+    titles = [title for title, *_ in COLUMNS]
+    position, cpu = titles.index("position error"), titles.index("CPU time")
+    assert [cells[position] for cells in table.values()] == ["0.012", "0.250", "123.000"]
+    # It has no digit in the others' notation.
+    assert [cells[cpu] for cells in table.values()] == ["0.50", "0.25", "1.0e-07"]
 
 
 def test_the_friction_that_rolling_needs_is_said_once() -> None:

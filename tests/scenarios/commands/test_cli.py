@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
@@ -15,6 +16,7 @@ from typing import Any
 
 import pytest
 from altered import Altered, pressing_ctrl_c, raising
+from rich.console import Console
 
 from tests.literature import published, rounds_to
 from tests.sealing import contents
@@ -26,6 +28,7 @@ from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.families import find_motion
 from velodrome.reference.surface import Paraboloid
 from velodrome.scenarios import gate
+from velodrome.scenarios.commands.present_motions import show_families
 from velodrome.scenarios.gate.verdict import Verdict, missing_verdict
 from velodrome.scenarios.run import runner
 from velodrome.scenarios.scenario.schema import library_names
@@ -380,7 +383,7 @@ def test_check_judges_what_it_is_asked_for(velodrome, tmp_path: Path) -> None:
     result = velodrome(*arguments, "--update", "--reason", "the first of its kind", "--json")
     assert (result.status, result.json()["updated"]) == (0, [str(tmp_path / "own" / "q2.json")])
     assert json.loads((tmp_path / "own" / "q2.json").read_text())["reason"] == "the first of its kind"
-    assert re.search(r"mujoco-multipliers  18 of 18 +0\.96 +\d+  nothing moved", velodrome(*arguments).stdout)
+    assert re.search(r"mujoco-multipliers +18 of 18 +0\.96 +[\d.]+  nothing moved", velodrome(*arguments).stdout)
     again = velodrome(*arguments, "--update")
     assert again.status == 0
     assert again.stdout.endswith("no baseline written: nothing moved beyond its limit\n")
@@ -453,9 +456,12 @@ def test_families_is_one_document_with_every_family(velodrome, tmp_path: Path) -
         assert {"rear_rate", "radius", "energy", "lyapunov_stable", "normal_force_front"} <= set(lengths)
         assert any(family["points"]["lyapunov_stable"]) == bool(family["stable_sections"])
     assert document["families"][1]["special_points"]["D"]["kind"] == "cusp"
-    table = velodrome("families", "--alpha", "0.005").stdout
+    console = Console(file=io.StringIO(), width=120)
+    show_families(console, document)
+    assert isinstance(console.file, io.StringIO)
+    table = console.file.getvalue()
     assert all(f"family {number}: " in table for number in (1, 2, 3, 4))
-    assert "Lyapunov stable: rear rate 15.276263732 (hopf) to 19.314284863 (hopf)" in table
+    assert "Lyapunov stable: rear rate 15.276263732 rad/s (hopf) to 19.314284863 rad/s (hopf)" in table
 
 
 def test_families_refuses_a_shape_that_is_none(velodrome, tmp_path: Path) -> None:

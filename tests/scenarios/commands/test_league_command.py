@@ -26,7 +26,7 @@ def test_the_tables_keep_engines_whole_at_sixty_columns(velodrome, monkeypatch: 
     errors = [float(cells[1]) for cells in first[1:]]
     assert first[0][:2] == ["reference", "–"]
     assert errors == sorted(errors)
-    assert any(line.startswith("mujoco-native creeps: ") for line in lines)
+    assert any(line.startswith("wheels creep, slip = J̇q̇ / b, with 1 / b: mujoco-native ") for line in lines)
     assert "written: league/league.html" in lines
 
 

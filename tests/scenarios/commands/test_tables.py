@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import pytest
 from rich.console import Console
+from stored_documents import show_stored_run, stored
 
 from velodrome.reference.bicycle import Bicycle
 from velodrome.scenarios.cli import app
@@ -22,14 +21,10 @@ from velodrome.scenarios.commands.present_float32 import show_float32
 from velodrome.scenarios.commands.present_gate import show_verdicts
 from velodrome.scenarios.commands.present_motions import show_atlas, show_circular, show_critical, show_families
 from velodrome.scenarios.commands.present_precision import show_precision
-from velodrome.scenarios.commands.present_run import show_outcome
 from velodrome.scenarios.commands.present_sweep import show_summary
 from velodrome.scenarios.commands.tables import Column, print_table
-from velodrome.scenarios.compare import diff_runs, read_pair
 from velodrome.scenarios.gate import Verdict
-from velodrome.scenarios.motions import families_document, solve_circular
-from velodrome.scenarios.run import RunOutcome, RunPlan, plan_run, run_plan
-from velodrome.scenarios.scenario import BicycleFile, load_scenario, make_bowl, name_bicycle
+from velodrome.scenarios.scenario import BicycleFile, name_bicycle
 from velodrome.scenarios.studies import BicycleStudy, study_bicycle
 
 # The longest names of the suite's own engines, and one that rich would read as markup.
@@ -38,27 +33,16 @@ NUMBERS = (-0.0033912345678e-7, 26.436362407, 1234.5678901234567, -2.22507385850
 Show = Callable[[Console], None]
 
 
-@cache
-def ridden() -> tuple[RunPlan, RunOutcome, dict[str, Any]]:
-    """A short ride and its difference from itself, both under several long names."""
-    changes = {"simulation.duration": 0.5, "simulation.output_rate": 50.0}
-    plan = plan_run(*load_scenario("q2-plus", changes), wanted=["mujoco-native"])
-    with TemporaryDirectory() as out:
-        outcome = run_plan(plan, Path(out), lambda *_: None, lambda _: None)
-        document = diff_runs(read_pair(outcome.folder, outcome.folder, None))
-    metrics = outcome.metrics | dict.fromkeys(LONG_NAMES, outcome.metrics["mujoco-native"])
-    entry = document["engines"]["mujoco-native"]
-    engines = document["engines"] | dict.fromkeys(LONG_NAMES, entry | {"verdict": "differs"})
-    return plan, replace(outcome, metrics=metrics), document | {"engines": engines}
-
-
 def show_run(console: Console) -> None:
-    plan, outcome, _ = ridden()
-    show_outcome(console, plan.name, plan.scenario, outcome)
+    run = stored("run")
+    run["metrics"] |= dict.fromkeys(LONG_NAMES, run["metrics"]["mujoco-native"])
+    show_stored_run(console, run)
 
 
 def show_difference(console: Console) -> None:
-    show_diff(console, ridden()[2])
+    document = stored("diff")
+    document["engines"] |= dict.fromkeys(LONG_NAMES, document["engines"]["mujoco-native"])
+    show_diff(console, document)
 
 
 def show_gate(console: Console) -> None:
@@ -110,19 +94,14 @@ def show_sweep(console: Console) -> None:
     show_summary(console, document, "")
 
 
-@cache
-def followed() -> dict[str, Any]:
-    return families_document(0.005)
-
-
 def show_all_families(console: Console) -> None:
-    show_families(console, followed())
+    show_families(console, stored("families"))
 
 
 def show_critical_shapes(console: Console) -> None:
     keys = ("alpha", "rear_rate", "lean", "steer")
     shape: dict[str, Any] = dict(zip(keys, NUMBERS, strict=True))
-    shape |= {"physical": False, "unphysical_because": ["the ground pulls the rear wheel: -1 N"]}
+    shape |= {"physical": False, "unphysical_because": ["the ground would have to pull the rear wheel: -1 N"]}
     show_critical(
         console,
         {
@@ -145,7 +124,7 @@ def show_regions(console: Console) -> None:
 
 
 def show_motion(console: Console) -> None:
-    show_circular(console, solve_circular(Bicycle(), make_bowl(0.005), 18.0, 2, None).as_json())
+    show_circular(console, stored("circular"))
 
 
 @cache
@@ -191,7 +170,7 @@ def test_words_and_figures_are_those_of_a_wide_terminal(show: Show, width: int) 
 def test_tables_fit_sixty_columns(show: Show) -> None:
     # Lines of words below a table are left to the terminal; those of these documents are short.
     lines = printed(show, 60).splitlines()
-    tables = [line for line in lines if ": " not in line]
+    tables = [line for line in lines if ": " not in line and not line.startswith("  ")]
     assert len(tables) > len(LONG_NAMES)
     assert all(len(line.rstrip()) <= 60 for line in tables)
 

@@ -17,7 +17,7 @@ from tests.sealing import contents
 from velodrome.engines import registry
 from velodrome.engines.engine import REFERENCE, Engine, EngineError, Problem, Settings, Trajectory
 from velodrome.engines.registry import engine_names
-from velodrome.reports.drawing.summary import make_remarks
+from velodrome.reports.drawing.remarks import make_remarks
 from velodrome.reports.measure import flatten_metrics
 from velodrome.reports.measure.consistency import describe_mismatch
 from velodrome.scenarios.cli import app
@@ -54,7 +54,9 @@ def test_a_run_names_every_report_that_contradicts_the_coordinates(what: str, tm
     found = measured[OWN]["inconsistent_reports"]
     assert {report["quantity"] for report in found} == named
     lines = make_remarks(OWN, measured[OWN], 0.5)
-    assert [f"{OWN}: {describe_mismatch(report)}" for report in found] == [line for line in lines if "from" in line]
+    told = "; ".join(map(describe_mismatch, found))
+    about = "reports that contradict the coordinates: "
+    assert [line for line in lines if line.startswith(about)] == ([f"{about}{OWN} ({told})"] if found else [])
     assert set(flatten_metrics(measured[OWN])["inconsistent_reports"].split(", ")) == named
     # What is shown is what follows from the coordinates.
     if "qd" in named:

@@ -1,4 +1,4 @@
-"""What a sweep says: JSON, a table, the live view; how it ends."""
+"""What a sweep says: JSON, a table, its progress; how it ends."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ import pytest
 from rich.console import Console
 from sweeping import UPRIGHT, here, planned, written
 
+from velodrome.scenarios.commands import progress
 from velodrome.scenarios.commands import run_sweep as command
+from velodrome.scenarios.commands.present_sweep import SweepCounter
 from velodrome.scenarios.error import ScenarioError
-from velodrome.scenarios.sweep.live import SweepView
 from velodrome.scenarios.sweep.page import group_medians
 from velodrome.scenarios.sweep.pool import Done
 
@@ -87,26 +88,22 @@ def test_a_stopped_retry_says_how_to_go_on(
     assert "3 of 3 runs are missing, finished runs are kept" in said
 
 
-def test_the_live_view_counts_and_says_what_failed_and_why(tmp_path: Path) -> None:
+def test_progress_counts_and_says_what_failed_and_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tasks = planned(tmp_path, THREE).tasks
-    screen = Console(file=io.StringIO(), force_terminal=True, width=100)
-    view = SweepView(10, screen)
-    view.watch(tasks[0], Done(0, {"status": "done", "reason": None}, {}), fresh=False)
-    view.watch(tasks[1], Done(1, {"status": "failed", "reason": "[bold]it diverged"}, {}), fresh=True)
-    with screen.capture() as shown:
-        screen.print(view.picture())
-    text = shown.get()
-    assert "2 of 10" in text
+    screen = Console(file=io.StringIO(), force_terminal=True, color_system=None, width=100)
+    monkeypatch.setattr(progress, "make_console", lambda stderr: screen)
+    monkeypatch.delenv(progress.SILENCE)
+    with progress.ProgressBars() as bars:
+        counter = SweepCounter(bars, "small", 10)
+        counter.watch(tasks[0], Done(0, {"status": "done", "reason": None}, {}), fresh=False)
+        counter.watch(tasks[1], Done(1, {"status": "failed", "reason": "[bold]it diverged"}, {}), fresh=True)
+    assert isinstance(screen.file, io.StringIO)
+    text = screen.file.getvalue()
+    assert "small" in text
+    assert "2 of 10 rows" in text
+    assert "done 1  failed 1  " in text
     assert "rows/s" in text
-    assert "left" in text
     assert f"{tasks[1].key} reference failed: [bold]it diverged" in text
-
-
-def test_no_live_view_where_there_is_no_terminal(tmp_path: Path) -> None:
-    file = io.StringIO()
-    with SweepView(3, Console(file=file)) as view:
-        view.watch(planned(tmp_path, THREE).tasks[0], Done(0, {"status": "done", "reason": None}, {}), fresh=True)
-    assert file.getvalue() == ""
 
 
 def test_a_sweeps_page_draws_the_errors_over_its_parameters(in_process: Path) -> None:

@@ -86,11 +86,16 @@ def test_a_motion_that_does_not_exist_is_a_row_of_every_engine(tmp_path: Path) -
 
 
 def test_a_fall_is_a_result(tmp_path: Path) -> None:
-    text = 'scenario = "iftomm-1"\n[grid]\nmotion.speed = [1.0]\nperturbation.lean_rate = [1.0]'
-    outcome = swept(planned(tmp_path, text), tmp_path / "out")
-    (row,) = rows(tmp_path / "out")
-    assert row["status"] == "fell"
-    assert f"fell at {row['fell_at']!r} s" in row["reason"]
+    text = 'scenario = "iftomm-1"\nengines = ["reference", "mujoco-multipliers"]\n'
+    plan = planned(tmp_path, text + "[grid]\nmotion.speed = [1.0]\nperturbation.lean_rate = [1.0]")
+    outcome = swept(plan, tmp_path / "out")
+    for engine in plan.file.engines:
+        (row,) = rows(tmp_path / "out", engine)
+        assert row["status"] == "fell"
+        assert f"fell at {row['fell_at']!r} s" in row["reason"]
+    assert row["position_error_max"] is not None
+    # Its error is that up to the fall, and no error of a whole ride.
+    assert summarise_sweep(plan, outcome)["engines"]["mujoco-multipliers"]["position_error"] is None
     assert status_of(outcome) == 0
 
 
