@@ -12,6 +12,7 @@ from .plots import (
     ERROR,
     FORCES,
     LOG_ENERGY,
+    NANOSECONDS,
     PLOTS,
     RADIUS,
     STATES,
@@ -22,6 +23,7 @@ from .plots import (
     mode_plots,
     to_nanoseconds,
 )
+from .samples import choose_samples
 from .summary import (
     COLUMNS,
     describe_required_friction,
@@ -30,7 +32,6 @@ from .summary import (
     format_table,
     format_verdict,
     make_remarks,
-    make_summary,
     rank_engines,
 )
 
@@ -43,6 +44,7 @@ __all__ = [
     "FORCES",
     "LINE_LIFT",
     "LOG_ENERGY",
+    "NANOSECONDS",
     "PLOTS",
     "RADIUS",
     "STATES",
@@ -56,6 +58,7 @@ __all__ = [
     "assign_colours",
     "ball",
     "body_meshes",
+    "choose_samples",
     "describe_required_friction",
     "describe_stability",
     "drawable_values",
@@ -69,7 +72,6 @@ __all__ = [
     "make_ground",
     "make_printable",
     "make_remarks",
-    "make_summary",
     "mode_plots",
     "rank_engines",
     "to_nanoseconds",
