@@ -13,7 +13,7 @@ from .camera import VIEW
 LETTER, FRAME, HEIGHT = 7.4, 14.0, 24.0
 # The viewer hangs a label below its point by this much [points].
 HANG = 3.0
-_LEAD = 44.0  # from a bicycle to the nearest labels [points]
+_LEAD = 24.0  # from a bicycle to the middle of the nearest label [points]
 _GAP = 3.0
 _ROWS = 5
 _BELOW = 60.0  # a place below counts as farther by this much [points], since it hides the path
@@ -24,7 +24,7 @@ def measure_labels(names: Sequence[str]) -> np.ndarray:
     return np.array([[LETTER * len(name) + FRAME, HEIGHT] for name in names])
 
 
-def place_labels(anchors: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+def place_labels(anchors: np.ndarray, reach: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Choose a place for every label near its bicycle at every time, so that no two labels overlap.
 
     The labels take their places in turn: each takes the first of a list of places around its bicycle that no earlier
@@ -35,6 +35,8 @@ def place_labels(anchors: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     ----------
     anchors : ndarray, shape (times, labels, 2)
         Where the bicycles are in the picture, from its middle [points]; NaN for one that is not seen.
+    reach : ndarray, shape (times, labels)
+        How far a bicycle may be above or below its place [points]; no label is so near.
     sizes : ndarray, shape (labels, 2)
         Widths and heights of the labels [points].
 
@@ -50,7 +52,7 @@ def place_labels(anchors: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     for t, here in enumerate(anchors):
         done: list[int] = []
         for k in np.flatnonzero(np.isfinite(here).all(axis=1)).tolist():
-            places = here[k] + offsets
+            places = here[k] + offsets + np.sign(offsets) * [0.0, reach[t, k]]
             free = np.ones(len(places), bool)
             for other in done:
                 apart = np.abs(places - placed[t, other]) - half[k] - half[other]

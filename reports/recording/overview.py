@@ -19,6 +19,7 @@ _STEEPEST_ELEVATION = np.radians(80.0)
 _OVER_THE_RIM = np.radians(8.0)
 _SHORTEST_BICYCLE = 60.0  # length in the picture [points] below which bicycles cannot be told apart
 _FREE_ABOVE = 90.0  # for names above the farthest bicycle [points]
+_HALF_HEIGHT = 0.65  # of a bicycle, from D [m]
 _USUAL_VIEW = 1.4  # size of a view, of the smallest one
 _LABEL_INTERVAL = 0.05  # a name is beside its bicycle at all times; where, is decided this often [s]
 _FOLLOWING = Camera(np.array([-2.4, -4.0, 2.2]), np.array([0.4, 0.0, 0.2]))
@@ -151,7 +152,8 @@ def name_bicycles(trajectories: Mapping[str, Trajectory], overview: Overview, ti
     seen = np.stack([np.einsum("nij,nj->ni", turn, positions[name][chosen] - centre) for name in order], axis=1)
     camera = overview.camera
     anchors, depth = camera.project(seen)
-    placed = place_labels(anchors, measure_labels([max(texts[name], key=len) for name in order]))
+    reach = np.nan_to_num(camera.scale * _HALF_HEIGHT / np.where(depth > 0, depth, np.nan))
+    placed = place_labels(anchors, reach, measure_labels([max(texts[name], key=len) for name in order]))
     hook = placed + [0.0, HEIGHT / 2 + HANG]
     # The line ends at the side of the label that faces the bicycle. A label hangs on its point by as many points in
     # every view: the line's end is right in one larger than the smallest, and within the label's frame in that one.

@@ -69,14 +69,10 @@ def make_verdict(
     }
     errors = {name: error for name, error in errors.items() if error is not None}
     if errors:
-        cells = [f"{escape_markdown(name)} {size} m" for name, size in zip(errors, _format(errors.values()), strict=True)]
+        cells = [f"{escape_markdown(name)} {format_numbers([error])[0]} m" for name, error in errors.items()]
         far = f", farthest {cells[-1]}" if len(cells) > 1 else ""
         lines.append(f"Nearest to the reference: {cells[0]}{far} (largest distance).")
     return "\n\n".join(lines) + "\n"
-
-
-def _format(values: Any) -> list[str]:
-    return format_numbers(list(values))
 
 
 def _judge(verdicts: Sequence[Mapping[str, Any]]) -> str:
