@@ -190,10 +190,7 @@ FORCES = (
 )
 CONSTRAINTS = (
     *(Plot(f"{w}_log_gap", f"{w} gap [10^x m]", _select_column(_take_log(_gap), k)) for k, w in enumerate(WHEELS)),
-    *(
-        Plot(f"{w}_log_slip", f"{w} slip [10^x m/s]", _select_column(_take_log(_slip), k))
-        for k, w in enumerate(WHEELS)
-    ),
+    *(Plot(f"{w}_log_slip", f"{w} slip [10^x m/s]", _select_column(_take_log(_slip), k)) for k, w in enumerate(WHEELS)),
 )
 PLOTS = (ERROR, CHANGE, RADIUS, LOG_ENERGY, ENERGY, *STATES, *FORCES, *CONSTRAINTS)
 

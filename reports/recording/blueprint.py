@@ -180,9 +180,7 @@ def make_blueprint(layout: Layout) -> rrb.Blueprint:
     total = VIEW[1] + layout.legend[1]
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(
-                rrb.Tabs(*ride, active_tab=0), _show_legend(layout), row_shares=[VIEW[1], layout.legend[1]]
-            ),
+            rrb.Vertical(rrb.Tabs(*ride, active_tab=0), _show_legend(layout), row_shares=[VIEW[1], layout.legend[1]]),
             rrb.Vertical(
                 verdict,
                 rrb.Tabs(*(tab for tab in tabs if tab is not None), active_tab=0),

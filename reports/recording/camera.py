@@ -67,9 +67,7 @@ def fit_camera(points: np.ndarray, azimuth: float, elevation: float, above: floa
     above : float
         Height that is to be free above the points besides the margin [points].
     """
-    towards = np.array(
-        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
-    )
+    towards = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
     # How far from the middle of the picture points may be: to the right and upwards, to the left and downwards.
     room = np.array(VIEW) / 2 - _MARGIN
     limits = np.array([room - [0.0, above], room])

@@ -75,9 +75,7 @@ def find_range(
     height = max(high - low, plot.span) or 1.0
     middle, half = 0.5 * (low + high), (0.5 + _MARGIN) * height
     beyond = [
-        name
-        for name, (_, values) in curves.items()
-        if values.min() < middle - half or values.max() > middle + half
+        name for name, (_, values) in curves.items() if values.min() < middle - half or values.max() > middle + half
     ]
     return (None if high - low >= plot.span and not beyond else (middle - half, middle + half)), beyond
 

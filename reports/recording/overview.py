@@ -154,7 +154,7 @@ def name_bicycles(trajectories: Mapping[str, Trajectory], overview: Overview, ti
     anchors, depth = camera.project(seen)
     reach = np.nan_to_num(camera.scale * _HALF_HEIGHT / np.where(depth > 0, depth, np.nan))
     placed = place_labels(anchors, reach, measure_labels([max(texts[name], key=len) for name in order]))
-    hook = placed + [0.0, HEIGHT / 2 + HANG]
+    hook = placed + np.array([0.0, HEIGHT / 2 + HANG])
     # The line ends at the side of the label that faces the bicycle. A label hangs on its point by as many points in
     # every view: the line's end is right in one larger than the smallest, and within the label's frame in that one.
     above = placed[..., 1:] > anchors[..., 1:]

@@ -64,9 +64,7 @@ def make_verdict(
     count = f"All {total}" if len(staying) == total else f"{len(staying)} of {total}"
     noun = "engine rides" if total == 1 else "engines ride"
     lines.append(f"**{count} {noun} to the end, {duration:g} s.**" + _list_ends(measured, failures))
-    errors = {
-        name: (measured[name].get("position_error") or {}).get("max") for name in staying if name != REFERENCE
-    }
+    errors = {name: (measured[name].get("position_error") or {}).get("max") for name in staying if name != REFERENCE}
     errors = {name: error for name, error in errors.items() if error is not None}
     if errors:
         cells = [f"{escape_markdown(name)} {format_numbers([error])[0]} m" for name, error in errors.items()]

@@ -58,8 +58,8 @@ def describe_thinning(rides: Iterable[Trajectory], stride: int) -> str | None:
     longest = max(rides, key=lambda ride: len(ride.time))
     rate = (len(longest.time) - 1) / float(longest.time[-1] - longest.time[0])
     return (
-        f"The recording holds every {_number(stride)} sample, {rate / stride:.4g} of {rate:.4g} a second; of a curve also "
-        "its largest and smallest values between; the Parquet files hold all."
+        f"The recording holds every {_number(stride)} sample, {rate / stride:.4g} of {rate:.4g} a second, and curves' "
+        "peaks between them; the Parquet files hold all samples."
     )
 
 

@@ -43,7 +43,7 @@ def show_outcome(console: Console, plan: RunPlan, outcome: RunOutcome) -> None:
         command = command.relative_to(Path.cwd())
     console.print(f"run folder: {outcome.folder}", markup=False, soft_wrap=True)
     console.print(f"report:     {outcome.folder / 'report.html'}", markup=False, soft_wrap=True)
-    if (outcome.folder / "comparison.rrd").exists():
+    if outcome.metrics:
         console.print(f"recording:  {command} view {outcome.folder}", markup=False, soft_wrap=True)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -110,6 +111,17 @@ def run_command(
     duration: DurationOption = None,
     bicycle: BicycleOption = None,
     out: Annotated[Path, typer.Option(help="Folder for the run folders.")] = Path("runs"),
+    record_rate: Annotated[
+        float | None,
+        typer.Option(
+            metavar="HZ",
+            help="Largest number of samples a second in the recording. Without it rides of more than 2500 samples are "
+            "thinned. Trajectories and metrics always have all samples.",
+        ),
+    ] = None,
+    no_recording: Annotated[
+        bool, typer.Option("--no-recording", help="Write no recording; velodrome view makes it when it is asked for.")
+    ] = False,
     traceback: TracebackOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -125,6 +137,10 @@ def run_command(
     sources = [*(scenario or []), *(_find_tagged(tag) if tag is not None else [])]
     if not sources:
         raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
+    if record_rate is not None and not 0 < record_rate < math.inf:
+        raise ScenarioError(f"--record-rate is {record_rate:g}; it must be a positive number of samples a second [Hz]")
+    if record_rate is not None and no_recording:
+        raise ScenarioError("--record-rate and --no-recording exclude one another: leave one out")
     changes = parse_changes(change, duration)
     installed_engines()  # raises here if two packages announce one engine, which is not a fault of a scenario
     other = None if bicycle is None else load_bicycle(bicycle).bicycle
@@ -134,7 +150,15 @@ def run_command(
     outcomes = []
     for plan in plans:
         with ProgressBars() as progress:
-            outcome = run_plan(plan, out, progress.watch, progress.note, print_traceback if traceback else None)
+            outcome = run_plan(
+                plan,
+                out,
+                progress.watch,
+                progress.note,
+                print_traceback if traceback else None,
+                recording=not no_recording,
+                record_rate=record_rate,
+            )
         outcomes.append((plan, outcome))
         with ending_with(0):  # the next run goes on if the reader of this table has closed the pipe
             show_outcome(console, plan, outcome)

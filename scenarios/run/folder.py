@@ -78,6 +78,7 @@ def write_manifest(
     failures: Mapping[str, str],
     verdicts: Sequence[Mapping[str, Any]] = (),
     complete: bool = False,
+    recording: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Write the manifest of a run (engines, versions, settings, start) and return it.
 
@@ -94,6 +95,8 @@ def write_manifest(
     verdicts : sequence of mapping
     complete : bool
         Whether every engine has finished or failed.
+    recording : mapping, optional
+        What is to be known of the recording: under ``leaves_out``, what `write_run_recording` returns.
     """
     start = plan.start
     engines: dict[str, Any] = {}
@@ -118,6 +121,7 @@ def write_manifest(
         "left_out": plan.left_out,
         "warnings": list(plan.start.problem.bicycle.warnings()),
         "verdicts": list(verdicts),
+        "recording": recording,
         **describe_run_environment(),
         "inputs": asdict(start.problem.inputs),
         "start": {

@@ -160,7 +160,14 @@ def plan_run(name: str, scenario: Scenario, wanted: list[str] | None = None) -> 
 
 
 def run_plan(
-    plan: RunPlan, out: Path, watch: RunWatch, note: Callable[[str], None], trace: Trace | None = None
+    plan: RunPlan,
+    out: Path,
+    watch: RunWatch,
+    note: Callable[[str], None],
+    trace: Trace | None = None,
+    *,
+    recording: bool = True,
+    record_rate: float | None = None,
 ) -> RunOutcome:
     """Run every engine of a plan and write the run folder.
 
@@ -178,17 +185,29 @@ def run_plan(
         Called with a line of text for warnings and failures.
     trace : callable, optional
         Called with the name of an engine that failed and its exception.
+    recording : bool
+        Whether to write the recording.
+    record_rate : float, optional
+        Largest number of samples a second in the recording [Hz]; by default long rides are thinned. A line says what
+        is left out.
 
     Returns
     -------
     RunOutcome
     """
-    folder, result = store_run(plan, out, watch, note, trace)
+    folder, result = store_run(plan, out, watch, note, trace, recording=recording, record_rate=record_rate)
     return RunOutcome(folder, result.metrics, result.failures, result.verdicts, result.interrupted)
 
 
 def store_run(
-    plan: RunPlan, out: Path, watch: RunWatch, note: Callable[[str], None], trace: Trace | None = None
+    plan: RunPlan,
+    out: Path,
+    watch: RunWatch,
+    note: Callable[[str], None],
+    trace: Trace | None = None,
+    *,
+    recording: bool = True,
+    record_rate: float | None = None,
 ) -> tuple[Path, RunResult]:
     """Run every engine of a plan and write the run folder; return the folder and all results.
 
@@ -208,10 +227,22 @@ def store_run(
     with _block_interrupts():
         result = measure_run(plan, rides)
         write_sealed(folder / "metrics.json", result.metrics, RUN_VERSION)
-        write_run_recording(folder, plan, result.shown, result.metrics, result.failures, result.verdicts)
-        complete = not result.interrupted
-        done, failures = result.trajectories, result.failures
-        manifest = write_manifest(folder, plan, digest, done, failures, result.verdicts, complete=complete)
+        recorded = None
+        if recording and result.shown:
+            parts = (result.shown, result.metrics, result.failures, result.verdicts)
+            recorded = {"leaves_out": write_run_recording(folder, plan, *parts, rate=record_rate)}
+            if recorded["leaves_out"] is not None:
+                note(recorded["leaves_out"])
+        manifest = write_manifest(
+            folder,
+            plan,
+            digest,
+            result.trajectories,
+            result.failures,
+            result.verdicts,
+            complete=not result.interrupted,
+            recording=recorded,
+        )
         write_page(folder, plan, result.shown, result.metrics, manifest)
     return folder, result
 
