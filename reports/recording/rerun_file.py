@@ -160,6 +160,8 @@ def _write_stream(
 
 def _thin_ride(run: Trajectory, clock: Clock, stride: int) -> Trajectory:
     """Return the samples of a ride that the recording shows in space."""
+    if stride == 1:
+        return run
     kept = thin_samples(run, clock.times, stride)
     return replace(run, **{name: value[kept] for name in SHAPES if (value := getattr(run, name)) is not None})
 

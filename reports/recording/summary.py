@@ -76,7 +76,7 @@ def make_verdict(
 def _judge(verdicts: Sequence[Mapping[str, Any]]) -> str:
     short = [verdict for verdict in verdicts if not verdict["holds"]]
     held = f"{len(verdicts) - len(short)} of {len(verdicts)}" if short else f"All {len(verdicts)}"
-    quantity, limit = verdicts[0]["quantity"].replace("_", " "), verdicts[0]["limit"]
+    quantity, limit = escape_markdown(verdicts[0]["quantity"].replace("_", " ")), verdicts[0]["limit"]
     names = f" Not: {escape_markdown(', '.join(verdict['engine'] for verdict in short))}." if short else ""
     return f"**{held} engines meet the criterion: {quantity} below {limit:.3g}.**{names}"
 
