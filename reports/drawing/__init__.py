@@ -12,6 +12,7 @@ from .plots import (
     ERROR,
     FORCES,
     LOG_ENERGY,
+    NANOSECONDS,
     PLOTS,
     RADIUS,
     SMALLEST_SIZE,
@@ -24,6 +25,7 @@ from .plots import (
     to_nanoseconds,
 )
 from .remarks import group_remarks, make_remarks
+from .samples import choose_samples
 from .summary import (
     COLUMNS,
     describe_required_friction,
@@ -32,7 +34,6 @@ from .summary import (
     format_table,
     format_verdict,
     is_whole_ride,
-    make_summary,
     rank_engines,
 )
 
@@ -45,6 +46,7 @@ __all__ = [
     "FORCES",
     "LINE_LIFT",
     "LOG_ENERGY",
+    "NANOSECONDS",
     "PLOTS",
     "RADIUS",
     "SMALLEST_SIZE",
@@ -59,6 +61,7 @@ __all__ = [
     "assign_colours",
     "ball",
     "body_meshes",
+    "choose_samples",
     "describe_required_friction",
     "describe_stability",
     "drawable_values",
@@ -74,7 +77,6 @@ __all__ = [
     "make_ground",
     "make_printable",
     "make_remarks",
-    "make_summary",
     "mode_plots",
     "rank_engines",
     "to_nanoseconds",

@@ -164,15 +164,15 @@ def _slip(_: RideData, trajectory: Trajectory) -> np.ndarray | None:
     return None if trajectory.slip is None else np.linalg.norm(trajectory.slip, axis=-1)
 
 
-ERROR = Plot("log_position_error", "log10 distance of D from the reference [m]", _take_log(position_error))
-CHANGE = Plot("log_position_change", "log10 distance of D from the earlier run [m]", _take_log(position_change))
-RADIUS = Plot("radius", "distance of D from the z axis [m]", lambda _, run: np.hypot(run.q[:, 0], run.q[:, 1]), 0.05)
-ENERGY = Plot("energy_change", "relative energy change [-]", energy_change, 1e-6)
-LOG_ENERGY = Plot("log_energy_change", "log10 relative energy change [-]", _take_log(energy_change))
+ERROR = Plot("log_position_error", "distance from the reference [10^x m]", _take_log(position_error))
+CHANGE = Plot("log_position_change", "distance from the earlier run [10^x m]", _take_log(position_change))
+RADIUS = Plot("radius", "distance from the axis [m]", lambda _, run: np.hypot(run.q[:, 0], run.q[:, 1]), 0.05)
+ENERGY = Plot("energy_change", "energy change, relative to the start's", energy_change, 1e-6)
+LOG_ENERGY = Plot("log_energy_change", "energy change, relative to the start's [10^x]", _take_log(energy_change))
 
 STATES = (
-    Plot("lean", "lean [rad]", lambda _, run: run.q[:, LEAN], 0.02),
-    Plot("steer", "steer [rad]", lambda _, run: run.q[:, STEER], 0.02),
+    Plot("lean", "lean, + to the right [rad]", lambda _, run: run.q[:, LEAN], 0.02),
+    Plot("steer", "steer, + to the left [rad]", lambda _, run: run.q[:, STEER], 0.02),
     Plot("lean_rate", "lean rate [rad/s]", lambda _, run: run.qd[:, LEAN], 0.02),
     Plot("yaw_rate", "yaw rate [rad/s]", lambda _, run: run.qd[:, YAW], 0.02),
     Plot("rear_rate", "rear wheel rate [rad/s]", lambda _, run: run.qd[:, REAR_ANGLE], 0.1),
@@ -184,16 +184,13 @@ FORCES = (
         for k, w in enumerate(WHEELS)
     ),
     *(
-        Plot(f"{w}_friction", f"{w} tangential / normal force [-]", _select_column(friction_used, k), 0.05)
+        Plot(f"{w}_friction", f"{w} friction coefficient used", _select_column(friction_used, k), 0.05)
         for k, w in enumerate(WHEELS)
     ),
 )
 CONSTRAINTS = (
-    *(Plot(f"{w}_log_gap", f"log10 {w} gap [m]", _select_column(_take_log(_gap), k)) for k, w in enumerate(WHEELS)),
-    *(
-        Plot(f"{w}_log_slip", f"log10 {w} slip [m/s]", _select_column(_take_log(_slip), k))
-        for k, w in enumerate(WHEELS)
-    ),
+    *(Plot(f"{w}_log_gap", f"{w} gap [10^x m]", _select_column(_take_log(_gap), k)) for k, w in enumerate(WHEELS)),
+    *(Plot(f"{w}_log_slip", f"{w} slip [10^x m/s]", _select_column(_take_log(_slip), k)) for k, w in enumerate(WHEELS)),
 )
 PLOTS = (ERROR, CHANGE, RADIUS, LOG_ENERGY, ENERGY, *STATES, *FORCES, *CONSTRAINTS)
 
@@ -217,4 +214,4 @@ def _mode_plot(modes: Modes, k: int, mode: Mode) -> Plot:
         return run.time[valid], law[valid]
 
     what = "rear rate" if mode.unit == "rad/s" else "angle"
-    return Plot(f"mode_{k}", f"{mode.title}: log10 {what} [{mode.unit}]", values, expected=expected)
+    return Plot(f"mode_{k}", f"{mode.title}: {what} [10^x {mode.unit}]", values, expected=expected)

@@ -1,17 +1,15 @@
-"""The run as text with one table, from the metrics: Markdown for the recording."""
+"""The run in words, and the cells of its table, from the metrics."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from ...engines.engine import REFERENCE
 from ...reference.inputs import Inputs
 from ...reference.surface import Surface, SurfaceOfRevolution
-from .markdown import escape_markdown
 from .numbers import format_numbers
-from .remarks import group_remarks
 
 # (title, unit, metric, part of a metric that has parts)
 COLUMNS: tuple[tuple[str, str, str, str | None], ...] = (
@@ -87,57 +85,6 @@ def describe_required_friction(measured: Mapping[str, Mapping[str, Any]]) -> str
     """
     needed = measured.get(REFERENCE, {}).get("required_friction")
     return None if needed is None else f"Rolling without slip needs a coefficient of friction of up to {needed:.3g}."
-
-
-def make_summary(
-    title: str,
-    measured: Mapping[str, Mapping[str, Any]],
-    failures: Mapping[str, str],
-    verdicts: Sequence[Mapping[str, Any]],
-    growth_rate: float,
-    duration: float,
-    unsteady: str | None = None,
-) -> str:
-    """Write the Markdown summary of a run.
-
-    Parameters
-    ----------
-    title : str
-    measured : mapping
-        Metrics by engine name.
-    failures : mapping
-        Reason by the name of an engine that gave no trajectory.
-    verdicts : sequence of mapping
-        As returned by `velodrome.scenarios.run.runner.judge_run`.
-    growth_rate : float
-        Growth rate of the motion's own disturbances [1/s].
-    duration : float
-        Duration of the run [s].
-    unsteady : str, optional
-        See `describe_stability`.
-
-    Returns
-    -------
-    str
-    """
-    lines = [f"# {escape_markdown(title)}", "", describe_stability(growth_rate, unsteady), ""]
-    # Engines are columns: there are fewer of them than quantities, and the recording's tab is narrow.
-    table = format_table(measured)
-    lines += ["| | " + " | ".join(escape_markdown(name) for name in table) + " |", "|---|" + "---:|" * len(table)]
-    for k, (name, unit, _, _) in enumerate(COLUMNS):
-        lines.append(f"| {name} [{unit}] | " + " | ".join(cells[k] for cells in table.values()) + " |")
-    lines += [
-        "",
-        f"Errors are the largest over {duration:g} s, against `{REFERENCE}`; drifts are slopes of a line fit.",
-        "",
-    ]
-    friction = describe_required_friction(measured)
-    lines += [] if friction is None else [friction, ""]
-    lines += [f"- {escape_markdown(format_verdict(verdict))}" for verdict in verdicts]
-    lines += [f"- {escape_markdown(f'{engine} did not run: {reason}')}" for engine, reason in failures.items()]
-    ranked = {engine: measured[engine] for engine in table}
-    lines += [f"- {escape_markdown(line)}" for line in group_remarks(ranked, duration)]
-    return "\n".join(lines).rstrip() + "\n"
 
 
 def format_verdict(verdict: Mapping[str, Any]) -> str:

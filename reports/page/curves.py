@@ -1,4 +1,4 @@
-"""The curves of the page, and the selection of their samples."""
+"""The curves of the page."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...engines.engine import REFERENCE
-from ..drawing import ERROR, PLOTS, RADIUS, SMALLEST_SIZE, Plot, RideData
+from ..drawing import ERROR, PLOTS, RADIUS, SMALLEST_SIZE, Plot, RideData, choose_samples
 
 MOST_CURVE_POINTS = 1000  # largest number of points of a curve, about the number of pixels across
 ALL_CURVE_POINTS = 40_000  # largest number of points of all curves together: less than a megabyte of the page
@@ -149,33 +149,6 @@ GROUPS: tuple[tuple[str, tuple[Panel, ...]], ...] = (
         ),
     ),
 )
-
-
-def choose_samples(values: np.ndarray, most: int) -> np.ndarray:
-    """Choose samples that draw a curve: smallest and largest of each of equal parts, the first and the last.
-
-    No extremum of the curve is lost, however short it is.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        NaN where there is no value.
-    most : int
-        Largest number of samples, at least 4.
-
-    Returns
-    -------
-    ndarray of int
-        Indices of finite values, in rising order.
-    """
-    finite = np.flatnonzero(np.isfinite(values))
-    if len(finite) <= most:
-        return finite
-    parts = np.array_split(finite, (most - 2) // 2)
-    chosen = [finite[0], finite[-1]]
-    for part in parts:
-        chosen += [part[values[part].argmin()], part[values[part].argmax()]]
-    return np.unique(chosen)
 
 
 def make_curve(time: np.ndarray, values: np.ndarray, most: int) -> dict[str, list[float | None]]:

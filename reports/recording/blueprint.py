@@ -2,27 +2,75 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from ...engines.engine import REFERENCE
-from ..drawing import CHANGE, CONSTRAINTS, ENERGY, ERROR, FORCES, LOG_ENERGY, RADIUS, STATES, GroundMesh, Plot
+from ...reference.bicycle import BODIES
+from ..drawing import CHANGE, CONSTRAINTS, ENERGY, ERROR, FORCES, LOG_ENERGY, RADIUS, STATES, Plot
+from .camera import VIEW, Camera
+from .curves import Curves, find_range
+from .overview import Overview
 
 BACKGROUND = (17, 19, 24)
 NEWTONS_PER_METRE = 500.0
-_LEGEND_SHARE = 1.8  # height relative to another view, so that a legend of ten engines fits
+_GHOST = (255, 255, 255, 60)  # a ghost's colours are multiplied by this: it is nearly transparent
+_CHASE = Camera(np.array([-2.1, -1.6, 1.0]), np.array([-0.2, 0.0, 0.15]))
+_VERDICT_HEIGHT = 84.0  # three lines of text in the smallest view [points]
 
-# Samples of each plot by its key, then by engine.
-Curves = Mapping[str, Mapping[str, np.ndarray]]
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Layout:
+    """What the views of a recording show.
+
+    Attributes
+    ----------
+    engines : sequence of str
+        Names in the order of display.
+    ghosts : mapping of str to str
+        The bicycle that is beside an engine's own in the engine's views, transparent.
+    chase : mapping of str to Camera
+        Camera of the views of one engine, in its chase frame.
+    overview : Overview
+    around_axis : bool
+        Whether the ride goes around the z axis.
+    staying : collection of str
+        Engines that ride to the end.
+    texts : mapping of str to str
+        Names of the views of one engine.
+    legend : tuple of float
+        Width and height of the legend [points].
+    curves : mapping
+        By plot key and engine; a plot without curves gets no view.
+    modes : sequence of Plot
+        Plots of the modes' amplitudes.
+    """
+
+    engines: Sequence[str]
+    ghosts: Mapping[str, str]
+    chase: Mapping[str, Camera]
+    overview: Overview
+    around_axis: bool
+    staying: Collection[str]
+    texts: Mapping[str, str]
+    legend: tuple[float, float]
+    curves: Curves
+    modes: Sequence[Plot] = ()
 
 
 def world(engine: str) -> str:
     """Return the path of the entity that contains everything of an engine in space."""
     return rr.new_entity_path(["world", engine])
+
+
+def chase_camera() -> Camera:
+    """Return the camera of the views of one engine, for a bicycle that turns to the right."""
+    return _CHASE
 
 
 def _show_trails(engines: Sequence[str], seconds: float | None) -> dict[Any, rrb.VisibleTimeRanges]:
@@ -34,111 +82,110 @@ def _show_trails(engines: Sequence[str], seconds: float | None) -> dict[Any, rrb
     return {f"{world(engine)}/trail/{part}": visible for engine in engines for part in ("rear", "front", "D")}
 
 
-def overview(engines: Sequence[str], ground: GroundMesh) -> rrb.Spatial3DView:
-    """Make the view of all engines on the whole ground; on a long strip the camera follows the first engine."""
-    if ground.disc:
-        # A camera higher than the near rim by twice the depth sees the bottom.
-        bottom, rim = ground.vertices[:, 2].min(), ground.edge[:, 2].max()
-        depth, size, origin = rim - bottom, ground.radius, "/world"
-        target = np.array([-0.05 * size, -0.20 * size, bottom + 0.3 * depth])
-        position = np.array([-0.45 * size, -1.62 * size, bottom + 0.90 * size + 2 * depth])
-    else:
-        origin, target = f"{world(engines[0])}/chase", np.array([0.4, 0.0, 0.2])
-        position = np.array([-2.4, -4.0, 2.2])
-    eye = rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=position, look_target=target, eye_up=(0, 0, 1))
+def _place_eye(camera: Camera) -> rrb.EyeControls3D:
+    return rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital, position=camera.position, look_target=camera.target, eye_up=(0, 0, 1)
+    )
+
+
+def _show_ride(layout: Layout) -> rrb.Spatial3DView:
+    """Make the view of all engines."""
+    followed = layout.overview.followed
     return rrb.Spatial3DView(
-        name=f"Overview (arrows: contact force, 1 m = {NEWTONS_PER_METRE:.0f} N)",
-        origin=origin,
+        name=f"Ride (arrows: contact forces, {NEWTONS_PER_METRE:.0f} N a metre)",
+        origin="/world" if followed is None else f"{world(followed)}/chase",
         contents=["+ /world/**"],
-        overrides=_show_trails(engines, None),
+        overrides=_show_trails(layout.engines, None if followed is None else 10.0),
         background=BACKGROUND,
         line_grid=False,
-        eye_controls=eye,
+        eye_controls=_place_eye(layout.overview.camera),
     )
 
 
-def chase(engine: str, engines: Sequence[str]) -> rrb.Spatial3DView:
-    """Make the view of one engine from behind, which turns with its yaw only, and of the reference beside it."""
-    visible = [name for name in engines if name in (engine, REFERENCE)]
-    hidden = rrb.EntityBehavior(visible=False)  # the tab has the name
-    eye = rrb.EyeControls3D(
-        kind=rrb.Eye3DKind.Orbital, position=(-2.1, -1.6, 1.0), look_target=(-0.2, 0.0, 0.15), eye_up=(0, 0, 1)
-    )
+def _show_engine(layout: Layout, engine: str) -> rrb.Spatial3DView:
+    """Make the view of one engine from behind, which turns with its yaw only, with a ghost of another one."""
+    ghost = layout.ghosts.get(engine)
+    visible = [engine] if ghost is None else [engine, ghost]
+    hidden = rrb.EntityBehavior(visible=False)
+    overrides: dict[Any, Any] = {**_show_trails(visible, 2.0), f"{world(engine)}/here": hidden}
+    if ghost is not None:
+        pale = rr.Mesh3D.from_fields(albedo_factor=_GHOST)
+        overrides |= {f"{world(ghost)}/{body}/shape": pale for body in BODIES}
+        overrides |= {f"{world(ghost)}/{part}": hidden for part in ("here", "force", "contact")}
     return rrb.Spatial3DView(
-        name=f"Chase {engine}",
+        name=layout.texts[engine],
         origin=f"{world(engine)}/chase",
         contents=["+ /world/ground/**", *(f"+ {world(name)}/**" for name in visible)],
-        overrides={**_show_trails(visible, 2.0), **{f"{world(name)}/chase/name": hidden for name in visible}},
+        overrides=overrides,
         background=BACKGROUND,
         line_grid=False,
-        eye_controls=eye,
+        eye_controls=_place_eye(layout.chase[engine]),
     )
 
 
-def _fix_axis(plot: Plot, curves: Mapping[str, np.ndarray]) -> rrb.ScalarAxis | None:
-    """Return a fixed range where the viewer's own range would magnify round-off to the full height."""
-    low = min(float(values.min()) for values in curves.values())
-    high = max(float(values.max()) for values in curves.values())
-    if high - low >= plot.span:
-        return None
-    middle = 0.5 * (low + high)
-    return rrb.ScalarAxis(range=(middle - plot.span / 2, middle + plot.span / 2))
+def _show_legend(layout: Layout) -> rrb.Spatial2DView:
+    return rrb.Spatial2DView(
+        name="Engines",
+        origin="/legend",
+        background=BACKGROUND,
+        visual_bounds=rrb.VisualBounds2D(x_range=(0.0, layout.legend[0]), y_range=(0.0, layout.legend[1])),
+        titlebar=False,
+    )
 
 
-def _plot_view(plot: Plot, curves: Mapping[str, np.ndarray], legend: bool) -> rrb.TimeSeriesView:
+def _show_plot(layout: Layout, plot: Plot) -> rrb.TimeSeriesView:
+    """Make the view of a plot. It has no legend, which would cover curves: all views share the one below the ride."""
+    axis, beyond = find_range(plot, layout.curves[plot.key], layout.staying)
+    said = f"; {', '.join(beyond)} beyond" if beyond else ""
     return rrb.TimeSeriesView(
-        name=plot.title,
+        name=f"{plot.title}{said}",
         origin=f"/plots/{plot.key}",
         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
-        axis_y=_fix_axis(plot, curves),
-        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftBottom, visible=legend),
+        axis_y=None if axis is None else rrb.ScalarAxis(range=axis),
+        plot_legend=rrb.PlotLegend(visible=False),
+        interaction=rrb.PlotInteraction(tooltip_mode="All"),
         background=rrb.archetypes.PlotBackground(color=BACKGROUND, show_grid=True),
     )
 
 
-def _plot_tab(name: str, plots: Sequence[Plot], curves: Curves, columns: int) -> rrb.Container | None:
-    """Make a tab of the plots that have a curve; None if there is none.
-
-    Each tab has one legend, in the first view with the most curves, since it covers a part of them; in a column of
-    views this view is the highest.
-    """
-    drawn = [plot for plot in plots if curves.get(plot.key)]
-    if not drawn:
+def _show_plots(layout: Layout, name: str, plots: Sequence[Plot], columns: int) -> rrb.Container | None:
+    """Make a tab of the plots that have a curve; None if there is none."""
+    views = [_show_plot(layout, plot) for plot in plots if layout.curves.get(plot.key)]
+    if not views:
         return None
-    keyed = max(drawn, key=lambda plot: len(curves[plot.key]))
-    views = [_plot_view(plot, curves[plot.key], plot is keyed) for plot in drawn]
-    if columns == 1:
-        return rrb.Vertical(*views, row_shares=[_LEGEND_SHARE if plot is keyed else 1 for plot in drawn], name=name)
-    return rrb.Grid(*views, grid_columns=columns, name=name)
+    return rrb.Vertical(*views, name=name) if columns == 1 else rrb.Grid(*views, grid_columns=columns, name=name)
 
 
-def blueprint(engines: Sequence[str], ground: GroundMesh, curves: Curves, modes: Sequence[Plot] = ()) -> rrb.Blueprint:
-    """Make the layout of a recording: the ride left, curves and summary right, paused at the start.
+def make_blueprint(layout: Layout) -> rrb.Blueprint:
+    """Make the layout of a recording, paused at the start.
 
-    Parameters
-    ----------
-    engines : sequence of str
-        Names in the order of display.
-    ground : GroundMesh
-        Drawn part of the surface.
-    curves : mapping
-        Samples by plot key and engine; a plot without samples gets no view.
-    modes : sequence of Plot
-        Plots of the modes' amplitudes.
+    On the left the ride, side by side and one at a time, above the legend; on the right the verdict above curves and
+    summary.
     """
-    where = RADIUS if ground.disc else STATES[1]
+    where = RADIUS if layout.around_axis else STATES[1]
     tabs = (
-        _plot_tab("Comparison", (CHANGE, ERROR, LOG_ENERGY, STATES[0], where), curves, 1),
-        _plot_tab("States", STATES, curves, 2),
-        _plot_tab("Forces", FORCES, curves, 2),
-        _plot_tab("Modes", modes, curves, 1),
-        _plot_tab("Constraints & energy", (*CONSTRAINTS, LOG_ENERGY, ENERGY), curves, 2),
+        _show_plots(layout, "Comparison", (CHANGE, ERROR, LOG_ENERGY, STATES[0], where), 1),
+        _show_plots(layout, "States", STATES, 2),
+        _show_plots(layout, "Forces", FORCES, 2),
+        _show_plots(layout, "Modes", layout.modes, 1),
+        _show_plots(layout, "Constraints & energy", (*CONSTRAINTS, LOG_ENERGY, ENERGY), 2),
         rrb.TextDocumentView(name="Summary", origin="/summary"),
     )
+    ride: list[rrb.Container | rrb.View] = [_show_ride(layout)]
+    if len(layout.engines) > 1:
+        spread = [_show_engine(layout, engine) for engine in layout.engines]
+        ride.append(rrb.Grid(*spread, grid_columns=math.ceil(math.sqrt(len(spread))), name="Side by side"))
+    ride.append(rrb.Tabs(*(_show_engine(layout, engine) for engine in layout.engines), name="One at a time"))
+    verdict = rrb.TextDocumentView(name="Verdict", origin="/verdict", titlebar=False)
+    total = VIEW[1] + layout.legend[1]
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Tabs(overview(engines, ground), *(chase(engine, engines) for engine in engines), active_tab=0),
-            rrb.Tabs(*(tab for tab in tabs if tab is not None), active_tab=0),
+            rrb.Vertical(rrb.Tabs(*ride, active_tab=0), _show_legend(layout), row_shares=[VIEW[1], layout.legend[1]]),
+            rrb.Vertical(
+                verdict,
+                rrb.Tabs(*(tab for tab in tabs if tab is not None), active_tab=0),
+                row_shares=[_VERDICT_HEIGHT, total - _VERDICT_HEIGHT],
+            ),
             column_shares=[3, 2],
         ),
         rrb.BlueprintPanel(state="collapsed"),

@@ -56,7 +56,7 @@ def show_outcome(console: Console, name: str, scenario: Scenario, outcome: RunOu
         command = command.relative_to(Path.cwd())
     print_line(console, f"run folder: {outcome.folder}")
     print_line(console, f"report:     {outcome.folder / 'report.html'}")
-    if (outcome.folder / "comparison.rrd").exists():
+    if outcome.metrics:
         print_line(console, f"recording:  {command} view {outcome.folder}")
 
 

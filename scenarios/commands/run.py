@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -153,6 +154,17 @@ def run_command(
     ] = None,
     cache: CacheOption = None,
     out: Annotated[Path, typer.Option(help="Folder for the run folders.")] = Path("runs"),
+    record_rate: Annotated[
+        float | None,
+        typer.Option(
+            metavar="HZ",
+            help="Largest number of samples a second in the recording. Without it rides of more than 2500 samples are "
+            "thinned. Trajectories and metrics always have all samples.",
+        ),
+    ] = None,
+    no_recording: Annotated[
+        bool, typer.Option("--no-recording", help="Write no recording; velodrome view makes it when it is asked for.")
+    ] = False,
     traceback: TracebackOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -173,6 +185,12 @@ def run_command(
                 raise ScenarioError("nothing to run: name a scenario, or a tag with --tag; velodrome list shows them")
             if wheel and release is None:
                 raise ScenarioError("--wheel: it belongs to --release, e.g. --release mujoco --wheel FILE.whl")
+            if record_rate is not None and not 0 < record_rate < math.inf:
+                raise ScenarioError(
+                    f"--record-rate is {record_rate:g}; it must be a positive number of samples a second [Hz]"
+                )
+            if record_rate is not None and no_recording:
+                raise ScenarioError("--record-rate and --no-recording exclude one another: leave one out")
             changes = parse_changes(change, duration)
             installed_engines()  # raises here if two packages announce one engine, which is not a fault of a scenario
             other = None if bicycle is None else load_bicycle(bicycle).bicycle
@@ -189,7 +207,7 @@ def run_command(
         outcomes = []
         for ride in rides:
             with showing_traceback(traceback), ProgressBars(RIDING) as progress:
-                outcome = ride.start(progress)
+                outcome = ride.start(progress, not no_recording, record_rate)
             outcomes.append((ride, outcome))
             with ending_with(0):  # the next run goes on if the reader of this table has closed the pipe
                 show_outcome(console, ride.name, ride.scenario, outcome)
@@ -202,11 +220,11 @@ def run_command(
 
 @dataclass(frozen=True)
 class _Ride:
-    """A run that has been checked."""
+    """A run that has been checked; ``start`` takes whether to record it, and the largest rate of samples then [Hz]."""
 
     name: str
     scenario: Scenario
-    start: Callable[[ProgressBars], RunOutcome]
+    start: Callable[[ProgressBars, bool, float | None], RunOutcome]
 
 
 def _exit_status(outcomes: Sequence[RunOutcome]) -> int:
@@ -233,11 +251,12 @@ def _plan_source(
     with _naming(source):
         plan = plan_run(name, scenario, wanted)
     trace = print_traceback if traceback else None
-    return _Ride(
-        name,
-        plan.scenario,
-        lambda progress: run_plan(plan, out, progress.watch, progress.note, trace, say=progress.say),
-    )
+
+    def start(progress: ProgressBars, recording: bool, rate: float | None) -> RunOutcome:
+        watch, note, say = progress.watch, progress.note, progress.say
+        return run_plan(plan, out, watch, note, trace, say=say, recording=recording, record_rate=rate)
+
+    return _Ride(name, plan.scenario, start)
 
 
 def _load_source(source: str, changes: dict[str, Any], bicycle: Bicycle | None) -> tuple[str, Scenario]:
@@ -273,11 +292,21 @@ def _plan_in_release(
     """Return a run of a scenario with a release."""
     from ..history import RunEnded, run_in_release
 
-    def start(progress: ProgressBars) -> RunOutcome:
+    def start(progress: ProgressBars, recording: bool, rate: float | None) -> RunOutcome:
         trace = (lambda text: print(text, file=sys.stderr, end="")) if traceback else None
         try:
             with _naming(source):
-                return run_in_release(opened, name, scenario, out, progress.watch, progress.note, trace)
+                return run_in_release(
+                    opened,
+                    name,
+                    scenario,
+                    out,
+                    progress.watch,
+                    progress.note,
+                    trace,
+                    recording=recording,
+                    record_rate=rate,
+                )
         except RunEnded as error:
             progress.note(f"velodrome: {source}: {error}")
             raise typer.Exit(1) from error

@@ -26,8 +26,9 @@ from ..run import (
     read_stored_scenario,
 )
 from ..scenario import OF_THE_MOTION, CircularTable, Scenario, make_start
-from .differences import DIFFERS, StoredGround, StoredRun, diff_document
-from .markdown import diff_markdown, diff_remarks
+from .differences import DIFFERS, TO_THE_BIT, StoredGround, StoredRun, diff_document
+from .markdown import diff_markdown, diff_remarks, diff_summary, diff_verdict
+from .reasons import format_value
 
 
 @dataclass(frozen=True)
@@ -186,12 +187,11 @@ def write_diff(pair: Pair, found: Mapping[str, Any], out: Path) -> list[Path]:
     make_folder(out)
     paths = [out / name for name in ("diff.json", "diff.md", "diff.html", "diff.rrd")]
     write_json(paths[0], found)
-    page = diff_markdown(found)
-    write_text(paths[1], page)
+    write_text(paths[1], diff_markdown(found))
     write_text(paths[2], _make_page(pair, found))
     if not pair.before.trajectories and not pair.after.trajectories:
         return paths[:3]
-    _record(paths[3], pair, found, page)
+    record_pair(paths[3], pair, found)
     return paths
 
 
@@ -225,7 +225,26 @@ def _follow(ride: Trajectory, ground: StoredGround) -> Trajectory:
     return cut_at_fall(evaluate_ride(ride, ground.bicycle, ground.surface), ground.bicycle, ground.surface)
 
 
-def _record(path: Path, pair: Pair, found: Mapping[str, Any], page: str) -> None:
+def record_pair(path: Path, pair: Pair, found: Mapping[str, Any]) -> str | None:
+    """Write the recording of two runs, with both rides of every engine; one that is the same to the bit once.
+
+    Parameters
+    ----------
+    path : Path
+    pair : Pair
+    found : mapping
+        Document of `diff_runs`.
+
+    Returns
+    -------
+    str or None
+        What the recording leaves out; None if it holds every sample.
+
+    Raises
+    ------
+    ScenarioError
+        If no engine of both runs has a ride.
+    """
     # Imported here: rerun takes a second to load.
     from ...reports.recording import brighten, write_recording
 
@@ -233,7 +252,7 @@ def _record(path: Path, pair: Pair, found: Mapping[str, Any], page: str) -> None
     rides: dict[str, Trajectory] = {}
     paint, earlier = {}, {}
     for engine, entry in found["engines"].items():
-        labels = _labels(pair, engine, entry)
+        labels = _label_rides(engine, entry)
         # The later run has the engine's own colour, the earlier one a pale one.
         for run, label, hue in zip(
             (pair.before, pair.after), labels, (brighten(hues[engine]), hues[engine]), strict=True
@@ -243,23 +262,42 @@ def _record(path: Path, pair: Pair, found: Mapping[str, Any], page: str) -> None
                 paint[label] = hue
         if labels[0] != labels[1] and all(label in rides for label in labels):
             earlier[labels[1]] = labels[0]
+    if not rides:
+        raise ScenarioError(f"{pair.before.name} and {pair.after.name}: no engine of both runs has a ride to show")
     inputs, circular = pair.scenario.make_inputs(), isinstance(pair.scenario.motion, CircularTable)
     steady = find_unsteadiness(ground.surface, inputs, circular) is None
-    undisturbed = make_start(pair.scenario).undisturbed if steady else None
-    title = f"{pair.scenario.title}: {pair.before.name} against {pair.after.name}"
-    where = (ground.bicycle, ground.surface)
-    write_recording(
-        path, title, *where, rides, page, undisturbed=undisturbed, before=earlier, paint=paint, inputs=inputs
+    return write_recording(
+        path,
+        f"{pair.scenario.title}: {pair.before.name} against {pair.after.name}",
+        ground.bicycle,
+        ground.surface,
+        rides,
+        diff_verdict(found),
+        diff_summary(found),
+        undisturbed=make_start(pair.scenario).undisturbed if steady else None,
+        before=earlier,
+        paint=paint,
+        inputs=inputs,
     )
 
 
-def _labels(pair: Pair, engine: str, entry: Mapping[str, Any]) -> tuple[str, str]:
-    """Name an engine's rides in both runs by its versions or, where these are the same, by the runs' names.
+_MOST_MARKS = 2  # settings in a label
 
-    A reference that is the same in both runs is named once, since the other engines are compared with it.
+
+def _label_rides(engine: str, entry: Mapping[str, Any]) -> tuple[str, str]:
+    """Name an engine's rides in both runs by what tells them apart: versions, settings, or the runs.
+
+    A ride that is the same to the bit is named once, and so is a reference that is the same within round-off, since the
+    other engines are compared with it.
     """
-    if engine == REFERENCE and entry["verdict"] != DIFFERS:
+    if entry["verdict"] == TO_THE_BIT or (engine == REFERENCE and entry["verdict"] != DIFFERS):
         return engine, engine
     before, after = entry["version"]
-    marks = (before, after) if before != after else (pair.before.name, pair.after.name)
-    return f"{engine} @ {marks[0]}", f"{engine} @ {marks[1]}"
+    if before != after:
+        return f"{engine} @ {before}", f"{engine} @ {after}"
+    settings = list(entry["settings"].items())
+    if 0 < len(settings) <= _MOST_MARKS:
+        marks = (", ".join(f"{name} {format_value(pair[k])}" for name, pair in settings) for k in (0, 1))
+        first, second = (f"{engine} @ {mark}" for mark in marks)
+        return first, second
+    return f"{engine} @ before", f"{engine} @ after"

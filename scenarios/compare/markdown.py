@@ -6,7 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...reports.drawing import escape_markdown
+from .differences import TO_THE_BIT
 from .reasons import format_value
+
+_WHEN = ("before", "after")
 
 
 def diff_markdown(document: Mapping[str, Any]) -> str:
@@ -15,15 +18,47 @@ def diff_markdown(document: Mapping[str, Any]) -> str:
     word = "the same within round-off" if document["same"] else "not the same"
     title = escape_markdown(f"{document['title']}: {names[0]} against {names[1]}")
     lines = [f"# {title}", "", f"The engines in both runs are {word}.", ""]
-    for part, changes in document["differs"].items():
-        lines += [f"- {part}: {escape_markdown(_format_change(name, *pair))}" for name, pair in changes.items()]
-    lines += [f"- {escape_markdown(note)}" for note in document["notes"]]
-    for when in ("before", "after"):
-        only = document[f"only_{when}"]
-        lines += [f"- only in the run {when}: {escape_markdown(', '.join(only))}"] if only else []
+    lines += _list_surroundings(document)
     for name, engine in document["engines"].items():
         lines += ["", f"## {escape_markdown(name)}: {engine['verdict']}", "", *_engine_lines(engine)]
     return "\n".join(lines) + "\n"
+
+
+def diff_verdict(document: Mapping[str, Any]) -> str:
+    """Write the verdict on two runs, their names, and which rides are the same, in a few lines of Markdown."""
+    word = "the same within round-off" if document["same"] else "not the same"
+    names = (f"{when}: {escape_markdown(run['name'])}" for when, run in zip(_WHEN, document["runs"], strict=True))
+    once = [name for name, engine in document["engines"].items() if engine["verdict"] == TO_THE_BIT]
+    lines = [f"**The engines in both runs are {word}.**", "; ".join(names)]
+    lines += [f"The same to the bit, drawn once: {escape_markdown(', '.join(once))}"] if once else []
+    return "\n\n".join(lines) + "\n"
+
+
+def diff_summary(document: Mapping[str, Any]) -> str:
+    """Write the comparison of two runs as Markdown that a narrow view shows: one row an engine, then the reasons."""
+    lines = [f"# {escape_markdown(document['title'])}", ""]
+    lines += ["| engine | largest distance [m] | too far from [s] | rides |", "|---|---:|---:|---|"]
+    for name, engine in document["engines"].items():
+        position = engine["position_difference"] or {"max": None, "exceeds_at": None}
+        cells = [_format_cell(position[key]) for key in ("max", "exceeds_at")]
+        lines.append(f"| {escape_markdown(name)} | {' | '.join(cells)} | {engine['verdict']} |")
+    lines += ["", *_list_surroundings(document)]
+    for name, engine in document["engines"].items():
+        remarks = [f"- {escape_markdown(line)}" for line in [*diff_remarks(engine), *engine["reasons"]]]
+        lines += ["", f"## {escape_markdown(name)}", "", *remarks] if remarks else []
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _list_surroundings(document: Mapping[str, Any]) -> list[str]:
+    """List what differs besides the engines of both runs, as items of Markdown."""
+    lines = []
+    for part, changes in document["differs"].items():
+        lines += [f"- {part}: {escape_markdown(_format_change(name, *pair))}" for name, pair in changes.items()]
+    lines += [f"- {escape_markdown(note)}" for note in document["notes"]]
+    for when in _WHEN:
+        only = document[f"only_{when}"]
+        lines += [f"- only in the run {when}: {escape_markdown(', '.join(only))}"] if only else []
+    return lines
 
 
 def _engine_lines(engine: Mapping[str, Any]) -> list[str]:

@@ -129,8 +129,8 @@ def write_run_commands(before: Release, after: Release, engine: str, ride: Measu
         for release, name in ((before, "before"), (after, "after"))
     ]
     # The names of run folders have the time.
-    compare = f"velodrome diff {folder}/before/* {folder}/after/* --out {folder}/diff"
-    return [*runs, compare, f"velodrome view {folder}/diff"]
+    both = f"{folder}/before/* {folder}/after/*"
+    return [*runs, f"velodrome diff {both}", f"velodrome view {both}"]
 
 
 def _write_run_command(release: Release, engine: str, ride: MeasuredRide, out: str) -> str:

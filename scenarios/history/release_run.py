@@ -133,6 +133,9 @@ def run_in_release(
     watch: RunWatch,
     note: Callable[[str], None],
     trace: Callable[[str], None] | None = None,
+    *,
+    recording: bool = True,
+    record_rate: float | None = None,
 ) -> RunOutcome:
     """Run a scenario in the engines of a release, and write an ordinary run folder.
 
@@ -150,6 +153,8 @@ def run_in_release(
         As for `velodrome.scenarios.run.run_plan`.
     trace : callable, optional
         Called with the traceback of an engine that failed.
+    recording, record_rate
+        As for `velodrome.scenarios.run.run_plan`.
 
     Raises
     ------
@@ -176,6 +181,8 @@ def run_in_release(
         engines=[*opened.plan.engines.names],
         named=sorted(opened.plan.engines.named),
         out=str(out.absolute()),
+        recording=recording,
+        record_rate=record_rate,
     )
     process = LaidOverProcess(_PROGRAM, environment.folder, opened.children)
     try:

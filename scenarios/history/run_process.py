@@ -48,6 +48,10 @@ class RunSetup:
         Engines of the package, and those of them that the user named.
     out : str
         Folder in which the run folder is made.
+    recording : bool
+        Whether to write the recording.
+    record_rate : float or None
+        Its largest number of samples a second [Hz]; None thins long rides.
     """
 
     parent: int
@@ -59,6 +63,8 @@ class RunSetup:
     engines: list[str]
     named: list[str]
     out: str
+    recording: bool
+    record_rate: float | None
 
     def line(self) -> str:
         """Return the setup as one line of JSON."""
@@ -112,6 +118,8 @@ def _run(setup: RunSetup, tell: Callable[..., None]) -> RunOutcome:
         note=lambda line: tell(note=line),
         trace=lambda name, error: tell(trace=f"{name}:\n{''.join(format_exception(error))}"),
         accept=accept,
+        recording=setup.recording,
+        record_rate=setup.record_rate,
     )
 
 

@@ -1,7 +1,7 @@
 """Runs of a scenario in every engine: planning, simulation, measurement and the run folder."""
 
 from ..scenario import configure_engine, installed_engines
-from .folder import RunPlan, describe_run_environment, library_versions, write_run_recording
+from .folder import RECORDING, RunPlan, describe_run_environment, library_versions, write_run_recording
 from .runner import (
     RunOutcome,
     RunResult,
@@ -27,6 +27,7 @@ from .stored import (
 )
 
 __all__ = [
+    "RECORDING",
     "RunOutcome",
     "RunPlan",
     "RunResult",

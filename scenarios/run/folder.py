@@ -12,7 +12,7 @@ from typing import Any
 from ...engines.engine import Engine, Settings, Trajectory
 from ...engines.registry import packages
 from ...engines.releases import find_reach
-from ...reports.drawing import find_unsteadiness, make_summary
+from ...reports.drawing import find_unsteadiness
 from ..error import ScenarioError
 from ..files import write_sealed, write_text
 from ..scenario import Scenario, Start, resolve_scenario
@@ -22,6 +22,7 @@ LIBRARIES = ("velodrome", "numpy", "scipy", "numba", "exudyn", "mujoco", "rerun-
 
 
 SCENARIO_FILE = "scenario.toml"
+RECORDING = "comparison.rrd"
 SCENARIO_DIGEST_KEY = "scenario_sha256"
 # Format version of manifest.json and metrics.json; files of version 1 have neither a digest nor a version.
 RUN_VERSION = 2
@@ -81,6 +82,7 @@ def write_manifest(
     failures: Mapping[str, str],
     verdicts: Sequence[Mapping[str, Any]] = (),
     complete: bool = False,
+    recording: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Write the manifest of a run (engines, versions, settings, start) and return it.
 
@@ -97,6 +99,8 @@ def write_manifest(
     verdicts : sequence of mapping
     complete : bool
         Whether every engine has finished or failed.
+    recording : mapping, optional
+        What is to be known of the recording: under ``leaves_out``, what `write_run_recording` returns.
     """
     start = plan.start
     engines: dict[str, Any] = {}
@@ -122,6 +126,7 @@ def write_manifest(
         "left_out": plan.left_out,
         "warnings": list(plan.start.problem.bicycle.warnings()),
         "verdicts": list(verdicts),
+        "recording": recording,
         **describe_run_environment(),
         "inputs": asdict(start.problem.inputs),
         "start": {
@@ -158,21 +163,45 @@ def write_run_recording(
     measured: Mapping[str, Mapping[str, Any]],
     failures: Mapping[str, str],
     verdicts: Sequence[Mapping[str, Any]],
-) -> None:
-    """Write the recording of the trajectories to show; without trajectories, write nothing."""
-    if not shown:
-        return
-    # Imported here, since loading rerun takes a second and only runs need it.
-    from ...reports.recording import write_recording
+    *,
+    rate: float | None = None,
+) -> str | None:
+    """Write the recording of the trajectories to show; without trajectories, write nothing.
 
-    problem = plan.start.problem
+    Parameters
+    ----------
+    folder : Path
+    plan : RunPlan
+    shown, measured, failures, verdicts
+        See `velodrome.scenarios.run.runner.RunResult`.
+    rate : float, optional
+        Largest number of samples a second [Hz]; see `velodrome.reports.recording.write_recording`.
+
+    Returns
+    -------
+    str or None
+        What the recording leaves out; None if it holds every sample.
+    """
+    if not shown:
+        return None
+    # Imported here, since loading rerun takes a second and only runs need it.
+    from ...reports.recording import make_summary, make_verdict, write_recording
+
+    problem, duration = plan.start.problem, plan.scenario.simulation.duration
     unsteady = find_unsteadiness(problem.surface, problem.inputs, plan.start.motion is not None)
-    facts = (plan.start.growth_rate, plan.scenario.simulation.duration, unsteady)
-    text = make_summary(plan.scenario.title, measured, failures, verdicts, *facts)
-    where = (plan.scenario.title, problem.bicycle, problem.surface)
-    undisturbed = plan.start.undisturbed if unsteady is None else None
-    path = folder / "comparison.rrd"
-    write_recording(path, *where, shown, text, undisturbed=undisturbed, inputs=problem.inputs)
+    facts = (plan.start.growth_rate, duration, unsteady)
+    return write_recording(
+        folder / RECORDING,
+        plan.scenario.title,
+        problem.bicycle,
+        problem.surface,
+        shown,
+        make_verdict(measured, failures, verdicts, duration),
+        make_summary(plan.scenario.title, measured, failures, verdicts, *facts),
+        undisturbed=plan.start.undisturbed if unsteady is None else None,
+        inputs=problem.inputs,
+        rate=rate,
+    )
 
 
 def write_page(

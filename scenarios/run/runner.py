@@ -182,6 +182,9 @@ def run_plan(
     trace: Trace | None = None,
     accept: Callable[[str], None] | None = None,
     say: Callable[[str], None] = lambda _: None,
+    *,
+    recording: bool = True,
+    record_rate: float | None = None,
 ) -> RunOutcome:
     """Run every engine of a plan and write the run folder.
 
@@ -203,12 +206,17 @@ def run_plan(
         Called with the name of an engine that has finished; what it raises is that engine's failure.
     say : callable
         Called after the rides with what is being done.
+    recording : bool
+        Whether to write the recording.
+    record_rate : float, optional
+        Largest number of samples a second in the recording [Hz]; by default long rides are thinned. A line says what
+        is left out.
 
     Returns
     -------
     RunOutcome
     """
-    folder, result = store_run(plan, out, watch, note, trace, accept, say)
+    folder, result = store_run(plan, out, watch, note, trace, accept, say, recording=recording, record_rate=record_rate)
     return RunOutcome(
         folder,
         result.metrics,
@@ -228,6 +236,9 @@ def store_run(
     trace: Trace | None = None,
     accept: Callable[[str], None] | None = None,
     say: Callable[[str], None] = lambda _: None,
+    *,
+    recording: bool = True,
+    record_rate: float | None = None,
 ) -> tuple[Path, RunResult]:
     """Run every engine of a plan and write the run folder; return the folder and all results.
 
@@ -249,10 +260,22 @@ def store_run(
         result = measure_run(plan, rides)
         say("writing the recording and the report")
         write_sealed(folder / "metrics.json", result.metrics, RUN_VERSION)
-        write_run_recording(folder, plan, result.shown, result.metrics, result.failures, result.verdicts)
-        complete = not result.interrupted
-        done, failures = result.trajectories, result.failures
-        manifest = write_manifest(folder, plan, digest, done, failures, result.verdicts, complete=complete)
+        recorded = None
+        if recording and result.shown:
+            parts = (result.shown, result.metrics, result.failures, result.verdicts)
+            recorded = {"leaves_out": write_run_recording(folder, plan, *parts, rate=record_rate)}
+            if recorded["leaves_out"] is not None:
+                note(recorded["leaves_out"])
+        manifest = write_manifest(
+            folder,
+            plan,
+            digest,
+            result.trajectories,
+            result.failures,
+            result.verdicts,
+            complete=not result.interrupted,
+            recording=recorded,
+        )
         write_page(folder, plan, result.shown, result.metrics, manifest)
     return folder, result
 

@@ -12,8 +12,7 @@ from typing import Any
 from ...engines.engine import Problem, Trajectory
 from ...reports.drawing import format_verdict
 from ..error import ScenarioError
-from ..run import find_part
-from ..view import RECORDING, open_native
+from ..view import find_recording, open_native
 from .table import MetricsTable
 
 
@@ -85,7 +84,7 @@ class Run:
             return self._open_recording(Path(name), make_widget)
 
     def _open_recording(self, folder: Path, make_widget: Callable[[Path], Any]) -> Any:
-        widget = make_widget(find_part(folder, RECORDING))
+        widget = make_widget(find_recording(folder))
         return open_native(folder) if widget is None else widget
 
     def _list_notes(self) -> list[str]:

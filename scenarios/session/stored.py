@@ -9,9 +9,9 @@ from typing import Any
 
 from ...engines.engine import Problem
 from ..error import ScenarioError
-from ..run import find_part, read_document, read_ride, read_start_state, read_stored_scenario
+from ..run import read_document, read_ride, read_start_state, read_stored_scenario
 from ..scenario import Scenario, output_times, show_value
-from ..view import RECORDING
+from ..view import find_recording
 from .arguments import read_path
 from .result import Run
 from .table import MetricsTable
@@ -57,7 +57,7 @@ def load(folder: str | Path) -> Run:
 
 def _read_run(folder: Path, manifest: Mapping[str, Any], metrics: Mapping[str, Any], scenario: Scenario) -> Run:
     def record(where: Path) -> None:
-        shutil.copy(find_part(folder, RECORDING), where)
+        shutil.copy(find_recording(folder), where)
 
     q, qd = read_start_state(manifest)
     bicycle, surface = scenario.make_bicycle(), scenario.surface.make()

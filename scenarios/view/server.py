@@ -9,7 +9,7 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 LOOPBACK = "127.0.0.1"
 _TYPES = {".html": "text/html; charset=utf-8", ".json": "application/json", ".toml": "text/plain; charset=utf-8"}
@@ -50,7 +50,7 @@ class RunPageServer(ThreadingHTTPServer):
     port : int
         0 for any free one.
     files : mapping of str to Path
-        The run's files by name.
+        The run's files by name: with ``report.html``, or the recording alone.
     viewer : mapping of str to Content
         Files below ``viewer/`` by name.
 
@@ -68,8 +68,12 @@ class RunPageServer(ThreadingHTTPServer):
 
     @property
     def address(self) -> str:
-        """Address of the page."""
-        return f"http://{LOOPBACK}:{self.server_port}/report.html?replay"
+        """Address of the page; without one, of the viewer with the recording in it."""
+        root = f"http://{LOOPBACK}:{self.server_port}"
+        if "report.html" in self.files:
+            return f"{root}/report.html?replay"
+        recording = quote(f"{root}/{next(iter(self.files))}", safe="")
+        return f"{root}/viewer/?url={recording}&hide_welcome_screen=1&persist=0&theme=dark"
 
     def knows(self, host: str | None) -> bool:
         """Return whether a request is meant for this server; a name that another site resolves to it is refused."""

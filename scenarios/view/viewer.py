@@ -19,6 +19,17 @@ _FILES = ("", "re_viewer.js", "re_viewer_bg.wasm", "favicon.ico")
 _PATIENCE = 20.0  # [s] for a program of 300 MB to be read from a cold disk and to listen
 # Links to fonts elsewhere: the viewer has its own fonts, and the page must not use the network.
 _ELSEWHERE = re.compile(rb"<link\b[^>]*\bhttps://[^>]*>")
+# The viewer asks whether there is a newer version and reports that it is used. The page must not use the network, and
+# its policy forbids it; answered with nothing, the viewer does not complain either.
+_STAY_HERE = b"""<script>
+      const fetchHere = window.fetch;
+      window.fetch = (from, ...options) => {
+        const { protocol, origin } = new URL(from.url ?? from, location);
+        const elsewhere = protocol.startsWith("http") && origin !== location.origin;
+        return elsewhere ? Promise.resolve(new Response(null, { status: 204 })) : fetchHere(from, ...options);
+      };
+    </script>
+    <script"""
 
 
 class ReplayError(RuntimeError):
@@ -94,4 +105,9 @@ def _fetch(port: int, name: str) -> Content:
     if answer.status != 200:
         raise ReplayError(f"the viewer has no file {name!r}: this version of rerun keeps them elsewhere")
     kind = answer.getheader("Content-Type", "application/octet-stream")
-    return Content(kind, _ELSEWHERE.sub(b"", body) if name == "" else body)
+    return Content(kind, _keep_here(body) if name == "" else body)
+
+
+def _keep_here(page: bytes) -> bytes:
+    """Return the viewer's page without links to elsewhere, and with no questions to elsewhere."""
+    return _ELSEWHERE.sub(b"", page).replace(b"<script", _STAY_HERE, 1)

@@ -3,57 +3,77 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from shlex import quote
 
 from ...reports.measure import cut_at_fall, evaluate_ride
 from ..error import ScenarioError
 from ..files import write_text
-from ..run import check_stored_scenario, find_part, read_document, read_ride, read_stored_scenario
+from ..run import RECORDING, check_stored_scenario, find_part, read_document, read_ride, read_stored_scenario
 from ..scenario import show_value
-from .server import LOOPBACK, RunPageServer
+from .recording import record_stored_run
+from .server import LOOPBACK, Content, RunPageServer
 from .viewer import ReplayError, rerun, viewer_files
 
-RECORDING, REPORT = "comparison.rrd", "report.html"
-DIFF_RECORDING = "diff.rrd"  # of two runs, as `velodrome diff --out` writes it
+REPORT = "report.html"
 
 
 def open_native(folder: Path) -> None:
-    """Open the recording of a run, or of the difference of two, in the native viewer; return when it is closed.
+    """Open the recording of a run in the native viewer; return when its window is closed.
 
     Raises
     ------
     ScenarioError
         If the folder has no recording, its scenario was changed, or the viewer cannot run here.
     """
-    of_two = (folder / DIFF_RECORDING).is_file() and not (folder / RECORDING).exists()
-    recording = folder / DIFF_RECORDING if of_two else find_recording(folder)
+    without = f"open {folder / REPORT} in a browser, or run: velodrome view --web {quote(str(folder))}"
+    open_recording(find_recording(folder), without)
+
+
+def open_recording(recording: Path, without: str) -> None:
+    """Open a recording in the native viewer; return when its window is closed.
+
+    Parameters
+    ----------
+    recording : Path
+    without : str
+        What to do without a display.
+
+    Raises
+    ------
+    ScenarioError
+        If the viewer cannot run here.
+    """
     command = native_command(recording)
     try:
         status = subprocess.call(command)
     except OSError as error:
         raise ScenarioError(f"the viewer {command[0]} cannot be started: {error.strerror}") from error
     if status != 0:
-        without = f"open {folder / REPORT} in a browser, or run: velodrome view --web {folder}"
-        if of_two:
-            without = f"open {recording} in rerun's viewer on another machine"
         raise ScenarioError(f"the viewer ended with status {status}; it needs a display. Without one, {without}")
 
 
 def find_recording(folder: Path) -> Path:
     """Return the path of a run's recording, after a check that the run's scenario was not changed since.
 
-    A folder that holds nothing but a recording, as a run that was not stored makes it, has no manifest to check with.
+    If the run was made without a recording, it is made now, from the stored rides. A folder that holds nothing but a
+    recording, as a run that was not stored makes it, has no manifest to check with.
 
     Raises
     ------
     ScenarioError
-        If there is no recording, or the scenario was changed.
+        If there is neither a recording nor a finished run with a ride, or the scenario was changed.
     """
-    path = find_part(folder, RECORDING)
-    if (folder / "manifest.json").exists():
-        check_stored_scenario(folder, read_document(folder, "manifest.json"))
-    return path
+    if not (folder / "manifest.json").exists():
+        return find_part(folder, RECORDING)
+    check_stored_scenario(folder, read_document(folder, "manifest.json"))
+    if not (folder / RECORDING).exists():
+        try:
+            record_stored_run(folder, folder)
+        except OSError as error:
+            raise ScenarioError(f"{folder / RECORDING}: cannot be written: {error.strerror}") from error
+    return find_part(folder, RECORDING)
 
 
 def native_command(recording: Path) -> list[str]:
@@ -79,11 +99,35 @@ def serve(folder: Path, port: int, ready: Callable[[str], None]) -> None:
         If the folder is not a run folder, the port is taken, or the viewer's files cannot be obtained.
     """
     with page_server(folder, port) as server:
-        ready(server.address)
-        try:
-            server.serve_forever()
-        except KeyboardInterrupt:
-            return
+        _answer_until_interrupted(server, ready)
+
+
+def serve_recording(recording: Path, port: int, ready: Callable[[str], None]) -> None:
+    """Serve the viewer with a recording in it, to this machine only, until interrupted; see `serve`."""
+    with _make_server(port, {RECORDING: recording}, _fetch_viewer()) as server:
+        _answer_until_interrupted(server, ready)
+
+
+def _answer_until_interrupted(server: RunPageServer, ready: Callable[[str], None]) -> None:
+    ready(server.address)
+    try:
+        server.serve_forever()
+    except KeyboardInterrupt:
+        return
+
+
+def _fetch_viewer() -> dict[str, Content]:
+    try:
+        return viewer_files()
+    except ReplayError as error:
+        raise ScenarioError(str(error)) from error
+
+
+def _make_server(port: int, files: Mapping[str, Path], viewer: Mapping[str, Content]) -> RunPageServer:
+    try:
+        return RunPageServer(port, files, viewer)
+    except OSError as error:
+        raise ScenarioError(f"--port {port}: cannot listen on it: {error.strerror}; 0 takes a free one") from error
 
 
 def page_server(folder: Path, port: int) -> RunPageServer:
@@ -95,10 +139,7 @@ def page_server(folder: Path, port: int) -> RunPageServer:
             write_text(folder / REPORT, text)
         except OSError as error:
             raise ScenarioError(f"{folder / REPORT}: cannot be written: {error.strerror}") from error
-    try:
-        viewer = viewer_files()
-    except ReplayError as error:
-        raise ScenarioError(str(error)) from error
+    viewer = _fetch_viewer()
     # Only files that are in the folder now can be served: an address is looked up, never joined to a path, and links,
     # which may lead anywhere, are left out.
     files = {
@@ -106,10 +147,7 @@ def page_server(folder: Path, port: int) -> RunPageServer:
         for path in folder.iterdir()
         if path.is_file() and not path.is_symlink() and not path.name.startswith(".")
     }
-    try:
-        return RunPageServer(port, files, viewer)
-    except OSError as error:
-        raise ScenarioError(f"--port {port}: cannot listen on it: {error.strerror}; 0 takes a free one") from error
+    return _make_server(port, files, viewer)
 
 
 def stored_page(folder: Path, docs: str | None = None) -> str:

@@ -21,8 +21,8 @@ from packaging.version import Version
 
 from tests.sealing import sealed
 from velodrome.engines import registry
-from velodrome.reports.drawing.summary import make_summary
 from velodrome.reports.figures.precision import precision_figure
+from velodrome.reports.recording.summary import make_summary, make_verdict
 from velodrome.scenarios.gate.ci_files import junit_xml, markdown_page
 from velodrome.scenarios.gate.verdict import Verdict
 from velodrome.scenarios.run.folder import new_folder, resolve_plan
@@ -238,6 +238,7 @@ def test_no_text_of_a_run_is_markup_in_markdown() -> None:
     pages = [
         markdown_page([(name, verdict)]),
         make_summary(name, measured, {name: name}, [], -1.0, 1.0),
+        make_verdict(measured, {name: name}, [{"engine": name, "quantity": name, "limit": 1.0, "holds": False}], 1.0),
     ]
     for page in pages:
         left = markup(page)

@@ -11,9 +11,9 @@ from velodrome.reports.drawing.summary import (
     COLUMNS,
     format_table,
     format_verdict,
-    make_summary,
     rank_engines,
 )
+from velodrome.reports.recording.summary import make_summary, make_verdict
 
 MEASURED: dict[str, Any] = {
     "position_error": {"max": 9.397e-6, "end": 8.83e-6},
@@ -46,18 +46,48 @@ def text(growth_rate: float = -0.4, **changes: Any) -> str:
     return make_summary("A ride", measured, {"mujoco-native": "no such thing"}, [], growth_rate, 20.0)
 
 
-def test_the_table_has_every_quantity_of_every_engine() -> None:
+def test_the_tables_have_every_quantity_of_every_engine() -> None:
     lines = text().splitlines()
     table = [[part.strip() for part in line.strip("|").split("|")] for line in lines if line.startswith("|")]
-    header, rule, *rows = table
-    assert header == ["", "reference", "exudyn"]
-    assert {len(row) for row in table} == {3}
-    assert rule[1:] == ["---:", "---:"]
-    found = {row[0]: row[1:] for row in rows}
-    assert len(found) == len(COLUMNS)
-    assert found["position error [m]"] == ["–", "9.4e-06"]
-    assert found["energy drift [1]"] == ["8.0e-14", "6.2e-08"]
-    assert found["radius drift [m/s]"] == ["–", "-1.2e-05"]
+    found: dict[str, dict[str, str]] = {"reference": {}, "exudyn": {}}
+    for header, rule, *rows in (table[:4], table[4:]):
+        assert (header[0], rule) == ("engine", ["---", *["---:"] * 4])
+        for row in rows:
+            found[row[0]] |= dict(zip(header[1:], row[1:], strict=True))
+    assert all(len(cells) == len(COLUMNS) for cells in found.values())
+    assert (found["reference"]["position [m]"], found["exudyn"]["position [m]"]) == ("–", "9.4e-06")
+    assert (found["reference"]["energy [1]"], found["exudyn"]["energy [1]"]) == ("8.0e-14", "6.2e-08")
+    assert found["exudyn"]["radius [m/s]"] == "-1.2e-05"
+
+
+def test_the_tables_fit_the_view_of_a_recording() -> None:
+    """Whatever the number of engines: 62 letters of the viewer's font are 440 points, two fifths of a laptop's."""
+    many = dict.fromkeys(("reference", *(f"mujoco-exact-contact{k}" for k in range(12))), MEASURED)
+    for line in make_summary("A ride", many, {}, [], -0.4, 20.0).splitlines():
+        if line.startswith("| "):
+            assert len("".join(cell.strip() for cell in line.split("|"))) <= 62
+
+
+def test_the_verdict_says_who_rides_on_and_how_near_in_three_lines() -> None:
+    near, far = (MEASURED | {"position_error": {"max": error, "end": error}} for error in (2e-9, 0.61))
+    measured = {
+        "reference": ALONE,
+        "near": near,
+        "far": far,
+        "fallen": MEASURED | {"fell_at": 0.4816, "position_error": {"max": 5.0, "end": 5.0}},
+        "stuck": MEASURED | {"ended": "Newton failed"},
+    }
+    limits = {"quantity": "energy_variation", "value": 0.5, "limit": 1e-3}
+    verdicts = [limits | {"engine": name, "holds": name != "far"} for name in ("near", "far")]
+    assert make_verdict(measured, {"missing": "no such thing"}, verdicts, 20.0).split("\n\n") == [
+        "**1 of 2 engines meet the criterion: energy variation below 0.001.** Not: far.",
+        "**3 of 6 engines ride to the end, 20 s.** fallen fell at 0.48 s; stuck ended early; missing did not run.",
+        "Nearest to the reference: near 2.0e-09 m, farthest far 0.61 m (largest distance).\n",
+    ]
+    assert make_verdict({"reference": ALONE, "near": near}, {}, [], 5.0).startswith(
+        "**All 2 engines ride to the end, 5 s.**\n"
+    )
+    assert make_verdict({}, {"missing": "no such thing"}, [], 5.0).startswith("**0 of 1 engine rides to the end")
 
 
 def test_a_column_has_one_notation() -> None:
@@ -159,7 +189,7 @@ def test_the_friction_that_rolling_needs_is_said_once() -> None:
     assert "coefficient of friction" not in text()
     measured = {"reference": ALONE | {"required_friction": 0.95923}, "exudyn": MEASURED}
     lines = make_summary("A ride", measured, {}, [], -0.4, 20.0).splitlines()
-    assert lines.count("Rolling without slip needs a coefficient of friction of up to 0.959.") == 1
+    assert lines.count("- Rolling without slip needs a coefficient of friction of up to 0.959.") == 1
 
 
 def test_a_failure_and_the_stability_are_said() -> None:
@@ -182,4 +212,5 @@ def test_a_failure_and_the_stability_are_said() -> None:
 def test_a_verdict_is_one_line(value: float | None, holds: bool, line: str) -> None:
     verdict = {"engine": "exudyn", "quantity": "energy_variation", "value": value, "limit": 1e-3, "holds": holds}
     assert format_verdict(verdict) == line
-    assert make_summary("A ride", {}, {}, [verdict], -1.0, 1.0).endswith(f"- {line}\n")
+    # The verdict comes first.
+    assert make_summary("A ride", {}, {}, [verdict], -1.0, 1.0).startswith(f"# A ride\n\n- {line}\n")

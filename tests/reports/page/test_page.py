@@ -23,18 +23,11 @@ from velodrome.reference.height_field import HeightField
 from velodrome.reference.surface import Paraboloid
 from velodrome.reports.drawing.palette import PALETTE, assign_colours
 from velodrome.reports.drawing.plots import PLOTS, RideData
+from velodrome.reports.drawing.samples import choose_samples
 from velodrome.reports.drawing.summary import COLUMNS, format_table, format_verdict
 from velodrome.reports.measure.metrics import compute_metrics
 from velodrome.reports.page import make_page
-from velodrome.reports.page.curves import (
-    GROUPS,
-    NOT_FINITE,
-    NOT_GIVEN,
-    THE_MEASURE,
-    TOO_SMALL,
-    choose_samples,
-    make_curve,
-)
+from velodrome.reports.page.curves import GROUPS, NOT_FINITE, NOT_GIVEN, THE_MEASURE, TOO_SMALL, make_curve
 from velodrome.reports.page.document import list_engine_styles
 from velodrome.reports.page.findings import (
     NEVER,

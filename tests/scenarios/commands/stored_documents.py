@@ -11,7 +11,8 @@ from typing import Any, cast
 from rich.console import Console
 
 from velodrome.scenarios.commands.present_run import show_outcome
-from velodrome.scenarios.run import RunOutcome, RunPlan
+from velodrome.scenarios.run import RunOutcome
+from velodrome.scenarios.scenario import Scenario
 
 HERE = Path(__file__).parent
 
@@ -23,9 +24,13 @@ def stored(name: str) -> Any:
 def show_stored_run(console: Console, run: Mapping[str, Any]) -> None:
     """Print what `velodrome run` prints of metrics, verdicts and failures."""
     scenario = SimpleNamespace(title=run["title"], simulation=SimpleNamespace(duration=run["duration"]))
-    plan = SimpleNamespace(name=run["name"], scenario=scenario, left_out=run["left_out"])
-    folder = Path("runs/q2-plus-20260102T030405")
     outcome = SimpleNamespace(
-        metrics=run["metrics"], verdicts=run["verdicts"], failures=run["failures"], folder=folder, interrupted=False
+        metrics=run["metrics"],
+        verdicts=run["verdicts"],
+        failures=run["failures"],
+        left_out=run["left_out"],
+        folder=Path("runs/q2-plus-20260102T030405"),
+        interrupted=False,
+        release=None,
     )
-    show_outcome(console, cast(RunPlan, plan), cast(RunOutcome, outcome))
+    show_outcome(console, run["name"], cast(Scenario, scenario), cast(RunOutcome, outcome))

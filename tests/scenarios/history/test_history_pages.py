@@ -21,7 +21,6 @@ from velodrome.scenarios.history.releases import Release
 from velodrome.scenarios.history.ride import digest_ride
 from velodrome.scenarios.history.wheels import WheelFile
 from velodrome.scenarios.scenario import load_scenario, make_start
-from velodrome.scenarios.view.viewing import DIFF_RECORDING
 
 
 @pytest.mark.slow
@@ -84,10 +83,10 @@ def check_the_commands(velodrome, pair: dict[str, Any], folder: Path) -> None:
         assert digest_ride(read_trajectory(ride / f"{PACKAGE}.parquet")) == pair[side]["bits"]
     globs = [str(ride) for word in compare[2:4] for ride in sorted(folder.glob(word))]
     assert globs == [str(ride) for ride in rides]
-    apart = velodrome("diff", *globs, *compare[4:], "--json")
+    apart = velodrome("diff", *globs, "--out", "compared", "--json")
     assert apart.json()["engines"][PACKAGE]["version"] == [pair["before"]["release"], pair["after"]["release"]]
-    assert show[:2] == ["velodrome", "view"]
-    assert (folder / show[2] / DIFF_RECORDING).is_file()
+    assert show == ["velodrome", "view", *compare[2:]]
+    assert (folder / "compared" / "diff.rrd").is_file()
 
 
 def test_distances_are_those_of_samples_that_both_have() -> None:
@@ -131,5 +130,5 @@ def test_the_commands_of_the_runs_have_all_that_the_history_rode_otherwise(
     assert make_start(scenario).problem.times.tolist() == ride.start.problem.times.tolist()
     assert scenario.engines["mujoco-native"] == ride.settings_of("mujoco-native") != {}
     assert "--release mujoco --wheel 'my builds/mujoco.whl' --duration" in after
-    assert compare == "velodrome diff two-rides/before/* two-rides/after/* --out two-rides/diff"
-    assert show == "velodrome view two-rides/diff"
+    assert compare == "velodrome diff two-rides/before/* two-rides/after/*"
+    assert show == "velodrome view two-rides/before/* two-rides/after/*"
