@@ -11,6 +11,8 @@ from .options import (
     STARTING,
     AlphaOption,
     BicycleOption,
+    ColumnsOption,
+    FormatOption,
     GroundOption,
     JsonOption,
     RearTorqueOption,
@@ -21,6 +23,7 @@ from .options import (
     load_bicycle,
     make_inputs,
     parse_angles,
+    parse_figure_output,
     parse_ground,
     print_json,
 )
@@ -70,7 +73,9 @@ def families_command(
     steer_torque: SteerTorqueOption = 0.0,
     rear_wheel_torque: RearTorqueOption = 0.0,
     steer_damping: SteerDampingOption = 0.0,
-    out: Annotated[Path | None, typer.Option(help="Folder for families.json and the figure families.png.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for families.json and the figure families.")] = None,
+    formats: FormatOption = None,
+    columns: ColumnsOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """The four solution families by continuation: special points, stable sections."""
@@ -80,12 +85,13 @@ def families_command(
     from .progress import show_working
     from .terminal import make_console
 
+    figures = parse_figure_output(formats, columns, None if out is not None else "--out")
     ground, source = parse_ground(alpha, surface), load_bicycle(bicycle)
     inputs = make_inputs(steer_torque, rear_wheel_torque, steer_damping)
     with answering_missing_motion(as_json), show_working(STARTING):
         document = follow_families(source.bicycle, make_bowl(ground), inputs).as_json(source.name)
     if out is not None:
-        write_families(document, out)
+        write_families(document, out, figures)
     with ending_with(0):
         if as_json:
             print_json(document)
@@ -121,6 +127,8 @@ def atlas_command(
     size: Annotated[int, typer.Option(help="Number of motions, roughly.")] = 400_000,
     largest: Annotated[float, typer.Option(help="Largest alpha [1/m], at most 1.")] = 1.0,
     bicycle: BicycleOption = None,
+    formats: FormatOption = None,
+    columns: ColumnsOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Stability of all circular motions over alpha and rear rate: data, boundaries, figures (half a minute)."""
@@ -129,10 +137,10 @@ def atlas_command(
     from .progress import ProgressBars
     from .terminal import make_console
 
-    source = load_bicycle(bicycle)
+    figures, source = parse_figure_output(formats, columns), load_bicycle(bicycle)
     with answering_missing_motion(as_json), ProgressBars() as progress:
         document = make_atlas(
-            source, out, size, largest, lambda done: progress.watch("atlas", done * size, size, "motions")
+            source, out, size, largest, lambda done: progress.watch("atlas", done * size, size, "motions"), figures
         )
     with ending_with(0):
         if as_json:

@@ -11,22 +11,34 @@ from .completion import complete_engine, complete_scenario
 from .options import (
     BicycleOption,
     ChangesOption,
+    ColumnsOption,
     DurationOption,
+    FormatOption,
     JsonOption,
     TracebackOption,
     answering_missing_motion,
     ending_with,
     load_bicycle,
     parse_changes,
+    parse_figure_output,
     print_json,
     print_traceback,
     show_written,
     showing_traceback,
 )
 
+PaperFormatOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--format", help="Format of figures: png, svg or pdf; may be given several times; svg and png if not given."
+    ),
+]
+
 
 def paper_command(
     out: Annotated[Path | None, typer.Option(help="Folder for the figures, tables and ledger.")] = None,
+    formats: PaperFormatOption = None,
+    columns: ColumnsOption = None,
     whole: Annotated[bool, typer.Option("--all", help="Print every claim, not only those that matter.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -39,13 +51,16 @@ def paper_command(
     from .progress import ProgressBars
     from .terminal import make_console
 
+    figures = parse_figure_output(formats, columns, None if out is not None else "--out", ("svg", "png"))
     if out is not None:
         make_folder(out)  # first, so that half a minute of work is not lost if it fails
     with ProgressBars() as progress:
         lines = make_ledger(lambda part, done, parts: progress.watch(part, done, parts, "parts of the paper"))
         written = []
         if out is not None:
-            written = write_paper(out, lines, lambda name, done, total: progress.watch(name, done, total, "figures"))
+            written = write_paper(
+                out, lines, lambda name, done, total: progress.watch(name, done, total, "figures"), figures
+            )
     found = ledger_document(lines, known_discrepancies())
     with ending_with(1 if found["surprises"] else 0):
         if as_json:
@@ -78,6 +93,8 @@ def precision_command(
     ] = 5,
     eigenvalues: Annotated[bool, typer.Option(help="Measure each engine's own eigenvalues too.")] = True,
     out: Annotated[Path | None, typer.Option(help="Folder for the document and its figure.")] = None,
+    formats: FormatOption = None,
+    columns: ColumnsOption = None,
     traceback: TracebackOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -89,6 +106,7 @@ def precision_command(
     from .progress import ProgressBars
     from .terminal import make_console
 
+    figures = parse_figure_output(formats, columns, None if out is not None else "--out")
     changes = parse_changes(change, duration)
     other = None if bicycle is None else load_bicycle(bicycle).bicycle
     name, loaded = load_scenario(scenario, changes, "--set", other)
@@ -97,7 +115,7 @@ def precision_command(
     with answering_missing_motion(as_json), showing_traceback(traceback), ProgressBars() as progress:
         trace = print_traceback if traceback else None
         document = study_precision(name, loaded, engine, levels, eigenvalues, progress.watch, trace)
-    written = [] if out is None else write_precision(document, out)
+    written = [] if out is None else write_precision(document, out, figures)
     with ending_with(0 if all_ran(document) else 1):
         if as_json:
             print_json(document)

@@ -1,6 +1,7 @@
 """Sweeps: a sweep file, its tasks, worker processes or a Dask cluster, and one data set of results."""
 
 from .cluster import on_cluster
+from .figure import SweepPlot, check_plots, parse_plots, read_sweep_folder, write_sweep_figures
 from .file import SweepFile
 from .live import ROW_STYLES, SweepView
 from .plan import plan_sweep
@@ -14,13 +15,18 @@ __all__ = [
     "ROW_STYLES",
     "STATUSES",
     "SweepFile",
+    "SweepPlot",
     "SweepView",
     "Work",
+    "check_plots",
     "locally",
     "on_cluster",
+    "parse_plots",
     "plan_sweep",
+    "read_sweep_folder",
     "resume_command",
     "run_sweep",
     "status_of",
     "summarise_sweep",
+    "write_sweep_figures",
 ]
