@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import cycle
+from textwrap import fill
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from ..drawing import assign_colours
-from .style import GREY, MARKERS, WIDTHS, darken, new_figure
+from .style import GREY, MARKERS, WIDTHS, darken, label_log_axes, new_figure
 
 
 def float32_figure(document: Mapping[str, Any], columns: int = 2) -> Figure:
@@ -56,5 +57,7 @@ def float32_figure(document: Mapping[str, Any], columns: int = 2) -> Figure:
     ax.grid(True)
     handles, labels = ax.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right upper" if columns == 2 else "outside lower center")
-    ax.set_title(f"{document['scenario']}: marks measured, lines by the last digits", loc="left", parse_math=False)
+    label_log_axes(ax)
+    title = f"{document['scenario']}: marks measured, lines by the last digits"
+    ax.set_title(fill(title, 100 if columns == 2 else 44), loc="left", parse_math=False)
     return figure

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from ...engines.engine import REFERENCE
 from ..drawing import assign_colours
 from ..measure import compared_time
-from .style import GREY, INK, MARKERS, WIDTHS, darken, new_figure
+from .style import GREY, INK, MARKERS, WIDTHS, darken, label_log_axes, new_figure
 
 
 def precision_figure(document: Mapping[str, Any], columns: int = 2) -> Figure:
@@ -47,6 +47,8 @@ def precision_figure(document: Mapping[str, Any], columns: int = 2) -> Figure:
         ax.grid(True)
         if columns == 1 or ax is by_step:
             ax.set_ylabel("largest position error [m]")
+    for ax in (by_step, by_cost):
+        label_log_axes(ax)
     handles, _ = by_step.get_legend_handles_labels()
     if any(line.get_gid() == "limit" for line in by_step.lines):
         mark: dict[str, Any] = {"ls": "", "marker": "o", "ms": 4, "mfc": "none", "color": GREY}

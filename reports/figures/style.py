@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from ...engines.files import write_whole
 
@@ -44,6 +47,7 @@ _STYLE: Any = {
     "ytick.labelcolor": INK,
     "xtick.direction": "in",
     "ytick.direction": "in",
+    "xtick.major.pad": 4.5,
     "xtick.labelsize": 7.5,
     "ytick.labelsize": 7.5,
     "grid.color": PALE,
@@ -66,6 +70,21 @@ def darken(colour: tuple[int, int, int]) -> tuple[float, float, float]:
     """Return an engine's colour, as `velodrome.reports.drawing.assign_colours` gives it, for white paper, 0 to 1."""
     red, green, blue = (_DARKER * part / 255 for part in colour)
     return red, green, blue
+
+
+def label_log_axes(axes: Axes) -> None:
+    """Label powers of ten on logarithmic axes, and 2 and 5 times them where fewer than two are in view.
+
+    matplotlib would label further multiples, which overlap in narrow panels. All data must be drawn.
+    """
+    for axis, limits in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+        if axis.get_scale() != "log":
+            continue
+        axis.set_minor_formatter(NullFormatter())
+        low, high = (math.log10(limit) for limit in limits)
+        if math.floor(high) - math.ceil(low) < 1:
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.set_major_formatter(LogFormatterSciNotation(minor_thresholds=(math.inf, math.inf)))
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 
 from ...engines.engine import REFERENCE
 from ..drawing import assign_colours
-from .style import GREY, INK, MARKERS, WIDTHS, darken, new_figure
+from .style import GREY, INK, MARKERS, WIDTHS, darken, label_log_axes, new_figure
 
 _DECADES = 2.0  # span of positive values from which their axis is logarithmic
 _MARGIN = 0.06  # of the axes beyond the values, as a share of their span
@@ -111,6 +111,7 @@ def sweep_figure(
             handles.append(Line2D([], [], color=GREY, lw=0.9, label=fill(joined, 60 if columns == 2 else 44)))
     handles += _explain_marks(axes, shown)
     axes.grid(True)
+    label_log_axes(axes)
     figure.legend(handles=handles, loc="outside lower center", ncols=2 if columns == 2 else 1)
     axes.set_title(fill(title, 100 if columns == 2 else 48), loc="left", parse_math=False)
     return figure

@@ -51,7 +51,7 @@ def configurations_figure(
 ) -> Figure:
     """Draw each bicycle on its circle in its part of the bowl; call within `use_style`."""
     rows = (len(shown) + 1) // 2
-    figure = new_figure((2.95 if columns == 2 else 2.05) * rows, WIDTHS[columns])
+    figure = new_figure((2.95 if columns == 2 else 2.22) * rows, WIDTHS[columns])
     figure.set_layout_engine("compressed")  # pictures keep their shape: excess space goes outside, not between them
     panels = figure.subplots(rows, 2, squeeze=False).ravel()
     for axes in panels[len(shown) :]:
@@ -82,8 +82,8 @@ def _draw_panel(axes: Axes, bicycle: Bicycle, surface: Surface, item: Configurat
     axes.text(half[0] - 0.25, 0.07 - half[1], "0.5 m", ha="center", va="bottom", fontsize=7)
     axes.set_axis_off()
     turns = "anticlockwise" if motion.yaw_rate > 0 else "clockwise"
-    space, size = ("  ", 7.5) if columns == 2 else ("\n", 6.5)  # a narrow panel has room for a third of the line
-    title = f"({tag})  {item.name}, family {item.family},{space.strip(' ') or ' '}{turns}"
+    space, size = (" ", 7.0) if columns == 2 else ("\n", 6.5)  # a narrow panel has room for a third of the line
+    title = f"({tag})  {item.name}, family {item.family},{space}{turns}"
     axes.set_title(title, pad=2, fontsize=size + 1)
     words = space.join(
         (
