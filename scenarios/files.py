@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,23 @@ from ..engines.format_version import VERSION_KEY
 from .error import ScenarioError
 
 DIGEST_KEY = "sha256"
+FIGURE_FORMATS = ("png", "svg", "pdf")
+
+
+@dataclass(frozen=True)
+class FigureOutput:
+    """How figures are written.
+
+    Attributes
+    ----------
+    formats : tuple of str
+        Some of `FIGURE_FORMATS`, each once.
+    columns : int
+        Number of a journal's columns that a figure fills: 1 (89 mm) or 2 (183 mm).
+    """
+
+    formats: tuple[str, ...] = ("png",)
+    columns: int = 2
 
 
 def make_folder(out: Path) -> None:

@@ -1,4 +1,7 @@
-"""Directives that run what a page shows: ``typed``, commands with what they print, and ``drawn``, code with its figure.
+"""Directives that run what a page shows.
+
+``typed``: commands with what they print; ``figured``: commands with the figures that they write; ``drawn``: code with
+its figure.
 
 What was run once is kept under ``docs/made`` and used again as long as nothing changes that it could depend on: its
 text, the package, and the versions of its libraries.
@@ -14,7 +17,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -32,7 +35,7 @@ import velodrome
 DOCS = Path(__file__).parents[1]
 MADE = DOCS / "made"
 COLUMNS = 100  # letters in a line: the whole table of a run
-_PIXELS_DRAWN, _PIXELS_SHOWN = 160, 96  # an inch
+_PIXELS_DRAWN, _PIXELS_PRINTED, _PIXELS_SHOWN = 160, 300, 96  # an inch
 _LIBRARIES = ("exudyn", "mujoco", "numpy", "scipy", "numba", "matplotlib")
 
 
@@ -77,10 +80,10 @@ def keep(what: str, text: str, make: Callable[[Path], None]) -> Path:
     return folder
 
 
-def run_commands(lines: str) -> Path:
+def run_commands(lines: str, inputs: Sequence[Path] = ()) -> Path:
     """Run commands of `velodrome`, a line each, in a folder of their own; return the folder.
 
-    The folder holds what they write, and ``printed.json``: what each printed on stdout.
+    The folder holds copies of the inputs, what the commands write, and ``printed.json``: what each printed on stdout.
 
     Raises
     ------
@@ -90,6 +93,8 @@ def run_commands(lines: str) -> Path:
 
     def make(folder: Path) -> None:
         printed = []
+        for path in inputs:
+            shutil.copy(path, folder)
         environment = {**os.environ, "COLUMNS": str(COLUMNS), "NO_COLOR": "1"}
         for line in lines.splitlines():
             words = shlex.split(line, comments=True)
@@ -111,7 +116,8 @@ def run_commands(lines: str) -> Path:
             printed.append(done.stdout.strip("\n").replace(installed, "velodrome"))
         (folder / "printed.json").write_text(json.dumps(printed), encoding="utf-8")
 
-    return keep("typed", lines, make)
+    contents = "".join(path.read_text(encoding="utf-8") for path in inputs)
+    return keep("typed", f"{contents}{lines}", make)
 
 
 def read_printed(folder: Path) -> list[str]:
@@ -160,6 +166,37 @@ class Typed(SphinxDirective):
         return found
 
 
+class Figured(SphinxDirective):
+    """Commands of `velodrome`, run when the site is built, and the figures that they write."""
+
+    has_content = True
+    option_spec = {  # noqa: RUF012
+        "alt": directives.unchanged_required,
+        "figure": directives.unchanged_required,
+        "input": directives.unchanged,
+    }
+
+    def run(self) -> list[nodes.Node]:
+        """Return the pictures and the block of commands."""
+        if "alt" not in self.options or "figure" not in self.options:
+            raise self.error("figures need :figure:, their files, and :alt:, for those who do not see them")
+        lines = "\n".join(self.content)
+        folder = run_commands(lines, [DOCS.parent / name for name in self.options.get("input", "").split()])
+        images = []
+        for name in self.options["figure"].split():
+            if not (folder / name).exists():
+                raise self.error(f"the commands do not write {name}")
+            images.append(show_picture(self.env, folder / name, self.options["alt"], _PIXELS_PRINTED))
+        return [*images, nodes.literal_block(lines, lines, language="sh")]
+
+
+def show_picture(env: Any, picture: Path, alt: str, pixels: float) -> nodes.image:
+    """Return a picture of a number of pixels an inch, as large as text of the same size in inches, or the page."""
+    source = os.path.relpath(picture, Path(env.doc2path(env.docname)).parent)
+    width = f"{round(_PIXELS_SHOWN * plt.imread(picture).shape[1] / pixels)}px"
+    return nodes.image(uri=Path(source).as_posix(), alt=alt, classes=["drawn"], width=width)
+
+
 class Drawn(SphinxDirective):
     """Code that leaves a figure, and the figure."""
 
@@ -172,10 +209,7 @@ class Drawn(SphinxDirective):
             raise self.error("a picture needs :alt:, for those who do not see it")
         code = "\n".join(self.content)
         picture = draw_figure(code)
-        source = os.path.relpath(picture, Path(self.env.doc2path(self.env.docname)).parent)
-        # As large as text of the same size in inches, and never wider than the page.
-        width = f"{round(_PIXELS_SHOWN * plt.imread(picture).shape[1] / _PIXELS_DRAWN)}px"
-        image = nodes.image(uri=Path(source).as_posix(), alt=self.options["alt"], classes=["drawn"], width=width)
+        image = show_picture(self.env, picture, self.options["alt"], _PIXELS_DRAWN)
         return (
             [image] if "picture-only" in self.options else [image, nodes.literal_block(code, code, language="python")]
         )
@@ -185,4 +219,5 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
     app.add_directive("typed", Typed)
     app.add_directive("drawn", Drawn)
+    app.add_directive("figured", Figured)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

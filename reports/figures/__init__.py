@@ -1,18 +1,34 @@
-"""Figures for print: solution families, the atlas, work-precision, single precision."""
+"""Figures for print: solution families, the atlas, eigenvalues, work-precision, single precision, sweeps."""
 
 from .atlas import growth_figure, stable_figure
 from .eigenvalues import eigenvalue_figure
-from .families import family_figure, solution_figure
+from .families import family_figure
 from .float32 import float32_figure
 from .precision import precision_figure
 from .solution_curve import make_curves
-from .style import FAMILY_COLOURS, GREY, INK, WIDTH, new_figure, use_style, write_figure
+from .style import (
+    FAMILY_COLOURS,
+    GREY,
+    INK,
+    WIDTH,
+    WIDTHS,
+    darken,
+    new_figure,
+    use_style,
+    write_figure,
+    write_formats,
+)
+from .sweep import SweepAxis, SweepRuns, sweep_figure
 
 __all__ = [
     "FAMILY_COLOURS",
     "GREY",
     "INK",
     "WIDTH",
+    "WIDTHS",
+    "SweepAxis",
+    "SweepRuns",
+    "darken",
     "eigenvalue_figure",
     "family_figure",
     "float32_figure",
@@ -20,8 +36,9 @@ __all__ = [
     "make_curves",
     "new_figure",
     "precision_figure",
-    "solution_figure",
     "stable_figure",
+    "sweep_figure",
     "use_style",
     "write_figure",
+    "write_formats",
 ]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, LogNorm
@@ -19,8 +19,8 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from ...reference.families import FAMILIES
-from .labels import Label, name_other_bicycle, place_labels
-from .style import FAMILY_COLOURS, GREY, INK, new_figure, use_style, write_figure
+from .labels import Badge, Label, name_other_bicycle, place_labels
+from .style import FAMILY_COLOURS, INK, WIDTHS, new_figure
 
 Columns = Mapping[str, np.ndarray]
 
@@ -28,49 +28,90 @@ STABLE = "#2b6cb0"
 _HIGHEST = 35.0  # largest rear rate drawn [rad/s]: beyond, two families continue without an event
 _PIXELS = 480
 _SLOW, _FAST = 0.1, 100.0  # growth rates of the colour scale [1/s]
-_NORM, _COLOURS = LogNorm(_SLOW, _FAST), "YlOrRd"
+_NORM = LogNorm(_SLOW, _FAST)
+# The lightness falls from slow to fast, for readers without colour; hatching would not show on the darkest part.
+_COLOURS = ListedColormap(colormaps["YlOrRd"](np.linspace(0.04, 0.82, 256)))
+_ABSENT_HATCH, _STABLE_HATCH, _UNRIDDEN_HATCH = "xxxx", "....", "////"
+_ABSENT_INK = "#a0a0a0"
 _CAUSE_LINES = {"hopf": "-", "energy": ":", "end": "--"}
 _CAUSE_LABELS = {"hopf": "a complex pair crosses (Hopf)", "energy": "the energy is extreme", "end": "the family ends"}
+_ABSENT = "the family has no such motion"
 _NOT_RIDDEN = "cannot be ridden: contact lost, or a rim inside the ground"
 _TICKS = (0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
+_FEW_TICKS = (0, 0.05, 0.2, 0.5, 1.0)  # of narrow panels
 
 
-def growth_figure(path: Path, columns: Columns, document: Mapping[str, Any]) -> None:
-    """Write the growth rate over alpha and rear rate, one panel per family.
+def growth_figure(columns: Columns, document: Mapping[str, Any], width: int = 2) -> Figure:
+    """Draw the growth rate over alpha and rear rate, one panel per family; call within `use_style`.
+
+    A family's motions that are absent, stable or cannot be ridden have a hatching each, since colours alone would tell
+    an absent motion from a slowly growing one to few readers.
 
     Parameters
     ----------
-    path : Path
-        File to write, completely or not at all; its ending gives the format.
     columns, document : mapping
         Columns and document of the atlas, as `velodrome atlas` writes them.
+    width : int
+        Number of a journal's columns that the figure fills.
+
+    Returns
+    -------
+    Figure
     """
-    with use_style(), rc_context({"hatch.linewidth": 0.4}):
-        figure = new_figure(6.2)
-        panels = figure.subplots(2, 2, sharex=True, sharey=True)
-        for axes, family in zip(panels.flat, FAMILIES, strict=True):
-            _draw_panel(axes, columns, document, family)
-        for axes in panels[1]:
-            axes.set_xlabel("shape of the bowl α [1/m], root scale")
+    figure = new_figure(6.6 if width == 2 else 6.0, WIDTHS[width])
+    panels = figure.subplots(2, 2, sharex=True, sharey=True)
+    for axes, family in zip(panels.flat, FAMILIES, strict=True):
+        _draw_panel(axes, columns, document, family)
+    shape = "shape of the bowl $α$ [1/m], root scale" if width == 2 else "$α$ [1/m], root scale"
+    for axes in panels[1]:
+        axes.set_xlabel(shape)
+    if width == 2:
         for axes in panels[:, 0]:
-            axes.set_ylabel("rear-wheel rate ωr [rad/s]")
-        _draw_colour_bar(figure, panels)
-        figure.legend(handles=list(_growth_legend(document)), loc="outside lower center", ncols=2)
-        title = "Circular motions and the growth rate of disturbances (of several at one rate the least is shown)"
-        figure.suptitle(_add_bicycle(title, document), x=0.01, ha="left", fontsize=9)
-        # Labels come last, since all other items move the axes.
-        for axes, family in zip(panels.flat, FAMILIES, strict=True):
-            _label_alphas(axes, _critical_points(document, family), "rear_rate")
-        write_figure(path, figure)
+            axes.set_ylabel("rear-wheel rate $ω_r$ [rad/s]")
+    else:
+        figure.supylabel("rear-wheel rate $ω_r$ [rad/s]", fontsize=8.5)
+        _write_fewer_ticks(panels[1])
+    _draw_colour_bar(figure, panels, width)
+    handles = list(_growth_legend(document))
+    _add_legend(figure, handles, width, 2)
+    title = "Circular motions and the growth rate of disturbances (of several at one rate the least is shown)"
+    _add_title(figure, title, document, width)
+    # Labels come last, since all other items move the axes.
+    for axes, family in zip(panels.flat, FAMILIES, strict=True):
+        _label_alphas(axes, _critical_points(document, family), "rear_rate", 7 if width == 2 else 6)
+    return figure
+
+
+def _add_legend(figure: Figure, handles: Sequence[Any], width: int, count: int) -> None:
+    """Add a legend below all axes, with a number of columns, or with one where the figure is narrow."""
+    for handle in handles:
+        handle.set_label(fill(handle.get_label(), 70 if width == 2 else 52))
+    figure.legend(handles=handles, loc="outside lower center", ncols=count if width == 2 else 1)
+
+
+def _add_title(figure: Figure, title: str, document: Mapping[str, Any], width: int) -> None:
+    """Add a title with a line for the document's bicycle, unless it is the benchmark."""
+    lines = [fill(title, 110 if width == 2 else 52), name_other_bicycle(document)]
+    text = "\n".join(filter(None, lines))
+    figure.suptitle(text, x=0.01, ha="left", fontsize=9 if width == 2 else 8, parse_math=False)
+
+
+def _write_fewer_ticks(panels: Sequence[Axes]) -> None:
+    """Keep the ticks of alpha that have room in narrow panels."""
+    for axes in panels:
+        largest = axes.get_xlim()[1]
+        axes.xaxis.set_major_locator(FixedLocator([tick for tick in _FEW_TICKS if tick <= largest]))
 
 
 def _draw_panel(axes: Axes, columns: Columns, document: Mapping[str, Any], family: int) -> None:
     alphas, rates = np.array(document["alphas"]), np.linspace(0.0, _HIGHEST, _PIXELS)
     growth, physical = sheet(columns, family, alphas, rates)
+    axes.patch.set(facecolor="white", edgecolor=_ABSENT_INK, hatch=_ABSENT_HATCH)  # seen where nothing is drawn
     axes.pcolormesh(alphas, rates, growth.clip(_SLOW / 2), norm=_NORM, cmap=_COLOURS, rasterized=True)
     stable = np.where(growth < 0, 1.0, np.nan)
     axes.pcolormesh(alphas, rates, stable, cmap=ListedColormap([STABLE]), rasterized=True)
-    _draw_hatching(axes, alphas, rates, np.isfinite(growth) & ~physical)
+    _draw_hatching(axes, alphas, rates, growth < 0, _STABLE_HATCH, "white", 0.0)
+    _draw_hatching(axes, alphas, rates, np.isfinite(growth) & ~physical, _UNRIDDEN_HATCH, INK, 0.5)
     _set_root_scale(axes, float(alphas[-1]))
     axes.set_ylim(0, _HIGHEST)
     axes.set_title(f"family {family}", loc="left", color=FAMILY_COLOURS[family], fontweight="bold")
@@ -78,40 +119,49 @@ def _draw_panel(axes: Axes, columns: Columns, document: Mapping[str, Any], famil
     _mark_touching(axes, document, family)
 
 
-def _draw_colour_bar(figure: Figure, panels: np.ndarray) -> None:
-    bar = figure.colorbar(ScalarMappable(_NORM, _COLOURS), ax=panels, extend="both", shrink=0.75, aspect=30, pad=0.02)
+def _draw_colour_bar(figure: Figure, panels: np.ndarray, width: int) -> None:
+    look: dict[str, Any] = {"shrink": 0.75, "aspect": 30, "pad": 0.02}
+    if width == 1:
+        look = {"location": "top", "aspect": 30, "pad": 0.01}
+    bar = figure.colorbar(ScalarMappable(_NORM, _COLOURS), ax=panels, extend="both", **look)
     bar.set_label("growth rate [1/s]")
-    bar.ax.yaxis.set_major_locator(FixedLocator([0.1, 0.3, 1, 3, 10, 30, 100]))
-    bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    bar.ax.yaxis.set_minor_locator(NullLocator())
+    axis = bar.ax.xaxis if width == 1 else bar.ax.yaxis
+    axis.set_major_locator(FixedLocator([0.1, 0.3, 1, 3, 10, 30, 100]))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(NullLocator())
 
 
-def stable_figure(path: Path, columns: Columns, document: Mapping[str, Any]) -> None:
-    """Write the stable regions, over alpha and rear rate and over alpha and lean; arguments as in `growth_figure`."""
-    with use_style():
+def stable_figure(columns: Columns, document: Mapping[str, Any], width: int = 2) -> Figure:
+    """Draw the stable regions, over alpha and rear rate and over alpha and lean; arguments as in `growth_figure`."""
+    if width == 2:
         figure = new_figure(3.9)
         panels = figure.subplots(1, 2, sharex=True)
-        for axes, name, label, tag in zip(
-            panels, ("rear_rate", "lean"), ("rear-wheel rate ωr [rad/s]", "lean θ₀ [rad]"), "ab", strict=True
-        ):
-            for boundary in document["stable"]:
-                _draw_region(axes, columns, boundary, name)
-            axes.set_xlabel("shape of the bowl α [1/m]")
-            axes.set_ylabel(label)
-            axes.set_xlim(left=0)
-            axes.grid()
-            axes.set_title(f"({tag})", loc="left")
-        for axes, name in zip(panels, ("rear_rate", "lean"), strict=True):
-            _label_alphas(axes, [b["vanishing"] for b in document["stable"] if b["vanishing"] is not None], name)
-        figure.legend(handles=list(_stable_legend(columns, document)), loc="outside lower center", ncols=3)
-        title = _add_bicycle("Stable circular motions of the hands-free bicycle", document)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=10)
-        write_figure(path, figure)
+    else:
+        figure = new_figure(6.4, WIDTHS[1])
+        panels = figure.subplots(2, 1, sharex=True)
+    drawn = (("rear_rate", "rear-wheel rate $ω_r$ [rad/s]", "a"), ("lean", "lean $θ_0$ [rad]", "b"))
+    for axes, (name, label, tag) in zip(panels, drawn, strict=True):
+        for boundary in document["stable"]:
+            _draw_region(axes, columns, boundary, name)
+        axes.set_ylabel(label)
+        axes.set_xlim(left=0)
+        axes.grid()
+        axes.set_title(f"({tag})", loc="left")
+    for axes in panels if width == 2 else panels[1:]:
+        axes.set_xlabel("shape of the bowl $α$ [1/m]")
+    _add_legend(figure, list(_stable_legend(columns, document)), width, 3)
+    _add_title(figure, "Stable circular motions of the hands-free bicycle", document, width)
+    for axes, (name, _, _) in zip(panels, drawn, strict=True):
+        _label_alphas(axes, [b["vanishing"] for b in document["stable"] if b["vanishing"] is not None], name, 7)
+        place_labels(axes, (), [_name_region(boundary, name) for boundary in document["stable"]])
+    return figure
 
 
-def _add_bicycle(title: str, document: Mapping[str, Any]) -> str:
-    """Return a title with a line for the document's bicycle, unless it is the benchmark."""
-    return "\n".join(filter(None, (title, name_other_bicycle(document))))
+def _name_region(boundary: Mapping[str, Any], name: str) -> Badge:
+    """Make a badge with a region's family, to be placed on its upper side."""
+    side = max(("start", "end"), key=lambda side: boundary[side][name][0])
+    line = np.column_stack([boundary["alpha"], boundary[side][name]])
+    return Badge(str(boundary["family"]), line, FAMILY_COLOURS[boundary["family"]])
 
 
 def sheet(columns: Columns, family: int, alphas: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -150,9 +200,12 @@ def sheet(columns: Columns, family: int, alphas: np.ndarray, rates: np.ndarray) 
     return out, ridden
 
 
-def _draw_hatching(axes: Axes, alphas: np.ndarray, rates: np.ndarray, where: np.ndarray) -> None:
+def _draw_hatching(
+    axes: Axes, alphas: np.ndarray, rates: np.ndarray, where: np.ndarray, hatch: str, colour: str, width: float
+) -> None:
     if where.any():
-        axes.contourf(alphas, rates, where.astype(float), levels=[0.5, 1.5], colors="none", hatches=["////"])
+        drawn = axes.contourf(alphas, rates, where.astype(float), levels=[0.5, 1.5], colors="none", hatches=[hatch])
+        drawn.set(edgecolor=colour, linewidth=width)
 
 
 def _set_root_scale(axes: Axes, largest: float) -> None:
@@ -195,11 +248,11 @@ def _draw_boundaries(axes: Axes, document: Mapping[str, Any], family: int) -> No
             axes.plot(end["alpha"], end["rear_rate"], "*", color=INK, ms=8, mec="white", mew=0.6)
 
 
-def _label_alphas(axes: Axes, points: Sequence[Mapping[str, Any]], name: str) -> None:
+def _label_alphas(axes: Axes, points: Sequence[Mapping[str, Any]], name: str, size: float) -> None:
     """Write the alpha of critical points next to them."""
-    labels = [Label(f"α = {point['alpha']:.3g}", (point["alpha"], point[name])) for point in points]
-    for text in place_labels(axes, labels):
-        text.set(fontsize=7, path_effects=[withStroke(linewidth=2, foreground="white")])
+    labels = [Label(f"$α$ = {point['alpha']:.3g}", (point["alpha"], point[name])) for point in points]
+    for text in place_labels(axes, labels, size=size):
+        text.set(path_effects=[withStroke(linewidth=2, foreground="white")])
 
 
 def _critical_points(document: Mapping[str, Any], family: int) -> list[Mapping[str, Any]]:
@@ -215,9 +268,9 @@ def _mark_touching(axes: Axes, document: Mapping[str, Any], family: int) -> None
 
 
 def _growth_legend(document: Mapping[str, Any]) -> Iterator[Any]:
-    yield Patch(facecolor=STABLE, label="stable")
-    yield Patch(facecolor="white", edgecolor=GREY, lw=0.6, label="the family has no such motion")
-    yield Patch(facecolor="white", edgecolor=INK, lw=0.6, hatch="////", label=_NOT_RIDDEN)
+    yield Patch(facecolor=STABLE, edgecolor="white", lw=0, hatch=_STABLE_HATCH, label="stable")
+    yield Patch(facecolor="white", edgecolor=_ABSENT_INK, lw=0, hatch=_ABSENT_HATCH, label=_ABSENT)
+    yield Patch(facecolor="white", edgecolor=INK, lw=0.6, hatch=_UNRIDDEN_HATCH, label=_NOT_RIDDEN)
     yield from _cause_legend(document)
     yield Line2D([], [], ls="", marker="*", color=INK, ms=8, label="the stable section vanishes")
     yield Line2D([], [], ls="", marker="D", color="white", mec=INK, ms=5, label="two curves touch and exchange parts")
@@ -250,7 +303,7 @@ def _draw_stable_hatching(
     reached = np.array([(alpha, inside.min(), inside.max()) for alpha, inside in lost.items() if len(inside)])
     if len(reached):
         alphas, low, high = reached.T
-        axes.fill_between(alphas, low, high, facecolor="none", edgecolor=INK, hatch="////", lw=0)
+        axes.fill_between(alphas, low, high, facecolor="none", edgecolor=INK, hatch=_UNRIDDEN_HATCH, lw=0)
 
 
 def _stable_legend(columns: Columns, document: Mapping[str, Any]) -> Iterator[Any]:
@@ -259,7 +312,7 @@ def _stable_legend(columns: Columns, document: Mapping[str, Any]) -> Iterator[An
         yield Patch(facecolor=colour, alpha=0.4, label=f"family {boundary['family']}")
     yield from _cause_legend(document)
     if np.any(columns["stable"] & ~columns["physical"]):
-        yield Patch(facecolor="white", edgecolor=INK, lw=0.6, hatch="////", label=_NOT_RIDDEN)
+        yield Patch(facecolor="white", edgecolor=INK, lw=0.6, hatch=_UNRIDDEN_HATCH, label=_NOT_RIDDEN)
     yield Line2D([], [], ls="", marker="*", color=INK, ms=9, label="the stable section vanishes")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,19 +15,32 @@ from matplotlib.ticker import MultipleLocator
 
 from .labels import Badge, Label, name_other_bicycle, place_labels
 from .solution_curve import NamedPoint, SolutionCurve, find_limits, find_named_points, make_curves, scaled_speed
-from .style import FAMILY_COLOURS, GREY, INK, new_figure, use_style, write_figure
+from .style import FAMILY_COLOURS, GREY, INK, WIDTHS, new_figure
 
-ANGLES = {"lean": "lean θ₀ [rad]", "steer": "steer δ₀ [rad]"}
+ANGLES = {"lean": "lean $θ_0$ [rad]", "steer": "steer $δ_0$ [rad]"}
 RANGES = {"lean": (-np.pi / 2, np.pi / 2), "steer": (0.0, np.pi)}
-MARKERS = {"static": "s", "pivot": "o", "cusp": "^", "straight": "D", "motion": "X"}
+# Of points on curves, filled, and of limits, open; beside letters they tell what a point is.
+MARKERS = {
+    "static": "s",
+    "pivot": "o",
+    "cusp": "^",
+    "straight": "D",
+    "motion": "X",
+    "large circle": "D",
+    "flat": "o",
+    "fast front wheel": ">",
+    "edge": "s",
+}
 POINT_MEANINGS = {
     "static": "static equilibrium",
     "pivot": "pivoting motion",
     "cusp": "cusp",
     "straight": "straight motion",
     "motion": "named motion",
-    "large circle": "large circles",
-    "flat": "limit",
+    "large circle": "ever larger circles",
+    "flat": "lying flat",
+    "fast front wheel": "front wheel ever faster",
+    "edge": "edge of the ground",
 }
 _SPEEDS = (0, 5, 10, 15, 20, 30, 50, 100)  # on the upper axis [rad/s]
 # Left, bottom, width, height of the magnified part, relative to a panel: where no curve of small alpha lies.
@@ -44,53 +56,67 @@ _UNRIDDEN_MEANINGS = {"pulled": "contact lost", "touching": "a rim in the ground
 
 
 def family_figure(
-    path: Path, document: Mapping[str, Any], front_radius: float, marks: Mapping[str, Mapping[str, float]] | None = None
-) -> None:
-    """Write the figure of all families.
+    document: Mapping[str, Any],
+    front_radius: float,
+    marks: Mapping[str, Mapping[str, float]] | None = None,
+    columns: int = 2,
+    units: Mapping[str, str] | None = None,
+) -> Figure:
+    """Draw lean and steer of all families over the scaled front speed; call within `use_style`.
 
     Parameters
     ----------
-    path : Path
-        File to write, completely or not at all; its ending gives the format.
     document : mapping
         As returned by `velodrome families`.
     front_radius : float
         Radius of the front wheel [m].
     marks : mapping, optional
         Further motions to mark, by name: ``lean``, ``steer`` and ``front_rate``.
+    columns : int
+        Number of a journal's columns that the figure fills.
+    units : mapping, optional
+        Units of the fields of the ground, if it is no paraboloid.
+
+    Returns
+    -------
+    Figure
     """
-    with use_style():
-        write_figure(path, solution_figure(document, front_radius, marks or {}))
-
-
-def solution_figure(
-    document: Mapping[str, Any], front_radius: float, marks: Mapping[str, Mapping[str, float]]
-) -> Figure:
-    """Draw lean and steer of all families over the scaled front speed; call within `use_style`."""
     drawn = make_curves(document["families"], front_radius)
     points = find_named_points(document["families"], front_radius)
     points += [
         NamedPoint(name, "motion", scaled_speed(mark["front_rate"], front_radius), mark["lean"], mark["steer"], False)
-        for name, mark in marks.items()
+        for name, mark in (marks or {}).items()
     ]
     points += find_limits(drawn)
-    figure = new_figure(3.75)
-    panels = figure.subplots(1, 2)
+    if columns == 2:
+        figure = new_figure(3.75)
+        panels = figure.subplots(1, 2)
+    else:
+        figure = new_figure(7.4, WIDTHS[1])
+        panels = figure.subplots(2, 1)
     if other := name_other_bicycle(document):
-        figure.suptitle(other, x=0.01, ha="left", fontsize=9)
+        figure.suptitle(other, x=0.01, ha="left", fontsize=9, parse_math=False)
     for axes, angle, tag in zip(panels, ANGLES, "ab", strict=True):
         _draw_frame(axes, angle, front_radius, mirrored=any(curve.steer.min() < 0 for curve in drawn))
+        if columns == 1:
+            axes.xaxis.set_major_locator(MultipleLocator(0.5))
         axes.text(
-            0.03, 0.965, f"({tag})  {_describe_ground(document)}", transform=axes.transAxes, va="top", fontsize=8.5
+            0.03,
+            0.965,
+            f"({tag})  {_describe_ground(document, units or {})}",
+            transform=axes.transAxes,
+            va="top",
+            fontsize=8.5,
         )
         for curve in drawn:
             _draw_curve(axes, curve, angle)
         _mark_points(axes, points, angle)
-    _draw_legend(figure, drawn, points)
+    _draw_legend(figure, drawn, points, columns)
     for axes, angle in zip(panels, ANGLES, strict=True):
         badges = [
-            Badge("+".join(str(number) for number in curve.families) or "–", curve.line(angle), _curve_colour(curve))
+            Badge("+".join(str(number) for number in curve.families), curve.line(angle), _curve_colour(curve))
             for curve in drawn
+            if curve.families
         ]
         _magnify(axes, drawn, points, angle)
         place_labels(axes, _make_labels(points, angle), badges)
@@ -104,7 +130,7 @@ def _make_labels(points: Sequence[NamedPoint], angle: str) -> list[Label]:
 def _magnify(axes: Axes, drawn: Sequence[SolutionCurve], points: Sequence[NamedPoint], angle: str) -> None:
     """Show cusps and stable sections enlarged: they are small, and the families nearly touch there."""
     stable = [curve.line(angle, *section) for curve in drawn for section in curve.stable]
-    cusps = [(point.speed, getattr(point, angle)) for point in points if point.kind == "cusp"]
+    cusps = [(point.speed, getattr(point, angle)) for point in points if point.kind == "cusp" and point.name]
     if not stable or not cusps:
         return
     magnified = np.concatenate([*stable, cusps])
@@ -125,15 +151,16 @@ def _magnify(axes: Axes, drawn: Sequence[SolutionCurve], points: Sequence[NamedP
         connector.set_visible(False)
 
 
-def _describe_ground(document: Mapping[str, Any]) -> str:
+def _describe_ground(document: Mapping[str, Any], units: Mapping[str, str]) -> str:
     """Describe the ground; a simple fraction is written as in the paper."""
     alpha = document["alpha"]
     if alpha is None:
-        fields = document["surface"].items()
-        return ", ".join(str(value) if name == "kind" else f"{name} {value}" for name, value in fields)[:_LONGEST]
+        fields = {name: value for name, value in document["surface"].items() if name != "kind"}
+        shown = [f"{name} {value} {units.get(name, '')}".removesuffix(" 1").strip() for name, value in fields.items()]
+        return ", ".join([str(document["surface"]["kind"]), *shown])[:_LONGEST]
     fraction = Fraction(alpha).limit_denominator(1000)
     simple = fraction.numerator == 1 and float(fraction) == alpha
-    return "α = 0" if alpha == 0 else f"α = {fraction if simple else f'{alpha:.6g}'} m⁻¹"
+    return "$α$ = 0" if alpha == 0 else f"$α$ = {fraction if simple else f'{alpha:.6g}'} m$^{{-1}}$"
 
 
 def _draw_frame(axes: Axes, angle: str, front_radius: float, mirrored: bool) -> None:
@@ -192,14 +219,22 @@ def _mark_points(axes: Axes, points: Sequence[NamedPoint], angle: str) -> None:
 
 
 def _marker_style(point: NamedPoint) -> dict[str, Any]:
-    """Return the marker of a point; it is open for a limit."""
-    marker = MARKERS.get(point.kind, "o" if point.kind == "flat" else "D")
-    return {"marker": marker, "ms": 4.6, "mfc": "white" if point.limit else INK, "mec": INK, "mew": 0.9}
+    """Return the marker of a point: open for a limit, smaller for a cusp to which the paper gives no letter."""
+    size = 2.8 if point.kind == "cusp" and not point.name else 4.6
+    return {
+        "marker": MARKERS[point.kind],
+        "ms": size,
+        "mfc": "white" if point.limit else INK,
+        "mec": INK,
+        "mew": 0.9 * size / 4.6,
+    }
 
 
-def _draw_legend(figure: Figure, drawn: Sequence[SolutionCurve], points: Sequence[NamedPoint]) -> None:
+def _draw_legend(figure: Figure, drawn: Sequence[SolutionCurve], points: Sequence[NamedPoint], columns: int) -> None:
     numbers = sorted({number for curve in drawn for number in curve.families})
     handles: list[Line2D] = [Line2D([], [], color=FAMILY_COLOURS[k], lw=2, label=f"family {k}") for k in numbers]
+    if any(not curve.families for curve in drawn):
+        handles.append(Line2D([], [], color=GREY, lw=2, label="of no family"))
     if any(curve.stable for curve in drawn):
         handles.append(Line2D([], [], color=GREY, lw=_STABLE, solid_capstyle="butt", label="Lyapunov stable"))
     if any(curve.unridden_stable for curve in drawn):
@@ -210,7 +245,11 @@ def _draw_legend(figure: Figure, drawn: Sequence[SolutionCurve], points: Sequenc
         if kind in kinds:
             handles.append(Line2D([], [], color=GREY, **_UNRIDDEN[kind], label=meaning))
     for kind, meaning in POINT_MEANINGS.items():
-        marked = [point for point in points if point.kind == kind]
+        # Of cusps the larger mark, if there is one.
+        marked = sorted((point for point in points if point.kind == kind), key=lambda point: not point.name)
         if marked:
-            handles.append(Line2D([], [], ls="", label=meaning, **_marker_style(marked[0])))
-    figure.legend(handles=handles, loc="outside lower center", ncols=math.ceil(len(handles) / 2), columnspacing=1.4)
+            limit = "limit: " if marked[0].limit else ""
+            handles.append(Line2D([], [], ls="", label=f"{limit}{meaning}", **_marker_style(marked[0])))
+    rows = max(2, math.ceil(len(handles) / 4))
+    ncols = math.ceil(len(handles) / rows) if columns == 2 else 2
+    figure.legend(handles=handles, loc="outside lower center", ncols=ncols, columnspacing=1.4)

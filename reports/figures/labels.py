@@ -16,9 +16,11 @@ from ...reference.bicycle import Bicycle
 _LONGEST_NAME = 40  # largest number of characters that name a bicycle
 _REACHES = (8.0, 11.0, 15.0, 20.0, 26.0)  # distances of a label from its point that are tried [pt]
 _DIRECTIONS = np.radians(np.arange(45.0, 405.0, 22.5))  # beginning at the upper right, where readers expect it
+_MARK = 5.0  # half the width of what is kept free around the points of other labels [pt]
 _MARGIN = 1.5  # kept free around a label [pt]
 _SPACING = 2.0  # of the points that represent a curve [pt]
-_LEADER = 17.0  # distance from which a label is connected to its point by a line [pt]
+_BADGE_SIZE = 7.0  # of the letters of badges [pt]
+_LEADER = 9.0  # distance of a label's edge from which a label is connected to its point by a line [pt]
 
 
 def name_other_bicycle(document: Mapping[str, Any]) -> str:
@@ -46,7 +48,9 @@ class Badge:
     colour: str
 
 
-def place_labels(axes: Axes, labels: Sequence[Label], badges: Sequence[Badge] = ()) -> list[Annotation]:
+def place_labels(
+    axes: Axes, labels: Sequence[Label], badges: Sequence[Badge] = (), size: float = 9
+) -> list[Annotation]:
     """Write labels beside their points, then badges on their curves.
 
     Parameters
@@ -55,6 +59,8 @@ def place_labels(axes: Axes, labels: Sequence[Label], badges: Sequence[Badge] = 
         Must have all curves and markers drawn and all limits set.
     labels : sequence of Label
     badges : sequence of Badge
+    size : float
+        Size of the labels' letters [pt].
 
     Returns
     -------
@@ -69,35 +75,41 @@ def place_labels(axes: Axes, labels: Sequence[Label], badges: Sequence[Badge] = 
     taken: list[np.ndarray] = [np.array(child.bbox.extents) * scale for child in axes.child_axes]
     written = []
     for label in labels:
-        text, size = _write_text(axes, label.text, label.point, scale)
+        text, extent = _write_text(axes, label.text, label.point, scale, size)
         at = axes.transData.transform(label.point) * scale
-        offset = _place_label(at, size, obstacles, taken, frame)
+        # Beside another label's point it would be read as that one's name.
+        others = [
+            _make_box(axes.transData.transform(other.point) * scale, np.full(2, 2 * _MARK))
+            for other in labels
+            if other.point != label.point
+        ]
+        offset = _place_label(at, extent, obstacles, [*taken, *others], frame)
         text.xyann = tuple(offset)
-        if np.hypot(*offset) > _LEADER:
-            edge = offset * (1 - np.min(size / 2 / np.maximum(np.abs(offset), 1e-9)))
+        edge = offset * (1 - np.min(extent / 2 / np.maximum(np.abs(offset), 1e-9)))
+        if np.hypot(*edge) > _LEADER:
             leader = {"arrowstyle": "-", "lw": 0.5, "shrinkA": 0, "shrinkB": 3}
             line = axes.annotate("", label.point, tuple(edge), textcoords="offset points", arrowprops=leader)
             line.set_in_layout(False)
-        taken.append(_make_box(at + offset, size))
+        taken.append(_make_box(at + offset, extent))
         written.append(text)
     for badge in badges:
-        text, size = _write_text(axes, badge.text, badge.points[0], scale, badge.colour)
+        text, extent = _write_text(axes, badge.text, badge.points[0], scale, _BADGE_SIZE, badge.colour)
         places = axes.transData.transform(badge.points) * scale
-        chosen = _place_badge(places, size + 4, obstacles, taken, frame)
+        chosen = _place_badge(places, extent + 4, obstacles, taken, frame)
         text.xy = tuple(badge.points[chosen])
-        taken.append(_make_box(places[chosen], size + 4))
+        taken.append(_make_box(places[chosen], extent + 4))
         written.append(text)
     return written
 
 
 def _write_text(
-    axes: Axes, words: str, point: Any, scale: float, colour: str | None = None
+    axes: Axes, words: str, point: Any, scale: float, size: float, colour: str | None = None
 ) -> tuple[Annotation, np.ndarray]:
     """Write a text at its point; return it and its width and height [pt]."""
-    kind: dict[str, Any] = {"fontsize": 9, "zorder": 9}
+    kind: dict[str, Any] = {"fontsize": size, "zorder": 9}
     if colour is not None:
         box = {"boxstyle": "round,pad=0.18", "fc": "white", "ec": colour, "lw": 0.9}
-        kind = {"fontsize": 7, "fontweight": "bold", "color": colour, "bbox": box, "zorder": 8}
+        kind = {"fontsize": size, "fontweight": "bold", "color": colour, "bbox": box, "zorder": 8}
     text = axes.annotate(
         words, tuple(point), (0, 0), textcoords="offset points", ha="center", va="center", annotation_clip=False, **kind
     )

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+_MARKED = ("static", "pivot", "cusp")  # kinds of points that are marked with and without a letter
 SCALE = 4.0  # speed in the paper's abscissa, for the front wheel [m/s]
 
 
@@ -168,8 +169,13 @@ def _owning_families(family: Mapping[str, Any]) -> tuple[int, ...]:
 
 
 def _find_curve_limits(family: Mapping[str, Any], speed: np.ndarray) -> tuple[NamedPoint, ...]:
-    """Return limits: E and F at the frame's corners; B and C where circles grow without bound, until solved for."""
-    points, special = family["points"], family["special_points"]
+    """Return limits: E and F at the frame's corners; B and C where circles grow without bound, until solved for.
+
+    The letters are those of the paper's families; limits of curves without a number have none.
+    Where the front wheel turns ever faster, and where the ground ends, the limit has no letter and stands at the
+    curve's end.
+    """
+    points, special, numbered = family["points"], family["special_points"], family["family"] is not None
     solved = {name for name, point in special.items() if point["kind"] == "straight"}
     large = [index for index, end in _index_ends(family) if end == "large circle"]
     fastest = max(large, key=lambda index: speed[index]) if large else None
@@ -179,12 +185,15 @@ def _find_curve_limits(family: Mapping[str, Any], speed: np.ndarray) -> tuple[Na
         if end == "flat":
             name, angles = ("E", (np.pi / 2, np.pi)) if lean > 0 else ("F", (-np.pi / 2, 0.0))
             if steer < 0:  # left and right exchanged, as a steer torque has it
-                name, angles = "", (np.pi / 2, 0.0) if lean > 0 else (-np.pi / 2, -np.pi)
+                angles = (np.pi / 2, 0.0) if lean > 0 else (-np.pi / 2, -np.pi)
+            name = name if numbered else ""
             found.append(NamedPoint(name, end, np.pi / 2, *angles, True, index == 0))
         elif end == "large circle" and not solved:
             letter = "B" if abs(steer) < np.pi / 2 else "C"
-            name = letter if index == fastest else ""
+            name = letter if numbered and index == fastest else ""
             found.append(NamedPoint(name, end, float(speed[index]), lean, steer, True, index == 0))
+        elif end in ("fast front wheel", "edge"):
+            found.append(NamedPoint("", end, float(speed[index]), lean, steer, True, index == 0))
     return tuple(found)
 
 
@@ -192,22 +201,28 @@ def find_limits(drawn: Sequence[SolutionCurve]) -> list[NamedPoint]:
     """Return the limits of all curves, each once; of large circles with equal angles only the fastest is lettered."""
     found: dict[tuple, NamedPoint] = {}
     for point in (limit for curve in drawn for limit in curve.limits):
-        found.setdefault((point.name, round(point.speed, 6), round(point.lean, 6)), point)
+        found.setdefault((point.name, *(round(value, 6) for value in (point.speed, point.lean, point.steer))), point)
     fastest = {point.name: point for point in sorted(found.values(), key=lambda point: point.speed)}
     return [point if fastest[point.name] is point else replace(point, name="") for point in found.values()]
 
 
 def find_named_points(families: Sequence[Mapping[str, Any]], front_radius: float) -> list[NamedPoint]:
-    """Return the points with the paper's letters; points that coincide share a label, as G and H do."""
+    """Return the special points to mark, with the paper's letters where it gives one.
+
+    Points that coincide share a label, as G and H do. Without a letter are static equilibria, pivoting motions and
+    cusps of curves that the paper does not have, on other grounds and with inputs.
+    """
     found: dict[tuple, NamedPoint] = {}
     for family in families:
         for name, point in family["special_points"].items():
             letters = set(name) - set(" ()")
             if not all(letter.isupper() for letter in letters):
-                continue
+                if point["kind"] not in _MARKED:
+                    continue
+                letters = set()
             speed = float(scaled_speed(point["front_rate"], front_radius))
             key = (point["kind"], round(point["lean"], 6), round(point["steer"], 6))
             both = sorted(letters | set(found[key].name if key in found else "") - set(" ()"))
-            label = both[0] + "".join(f" ({other})" for other in both[1:])
+            label = "".join([*both[:1], *(f" ({other})" for other in both[1:])])
             found[key] = NamedPoint(label, point["kind"], speed, point["lean"], point["steer"], False)
     return list(found.values())

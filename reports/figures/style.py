@@ -1,25 +1,38 @@
-"""Common style of all printed figures, and writing them to files."""
+"""Common style of all printed figures, their widths, and writing them to files."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from ...engines.files import write_whole
 
-WIDTH = 7.2  # width of a page with two columns [inch]: text stays readable at half of it
+# Widths of figures in one and in two columns of a journal, 89 mm and 183 mm (Nature; within a millimetre of those of
+# Elsevier and IEEE) [inch].
+WIDTHS = {1: 89 / 25.4, 2: 183 / 25.4}
+WIDTH = WIDTHS[2]
 
 INK, GREY, PALE = "#1a1a1a", "#6b6b6b", "#d9d9d9"
 # Okabe and Ito's colours, which remain distinct with common colour blindness; one for each solution family.
 FAMILY_COLOURS = {1: "#0072B2", 2: "#D55E00", 3: "#009E73", 4: "#CC79A7"}
 
+MARKERS = "os^Dvp*hX<>"  # of engines, distinct without colour
+_DARKER = 0.72  # engines' colours are chosen for a dark background
+
 _STYLE: Any = {
-    "font.family": "DejaVu Sans",  # included in matplotlib: the same glyphs on every machine
+    "font.family": "sans-serif",
+    # DejaVu Sans is included in matplotlib: the same glyphs on every machine. The others have nearly its widths, for
+    # viewers of SVG files that lack it.
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "Helvetica"],
+    "mathtext.fontset": "dejavusans",
     "font.size": 8,
     "axes.labelsize": 8.5,
     "axes.titlesize": 8.5,
@@ -34,6 +47,7 @@ _STYLE: Any = {
     "ytick.labelcolor": INK,
     "xtick.direction": "in",
     "ytick.direction": "in",
+    "xtick.major.pad": 4.5,
     "xtick.labelsize": 7.5,
     "ytick.labelsize": 7.5,
     "grid.color": PALE,
@@ -43,11 +57,34 @@ _STYLE: Any = {
     "legend.handlelength": 1.8,
     "lines.linewidth": 1.4,
     "figure.dpi": 72,  # a point is a pixel: label placement works in points
-    "savefig.dpi": 200,
+    "hatch.linewidth": 0.4,
+    "savefig.dpi": 300,
     "svg.hashsalt": "velodrome",  # the same figure gives the same file
-    "svg.fonttype": "path",
+    "svg.fonttype": "none",  # text remains text, which can be searched and edited
+    "pdf.fonttype": 42,  # TrueType: publishers refuse Type 3 fonts
 }
 _NO_DATE: dict[str, dict[str, Any]] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+
+
+def darken(colour: tuple[int, int, int]) -> tuple[float, float, float]:
+    """Return an engine's colour, as `velodrome.reports.drawing.assign_colours` gives it, for white paper, 0 to 1."""
+    red, green, blue = (_DARKER * part / 255 for part in colour)
+    return red, green, blue
+
+
+def label_log_axes(axes: Axes) -> None:
+    """Label powers of ten on logarithmic axes, and 2 and 5 times them where fewer than two are in view.
+
+    matplotlib would label further multiples, which overlap in narrow panels. All data must be drawn.
+    """
+    for axis, limits in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+        if axis.get_scale() != "log":
+            continue
+        axis.set_minor_formatter(NullFormatter())
+        low, high = (math.log10(limit) for limit in limits)
+        if math.floor(high) - math.ceil(low) < 1:
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.set_major_formatter(LogFormatterSciNotation(minor_thresholds=(math.inf, math.inf)))
 
 
 @contextmanager
@@ -76,3 +113,32 @@ def write_figure(path: Path, figure: Figure) -> None:
     """
     with write_whole(path) as partial:
         figure.savefig(partial, metadata=_NO_DATE.get(path.suffix))
+
+
+def write_formats(
+    stem: Path, draw: Callable[[int], Figure], formats: Iterable[str] = ("png",), columns: int = 2
+) -> list[Path]:
+    """Draw a figure in the common style and write it in all formats, each file completely or not at all.
+
+    Parameters
+    ----------
+    stem : Path
+        Path of the files without their endings.
+    draw : callable
+        Returns the figure for a number of columns.
+    formats : iterable of str
+        Endings of files without their dots: ``png``, ``svg``, ``pdf``.
+    columns : int
+        Number of a journal's columns that the figure fills, 1 or 2; see `WIDTHS`.
+
+    Returns
+    -------
+    list of Path
+        Files written.
+    """
+    paths = [stem.with_name(f"{stem.name}.{name}") for name in formats]
+    with use_style():
+        figure = draw(columns)
+        for path in paths:
+            write_figure(path, figure)
+    return paths

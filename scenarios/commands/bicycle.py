@@ -9,7 +9,17 @@ import typer
 
 from ..error import ScenarioError
 from .completion import complete_scenario
-from .options import JsonOption, SteerDampingOption, ending_with, make_inputs, print_json, show_written
+from .options import (
+    ColumnsOption,
+    FormatOption,
+    JsonOption,
+    SteerDampingOption,
+    ending_with,
+    make_inputs,
+    parse_figure_output,
+    print_json,
+    show_written,
+)
 
 _FINEST = 10_000  # speeds of a list
 _FASTEST = 1e4  # [m/s]
@@ -27,13 +37,16 @@ def bicycle_command(
         str, typer.Option(metavar="FROM:TO", help="Range of forward speeds [m/s], or a list such as 1,3,5.")
     ] = "0:10",
     steer_damping: SteerDampingOption = 0.0,
-    out: Annotated[Path | None, typer.Option(help="Folder for bicycle.json and the figure eigenvalues.png.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for bicycle.json and the figure eigenvalues.")] = None,
+    formats: FormatOption = None,
+    columns: ColumnsOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """A bicycle by itself: canonical matrices, eigenvalues over speed, weave and capsize speeds."""
     from .progress import ProgressBars
     from .terminal import make_console
 
+    figures = parse_figure_output(formats, columns, None if out is not None else "--out")
     with ProgressBars() as progress:
         import numpy as np
 
@@ -44,7 +57,7 @@ def bicycle_command(
         damping = make_inputs(0.0, 0.0, steer_damping).steer_damping
         progress.say("computing the eigenvalues")
         study = study_bicycle(find_bicycle(source), np.array(parse_speeds(speeds)), damping)
-        written = [] if out is None else write_bicycle(study, out)
+        written = [] if out is None else write_bicycle(study, out, figures)
     with ending_with(0):
         if as_json:
             print_json(study.as_json())

@@ -11,13 +11,16 @@ from .completion import complete_engine, complete_scenario
 from .options import (
     BicycleOption,
     ChangesOption,
+    ColumnsOption,
     DurationOption,
+    FormatOption,
     JsonOption,
     TracebackOption,
     answering_missing_motion,
     ending_with,
     load_bicycle,
     parse_changes,
+    parse_figure_output,
     print_json,
     print_traceback,
     show_written,
@@ -45,6 +48,8 @@ def float32_command(
         typer.Option(min=1, max=100, help="Number of rides of each kind, from starts that differ in the last digits."),
     ] = 8,
     out: Annotated[Path | None, typer.Option(help="Folder for the document and its figure.")] = None,
+    formats: FormatOption = None,
+    columns: ColumnsOption = None,
     traceback: TracebackOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -60,6 +65,7 @@ def float32_command(
     from .present_float32 import show_float32
     from .progress import ProgressBars
 
+    figures = parse_figure_output(formats, columns, None if out is not None else "--out")
     changes = parse_changes(change, duration)
     other = None if bicycle is None else load_bicycle(bicycle).bicycle
     name, loaded = load_scenario(scenario, changes, "--set", other)
@@ -68,7 +74,7 @@ def float32_command(
     with answering_missing_motion(as_json), showing_traceback(traceback), ProgressBars() as progress:
         trace = print_traceback if traceback else None
         document = study_float32(name, loaded, engine, starts, progress.watch, trace)
-    written = [] if out is None else write_float32(document, out)
+    written = [] if out is None else write_float32(document, out, figures)
     with ending_with(0 if all_rode_float32(document) else 1):
         if as_json:
             print_json(document)

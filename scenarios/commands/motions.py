@@ -10,6 +10,8 @@ import typer
 from .options import (
     AlphaOption,
     BicycleOption,
+    ColumnsOption,
+    FormatOption,
     GroundOption,
     JsonOption,
     RearTorqueOption,
@@ -20,6 +22,7 @@ from .options import (
     load_bicycle,
     make_inputs,
     parse_angles,
+    parse_figure_output,
     parse_ground,
     print_json,
 )
@@ -71,13 +74,16 @@ def families_command(
     steer_torque: SteerTorqueOption = 0.0,
     rear_wheel_torque: RearTorqueOption = 0.0,
     steer_damping: SteerDampingOption = 0.0,
-    out: Annotated[Path | None, typer.Option(help="Folder for families.json and the figure families.png.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for families.json and the figure families.")] = None,
+    formats: FormatOption = None,
+    columns: ColumnsOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """The four solution families by continuation: special points, stable sections."""
     from .progress import ProgressBars
     from .terminal import make_console
 
+    figures = parse_figure_output(formats, columns, None if out is not None else "--out")
     with answering_missing_motion(as_json), ProgressBars() as progress:
         from ..motions import follow_families, write_families
         from ..scenario import make_bowl
@@ -95,7 +101,7 @@ def families_command(
         document = families.as_json(source.name)
         if out is not None:
             progress.say("drawing the figure")
-            write_families(document, out)
+            write_families(document, out, figures)
     with ending_with(0):
         if as_json:
             print_json(document)
@@ -132,19 +138,22 @@ def atlas_command(
     size: Annotated[int, typer.Option(help="Number of motions, roughly.")] = 400_000,
     largest: Annotated[float, typer.Option(help="Largest alpha [1/m], at most 1.")] = 1.0,
     bicycle: BicycleOption = None,
+    formats: FormatOption = None,
+    columns: ColumnsOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Stability of all circular motions over alpha and rear rate: data, boundaries, figures (half a minute)."""
     from .progress import ProgressBars
     from .terminal import make_console
 
+    figures = parse_figure_output(formats, columns)
     with answering_missing_motion(as_json), ProgressBars() as progress:
         from ..motions import make_atlas
         from .present_motions import show_atlas
 
         source = load_bicycle(bicycle)
         document = make_atlas(
-            source, out, size, largest, lambda done: progress.watch("atlas", done * size, size, "motions")
+            source, out, size, largest, lambda done: progress.watch("atlas", done * size, size, "motions"), figures
         )
     with ending_with(0):
         if as_json:

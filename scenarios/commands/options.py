@@ -20,6 +20,7 @@ from .completion import complete_scenario
 if TYPE_CHECKING:
     from ...reference.inputs import Inputs
     from ...reference.surface import Surface
+    from ..files import FigureOutput
     from ..scenario import BicycleFile
 
 AlphaOption = Annotated[
@@ -62,6 +63,19 @@ CacheOption = Annotated[
         show_envvar=True,
         help="Folder whose subfolder releases keeps the releases' environments; velodrome in the user's cache folder "
         "if not given.",
+    ),
+]
+FormatOption = Annotated[
+    list[str] | None,
+    typer.Option("--format", help="Format of figures: png, svg or pdf; may be given several times; png if not given."),
+]
+ColumnsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--columns",
+        min=1,
+        max=2,
+        help="Width of figures: 1 for one column of a journal (89 mm), 2 for two (183 mm); 2 if not given.",
     ),
 ]
 HISTORIES = Path("history")  # where histories are written and looked for if no folder is named
@@ -166,6 +180,39 @@ def make_inputs(steer_torque: float, rear_wheel_torque: float, steer_damping: fl
     except ValueError as error:
         name, space, rest = str(error).partition(" ")
         raise ScenarioError(f"--{name.replace('_', '-')}{space}{rest}") from error
+
+
+def parse_figure_output(
+    formats: list[str] | None, columns: int | None, needed: str | None = None, usual: tuple[str, ...] = ("png",)
+) -> FigureOutput:
+    """Return how the figures are written that --format and --columns ask for.
+
+    Parameters
+    ----------
+    formats : list of str or None
+    columns : int or None
+    needed : str, optional
+        Option without which the command writes no figures, if it was not given.
+    usual : tuple of str
+        Formats if none is given.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such format, or the command writes no figures.
+    """
+    from ...engines.names import suggest_name
+    from ..files import FIGURE_FORMATS, FigureOutput
+    from ..scenario import show_value
+
+    if needed is not None:
+        for option, value in (("--format", formats), ("--columns", columns)):
+            if value:
+                raise ScenarioError(f"{option}: it is of figures, which are written with {needed} only")
+    for name in formats or ():
+        if name not in FIGURE_FORMATS:
+            raise ScenarioError(f"--format {show_value(name)}: no such format ({suggest_name(name, FIGURE_FORMATS)})")
+    return FigureOutput(tuple(dict.fromkeys(formats or usual)), 2 if columns is None else columns)
 
 
 def show_written(paths: Iterable[Path]) -> None:

@@ -11,22 +11,34 @@ from .completion import complete_engine, complete_scenario
 from .options import (
     BicycleOption,
     ChangesOption,
+    ColumnsOption,
     DurationOption,
+    FormatOption,
     JsonOption,
     TracebackOption,
     answering_missing_motion,
     ending_with,
     load_bicycle,
     parse_changes,
+    parse_figure_output,
     print_json,
     print_traceback,
     show_written,
     showing_traceback,
 )
 
+PaperFormatOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--format", help="Format of figures: png, svg or pdf; may be given several times; svg and png if not given."
+    ),
+]
+
 
 def paper_command(
     out: Annotated[Path | None, typer.Option(help="Folder for the figures, tables and ledger.")] = None,
+    formats: PaperFormatOption = None,
+    columns: ColumnsOption = None,
     whole: Annotated[bool, typer.Option("--all", help="Print every claim, not only those that matter.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -37,6 +49,7 @@ def paper_command(
     from .progress import ProgressBars
     from .terminal import make_console
 
+    figures = parse_figure_output(formats, columns, None if out is not None else "--out", ("svg", "png"))
     with ProgressBars() as progress:
         from ..files import make_folder
         from ..paper import known_discrepancies, ledger_document, make_ledger, show_ledger, write_paper
@@ -46,7 +59,9 @@ def paper_command(
         lines = make_ledger(lambda part, done, parts: progress.watch(part, done, parts, "parts of the paper"))
         written = []
         if out is not None:
-            written = write_paper(out, lines, lambda name, done, total: progress.watch(name, done, total, "figures"))
+            written = write_paper(
+                out, lines, lambda name, done, total: progress.watch(name, done, total, "figures"), figures
+            )
     found = ledger_document(lines, known_discrepancies())
     with ending_with(1 if found["surprises"] else 0):
         if as_json:
@@ -79,6 +94,8 @@ def precision_command(
     ] = 5,
     eigenvalues: Annotated[bool, typer.Option(help="Measure each engine's own eigenvalues too.")] = True,
     out: Annotated[Path | None, typer.Option(help="Folder for the document, its page and its figure.")] = None,
+    formats: FormatOption = None,
+    columns: ColumnsOption = None,
     traceback: TracebackOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -86,6 +103,7 @@ def precision_command(
     from .progress import COMPUTING, ProgressBars
     from .terminal import make_console
 
+    figures = parse_figure_output(formats, columns, None if out is not None else "--out")
     with answering_missing_motion(as_json), showing_traceback(traceback), ProgressBars() as progress:
         from ..files import make_folder
         from ..scenario import load_scenario
@@ -100,7 +118,7 @@ def precision_command(
         progress.say(COMPUTING)
         trace = print_traceback if traceback else None
         document = study_precision(name, loaded, engine, levels, eigenvalues, progress.watch, trace)
-    written = [] if out is None else write_precision(document, out)
+    written = [] if out is None else write_precision(document, out, figures)
     with ending_with(0 if all_ran(document) else 1):
         if as_json:
             print_json(document)

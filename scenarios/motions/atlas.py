@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from ...reference.atlas import ATLAS_SIZE, Atlas, Boundary, compute_atlas, spaci
 from ...reference.rideability import OBSTACLES
 from ...reference.stability import VARIABLES
 from ..error import MissingMotionError, ScenarioError
-from ..files import make_folder, write_json
+from ..files import FigureOutput, make_folder, write_json
 from ..scenario import BicycleFile, name_bicycle
 from .families import check_inertia, critical_entry
 
@@ -42,6 +43,7 @@ def make_atlas(
     size: int = ATLAS_SIZE,
     largest: float = 1.0,
     progress: Callable[[float], None] = lambda _: None,
+    figures: FigureOutput = FigureOutput(),  # noqa: B008
 ) -> dict[str, Any]:
     """Compute the atlas and write ``atlas.parquet``, ``boundaries.json`` and the figures into a folder.
 
@@ -57,6 +59,8 @@ def make_atlas(
         Largest alpha [1/m].
     progress : callable
         Called with the fraction done.
+    figures : FigureOutput
+        How the figures are written.
 
     Returns
     -------
@@ -71,7 +75,7 @@ def make_atlas(
         If the size or the largest alpha is out of range, the bicycle's equations are singular, or the folder cannot be
         made.
     """
-    from ...reports.figures import growth_figure, stable_figure
+    from ...reports.figures import growth_figure, stable_figure, write_formats
 
     if not SMALLEST <= size <= LARGEST:
         raise ScenarioError(f"--size {size}: an atlas has from {SMALLEST} to {LARGEST} motions")
@@ -89,8 +93,8 @@ def make_atlas(
     facts = {"longest_step": longest, "bicycle": asdict(found.bicycle), "obstacles": list(OBSTACLES)}
     write_atlas(columns, out / "atlas.parquet", facts)
     write_json(out / "boundaries.json", document)
-    growth_figure(out / "growth.png", columns, document)
-    stable_figure(out / "stable.png", columns, document)
+    for name, draw in (("growth", growth_figure), ("stable", stable_figure)):
+        write_formats(out / name, partial(draw, columns, document), figures.formats, figures.columns)
     progress(1.0)
     return document
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,8 +24,11 @@ from ...reference.special import SpecialPoint, special_points
 from ...reference.surface import Paraboloid, Surface, SurfaceOfRevolution
 from ...reports.measure import to_number
 from ..error import ScenarioError
-from ..files import make_folder, write_json
-from ..scenario import describe_missing_motion, make_bowl, name_bicycle, name_surface
+from ..files import FigureOutput, make_folder, write_json
+from ..scenario import describe_missing_motion, find_unit, make_bowl, name_bicycle, name_surface
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Longest step along the arc: 100 to 300 points per family. No known stable section is shorter than three steps.
 LONGEST_DRAWN_STEP = 0.05
@@ -381,19 +384,25 @@ def _entry_or_null(point: CriticalPoint | None) -> dict[str, Any] | None:
     return None if point is None else critical_entry(point)
 
 
-def write_families(document: Mapping[str, Any], out: Path) -> None:
-    """Write the document and its figure into a folder, which is made if it does not exist.
+def write_families(document: Mapping[str, Any], out: Path, output: FigureOutput) -> list[Path]:
+    """Write the document and its figure into a folder, which is made if it does not exist, and return their paths.
 
     Raises
     ------
     ScenarioError
         If the folder cannot be made.
     """
-    from ...reports.figures import family_figure
+    from ...reports.figures import family_figure, write_formats
 
     make_folder(out)
     write_json(out / "families.json", document)
-    family_figure(out / "families.png", document, document["bicycle"]["parameters"]["front_wheel_radius"])
+    radius = document["bicycle"]["parameters"]["front_wheel_radius"]
+    units = {name: find_unit(f"surface.{name}") or "" for name in document.get("surface", {})}
+
+    def draw(columns: int) -> Figure:
+        return family_figure(document, radius, columns=columns, units=units)
+
+    return [out / "families.json", *write_formats(out / "families", draw, output.formats, output.columns)]
 
 
 def _describe_section(start: SectionEnd, end: SectionEnd, parts: Sequence[tuple[PartEnd, PartEnd]]) -> dict[str, Any]:

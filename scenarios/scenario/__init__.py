@@ -37,6 +37,7 @@ from .table import (
     set_keys,
     show_value,
 )
+from .units import find_unit
 
 __all__ = [
     "BENCHMARK",
@@ -57,6 +58,7 @@ __all__ = [
     "describe_missing_motion",
     "error_place",
     "find_bicycle",
+    "find_unit",
     "fits_engine",
     "format_validation_error",
     "insert_bicycle_file",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from functools import partial
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from ...reference.upright import (
     weave_speed,
 )
 from ..error import ScenarioError
-from ..files import make_folder, write_json
+from ..files import FigureOutput, make_folder, write_json
 from ..scenario import BicycleFile
 
 
@@ -135,13 +136,13 @@ def study_bicycle(source: BicycleFile, speeds: np.ndarray, steer_damping: float 
     )
 
 
-def write_bicycle(study: BicycleStudy, out: Path) -> list[Path]:
+def write_bicycle(study: BicycleStudy, out: Path, output: FigureOutput) -> list[Path]:
     """Write the document and the figure of a study into a folder, and return their paths."""
     # Imported here, since the document does not need matplotlib.
-    from ...reports.figures import eigenvalue_figure
+    from ...reports.figures import eigenvalue_figure, write_formats
 
     make_folder(out)
-    document, figure = out / "bicycle.json", out / "eigenvalues.png"
-    write_json(document, study.as_json())
-    eigenvalue_figure(figure, study.source.name, study.speeds, study.followed, study.modes, study.stable_speeds)
-    return [document, figure]
+    write_json(out / "bicycle.json", study.as_json())
+    shown = study.source.name, study.speeds, study.followed, study.modes, study.stable_speeds
+    draw = partial(eigenvalue_figure, *shown)
+    return [out / "bicycle.json", *write_formats(out / "eigenvalues", draw, output.formats, output.columns)]

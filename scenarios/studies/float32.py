@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ from ...reports.measure import (
     measure_step_errors,
 )
 from ..error import ScenarioError
-from ..files import make_folder, write_json
+from ..files import FigureOutput, make_folder, write_json
 from ..run import RunPlan, RunWatch, Trace, configure_engine, installed_engines, library_versions, plan_run
 from ..scenario import Scenario, choose_engines, join_complaints, make_start, name_bicycle
 
@@ -449,7 +450,7 @@ def _measure_reference(plan: RunPlan, double: _Double, watch: RunWatch) -> list[
     ]
 
 
-def write_float32(document: Mapping[str, Any], out: Path) -> list[Path]:
+def write_float32(document: Mapping[str, Any], out: Path, output: FigureOutput) -> list[Path]:
     """Write the document and its figure into a folder, which is made if it does not exist.
 
     Raises
@@ -457,10 +458,10 @@ def write_float32(document: Mapping[str, Any], out: Path) -> list[Path]:
     ScenarioError
         If the folder cannot be made.
     """
-    from ...reports.figures import float32_figure
+    from ...reports.figures import float32_figure, write_formats
 
     make_folder(out)
-    files = [out / f"float32-{document['scenario']}.json", out / f"float32-{document['scenario']}.png"]
-    write_json(files[0], document)
-    float32_figure(files[1], document)
-    return files
+    name = f"float32-{document['scenario']}"
+    write_json(out / f"{name}.json", document)
+    draw = partial(float32_figure, document)
+    return [out / f"{name}.json", *write_formats(out / name, draw, output.formats, output.columns)]

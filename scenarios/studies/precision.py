@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from ...reports.drawing import find_unsteadiness
 from ...reports.measure import IDENTIFY_LEVELS as IDENTIFY_LEVELS
 from ...reports.measure import Identified, Level, comparison_horizon, eigenvalue_document, engine_document, identify
 from ..error import ScenarioError
-from ..files import make_folder, write_json, write_text
+from ..files import FigureOutput, make_folder, write_json, write_text
 from ..run import RunPlan, RunWatch, Trace, claimed_noise, library_versions, measure_one, plan_run
 from ..scenario import Scenario, Start, name_bicycle
 
@@ -326,7 +327,7 @@ def _make_document(
     }
 
 
-def write_precision(document: Mapping[str, Any], out: Path) -> list[Path]:
+def write_precision(document: Mapping[str, Any], out: Path, output: FigureOutput) -> list[Path]:
     """Write the document, its page and its figure into a folder, which is made if it does not exist.
 
     Raises
@@ -334,12 +335,13 @@ def write_precision(document: Mapping[str, Any], out: Path) -> list[Path]:
     ScenarioError
         If the folder cannot be made.
     """
-    from ...reports.figures import precision_figure
+    from ...reports.figures import precision_figure, write_formats
     from ...reports.page import make_precision_page
 
     make_folder(out)
-    files = [out / f"precision-{document['scenario']}.{kind}" for kind in ("json", "html", "png")]
-    write_json(files[0], document)
-    write_text(files[1], make_precision_page(document))
-    precision_figure(files[2], document)
-    return files
+    name = f"precision-{document['scenario']}"
+    document_file, page = out / f"{name}.json", out / f"{name}.html"
+    write_json(document_file, document)
+    write_text(page, make_precision_page(document))
+    draw = partial(precision_figure, document)
+    return [document_file, page, *write_formats(out / name, draw, output.formats, output.columns)]

@@ -8,6 +8,7 @@ import re
 import shutil
 import tomllib
 from collections.abc import Iterator
+from functools import partial
 from html.parser import HTMLParser
 from importlib.metadata import EntryPoint, PackageNotFoundError, distribution
 from pathlib import Path
@@ -22,6 +23,7 @@ from packaging.version import Version
 from tests.sealing import sealed
 from velodrome.engines import registry
 from velodrome.reports.figures.precision import precision_figure
+from velodrome.reports.figures.style import write_formats
 from velodrome.reports.recording.summary import make_summary, make_verdict
 from velodrome.scenarios.gate.ci_files import junit_xml, markdown_page
 from velodrome.scenarios.gate.verdict import Verdict
@@ -250,7 +252,7 @@ def test_no_text_of_a_run_is_markup_in_markdown() -> None:
 
 def test_a_files_name_is_no_formula_in_a_figure(tmp_path: Path) -> None:
     document = {"scenario": "$\\frac{$", "duration": 1.0, "horizon": None, "engines": {}}
-    precision_figure(tmp_path / "a.png", document)
+    write_formats(tmp_path / "a", partial(precision_figure, document))
     assert (tmp_path / "a.png").stat().st_size > 0
 
 

@@ -22,10 +22,11 @@ from velodrome.scenarios.sweep.file import SweepFile
 SLOW = {DOCS / "guides" / "own-engine.md", DOCS / "index.md", DOCS / "gallery.md", DOCS / "start" / "report.md"}
 CODE = [page for page in source_pages() if blocks(page, "python")]
 DRAWN = [block for page in source_pages() for block in blocks(page, "{drawn}")]
+FIGURED = [block for page in source_pages() for block in blocks(page, "{figured}")]
 SHELL = [
     (page, line)
     for page in source_pages()
-    for block in blocks(page, "sh", "{typed}", "yaml")
+    for block in blocks(page, "sh", "{typed}", "{figured}", "yaml")
     for line in re.findall(r"(?:^|- run: |bin/)(velodrome .*)$", block.text, re.MULTILINE)
 ]
 TOML = [block for page in source_pages() for block in blocks(page, "toml")]
@@ -50,6 +51,20 @@ def test_the_code_of_a_figure_draws_it(block: Block, tmp_path: Path, monkeypatch
     figure.savefig(tmp_path / "figure.png")
     # A caption says what is seen to those who do not see it.
     assert re.search(r"^:alt: \S", block.options, re.MULTILINE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", FIGURED, ids=[block.name for block in FIGURED])
+def test_the_commands_of_a_figure_write_it(block: Block, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("sphinx")
+    import executed
+
+    options = dict(re.findall(r"^:(\w+): (.+)$", block.options, re.MULTILINE))
+    monkeypatch.setattr(executed, "MADE", tmp_path)
+    folder = executed.run_commands(block.text, [ROOT / name for name in options.get("input", "").split()])
+    for name in options["figure"].split():
+        assert (folder / name).stat().st_size > 10_000
+    assert options["alt"]
 
 
 def run_code(code: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from ....reference.circular import CircularMotion
 from ....reference.kinematics import body_positions, rotations
 from ....reference.surface import Surface, unit_normals
 from ....reports.drawing import STEEPEST, ball, body_meshes, ground_disc, lift_points
-from ....reports.figures import FAMILY_COLOURS, INK, WIDTH, new_figure
+from ....reports.figures import FAMILY_COLOURS, INK, WIDTHS, new_figure
 from .picture import Picture, View
 
 _FRONT = "#8d939a"  # of the front assembly, so that a reversed handlebar can be recognised
@@ -46,26 +46,28 @@ class Configuration:
     motion: CircularMotion
 
 
-def configurations_figure(bicycle: Bicycle, surface: Surface, shown: Sequence[Configuration]) -> Figure:
+def configurations_figure(
+    bicycle: Bicycle, surface: Surface, shown: Sequence[Configuration], columns: int = 2
+) -> Figure:
     """Draw each bicycle on its circle in its part of the bowl; call within `use_style`."""
     rows = (len(shown) + 1) // 2
-    figure = new_figure(2.95 * rows, WIDTH)
+    figure = new_figure((2.95 if columns == 2 else 2.22) * rows, WIDTHS[columns])
     figure.set_layout_engine("compressed")  # pictures keep their shape: excess space goes outside, not between them
     panels = figure.subplots(rows, 2, squeeze=False).ravel()
     for axes in panels[len(shown) :]:
         axes.remove()
     for axes, item, tag in zip(panels, shown, "abcdefgh", strict=False):
-        _draw_panel(axes, bicycle, surface, item, tag)
+        _draw_panel(axes, bicycle, surface, item, tag, columns)
     handles = [
         Line2D([], [], color=_REAR_TRACK, label="circle of the rear contact point"),
         Line2D([], [], color=_FRONT_TRACK, label="of the front contact point"),
         Line2D([], [], color=_PATH, ls="--", label="path of D"),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3 if columns == 2 else 1)
     return figure
 
 
-def _draw_panel(axes: Axes, bicycle: Bicycle, surface: Surface, item: Configuration, tag: str) -> None:
+def _draw_panel(axes: Axes, bicycle: Bicycle, surface: Surface, item: Configuration, tag: str, columns: int) -> None:
     motion = item.motion
     radius = float(np.hypot(*motion.contact[:, :2].T).max()) + _MARGIN
     rim = float(lift_points(surface, np.array([radius]), np.zeros(1))[0, 2])
@@ -80,12 +82,17 @@ def _draw_panel(axes: Axes, bicycle: Bicycle, surface: Surface, item: Configurat
     axes.text(half[0] - 0.25, 0.07 - half[1], "0.5 m", ha="center", va="bottom", fontsize=7)
     axes.set_axis_off()
     turns = "anticlockwise" if motion.yaw_rate > 0 else "clockwise"
-    axes.set_title(f"({tag})  {item.name}, family {item.family}, {turns}", pad=2)
-    words = (
-        f"$θ_0$ = {motion.lean:.2f}, $δ_0$ = {motion.steer:.2f};  "
-        f"$ω_r$ = {motion.rear_rate:.4g}, $ω_f$ = {motion.front_rate:.2f}, $ω$ = {motion.yaw_rate:.2f} rad/s"
+    space, size = (" ", 7.0) if columns == 2 else ("\n", 6.5)  # a narrow panel has room for a third of the line
+    title = f"({tag})  {item.name}, family {item.family},{space}{turns}"
+    axes.set_title(title, pad=2, fontsize=size + 1)
+    words = space.join(
+        (
+            f"$θ_0$ = {motion.lean:.2f}, $δ_0$ = {motion.steer:.2f} rad;",
+            f"$ω_r$ = {motion.rear_rate:.4g}, $ω_f$ = {motion.front_rate:.2f},",
+            f"$ω$ = {motion.yaw_rate:.2f} rad/s",
+        )
     )
-    axes.text(0.5, -0.01, words.replace("-", "−"), transform=axes.transAxes, ha="center", va="top", fontsize=7.5)
+    axes.text(0.5, -0.01, words.replace("-", "−"), transform=axes.transAxes, ha="center", va="top", fontsize=size)
 
 
 def _make_view(motion: CircularMotion, radius: float, rim: float) -> View:

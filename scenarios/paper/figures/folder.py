@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -15,8 +15,8 @@ from ....reference.families import trace
 from ....reference.simulate import simulate, simulate_modified_euler
 from ....reference.stability import independent, linearise
 from ....reference.surface import Paraboloid
-from ....reports.figures import solution_figure, use_style, write_figure
-from ...files import make_folder, write_json, write_text
+from ....reports.figures import family_figure, write_formats
+from ...files import FigureOutput, make_folder, write_json, write_text
 from ...motions import families_document
 from ...scenario import Start, load_scenario, make_start
 from ..energy import motion_of_energy
@@ -28,18 +28,18 @@ from .configurations import Configuration, configurations_figure
 from .tables import LinearisedPoint, linearisation_document, linearisation_tables
 from .trajectories import FigureRide, departure_figure, disturbed_figure, while_pushed
 
-ENDINGS = (".svg", ".png")
 ALPHAS = {"figure-2": 0.0, "figure-3": 1 / 200, "figure-4": 1 / 20, "figure-5": 1 / 5, "figure-7": 1.0}
 MARKS = {"figure-3": ("q1", "q2"), "figure-5": ("p1", "p2", "p3", "p4")}  # motions that the paper marks
 DISTURBED_SCENARIO = {"+0.1 rad/s": "q2-plus", "−0.1 rad/s": "q2-minus"}
 DEPARTURE, SETTLING = 100.0, 60.0  # durations simulated from Q1 and about Q2 [s]
 
-DrawnFigure = tuple[Figure, str]
+# A function that draws the figure for a number of columns, and the caption.
+DrawnFigure = tuple[Callable[[int], Figure], str]
 # (what is drawn, how far it is, how far it goes)
 FigureWatch = Callable[[str, float, float], None]
 
 
-def write_figures(out: Path, progress: FigureWatch, endings: Iterable[str] = ENDINGS) -> list[Path]:
+def write_figures(out: Path, progress: FigureWatch, output: FigureOutput) -> list[Path]:
     """Compute and write Figures 2 to 9, their captions, and the tables at Q1 and Q2.
 
     Parameters
@@ -48,8 +48,8 @@ def write_figures(out: Path, progress: FigureWatch, endings: Iterable[str] = END
         Folder, made if it does not exist.
     progress : callable
         Called with the next figure, the number of figures done and the number of steps in all.
-    endings : iterable of str
-        Endings of the files to write each figure in.
+    output : FigureOutput
+        Formats and width of the figures.
 
     Returns
     -------
@@ -60,13 +60,10 @@ def write_figures(out: Path, progress: FigureWatch, endings: Iterable[str] = END
     written: list[Path] = []
     captions: dict[str, str] = {}
     jobs = _drawing_functions()
-    with use_style():
-        for done, (name, draw) in enumerate(jobs.items()):
-            progress(name, done, len(jobs) + 1)
-            figure, captions[name] = draw()
-            for ending in endings:
-                write_figure(out / f"{name}{ending}", figure)
-                written.append(out / f"{name}{ending}")
+    for done, (name, compute) in enumerate(jobs.items()):
+        progress(name, done, len(jobs) + 1)
+        draw, captions[name] = compute()
+        written += write_formats(out / name, draw, output.formats, output.columns)
     progress("tables", len(jobs), len(jobs) + 1)
     points = [linearised_point("Q1", "q1"), linearised_point("Q2", "q2")]
     write_text(out / "captions.md", captions_text(captions))
@@ -75,7 +72,7 @@ def write_figures(out: Path, progress: FigureWatch, endings: Iterable[str] = END
     return [*written, *(out / name for name in ("captions.md", "tables.md", "linearisation.json"))]
 
 
-def write_paper(out: Path, lines: Sequence[LedgerLine], progress: FigureWatch) -> list[Path]:
+def write_paper(out: Path, lines: Sequence[LedgerLine], progress: FigureWatch, output: FigureOutput) -> list[Path]:
     """Write the ledger, as JSON and as a page of Markdown, and all figures and tables into a folder.
 
     Raises
@@ -86,11 +83,11 @@ def write_paper(out: Path, lines: Sequence[LedgerLine], progress: FigureWatch) -
     make_folder(out)
     write_json(out / "ledger.json", ledger_document(lines, known_discrepancies()))
     write_text(out / "ledger.md", ledger_markdown(lines))
-    return [out / "ledger.json", out / "ledger.md", *write_figures(out, progress)]
+    return [out / "ledger.json", out / "ledger.md", *write_figures(out, progress, output)]
 
 
 def _drawing_functions() -> dict[str, Callable[[], DrawnFigure]]:
-    """Return the functions that compute and draw the figures, by the figures' names, in the paper's order."""
+    """Return the functions that compute what the figures show, by the figures' names, in the paper's order."""
     jobs: dict[str, Callable[[], DrawnFigure]] = {name: partial(_draw_families, name) for name in ALPHAS}
     jobs |= {"figure-6": _draw_configurations, "figure-8": _draw_departure, "figure-9": _draw_disturbed}
     return dict(sorted(jobs.items()))
@@ -100,23 +97,23 @@ def _draw_families(name: str) -> DrawnFigure:
     alpha, marked = ALPHAS[name], {key.upper(): start_named(key) for key in MARKS.get(name, ())}
     marks = {key: _marked_values(_require_motion(start)) for key, start in marked.items()}
     document = families_document(alpha)
-    return solution_figure(document, Bicycle().front_wheel_radius, marks), families_caption(
-        document, Bicycle().front_wheel_radius
-    )
+    radius = Bicycle().front_wheel_radius
+    return partial(family_figure, document, radius, marks), families_caption(document, radius)
 
 
 def _draw_configurations() -> DrawnFigure:
     starts = {name: start_named(name) for name in MARKS["figure-5"]}
     shown = [Configuration(name.upper(), start.family or 0, _require_motion(start)) for name, start in starts.items()]
     problem = starts["p1"].problem
-    figure = configurations_figure(problem.bicycle, problem.surface, shown)
-    return figure, configurations_caption(ALPHAS["figure-5"])
+    draw = partial(configurations_figure, problem.bicycle, problem.surface, shown)
+    return draw, configurations_caption(ALPHAS["figure-5"])
 
 
 def _draw_departure() -> DrawnFigure:
     start = start_named("q1", DEPARTURE)
     ride, motion = ride_from("Q1", start), _require_motion(start)
-    return departure_figure(ride, motion, start.growth_rate), departure_caption(ride, motion, start.growth_rate)
+    draw = partial(departure_figure, ride, motion, start.growth_rate)
+    return draw, departure_caption(ride, motion, start.growth_rate)
 
 
 def _draw_disturbed() -> DrawnFigure:
@@ -124,7 +121,8 @@ def _draw_disturbed() -> DrawnFigure:
     starts = {words: start_named(name, SETTLING) for words, name in DISTURBED_SCENARIO.items()}
     rides = [ride_from(words, start) for words, start in starts.items()]
     neighbours = {words: circle_of_equal_energy(start, circle) for words, start in starts.items()}
-    return disturbed_figure(rides, circle, neighbours), disturbed_caption(rides, circle, neighbours)
+    draw = partial(disturbed_figure, rides, circle, neighbours)
+    return draw, disturbed_caption(rides, circle, neighbours)
 
 
 def ride_from(name: str, start: Start) -> FigureRide:

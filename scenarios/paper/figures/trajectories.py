@@ -18,7 +18,7 @@ from ....reference.contact import observe
 from ....reference.kinematics import FRONT_ANGLE, REAR_ANGLE
 from ....reference.simulate import PreciseMotion
 from ....reference.surface import Surface
-from ....reports.figures import FAMILY_COLOURS, GREY, INK, new_figure
+from ....reports.figures import FAMILY_COLOURS, GREY, INK, WIDTHS, new_figure
 
 REAR, FRONT = FAMILY_COLOURS[1], FAMILY_COLOURS[2]
 DISTURBED_COLOURS = (FAMILY_COLOURS[1], FAMILY_COLOURS[2])
@@ -79,7 +79,7 @@ def leaves_at(motion: PreciseMotion, circle: CircularMotion, share: float) -> fl
     return float(motion.time[off[0]]) if len(off) else None
 
 
-def departure_figure(ride: FigureRide, circle: CircularMotion, growth_rate: float) -> Figure:
+def departure_figure(ride: FigureRide, circle: CircularMotion, growth_rate: float, columns: int = 2) -> Figure:
     """Draw a ride that leaves its circle: path, wheel rates, distance from the circle on a log scale.
 
     Parameters
@@ -89,12 +89,14 @@ def departure_figure(ride: FigureRide, circle: CircularMotion, growth_rate: floa
         Circle at the start.
     growth_rate : float
         Growth rate of the linear theory [1/s].
+    columns : int
+        Number of a journal's columns that the figure fills.
 
     Returns
     -------
     Figure
     """
-    figure, path, rates, growth = _make_panels("off the circle [m]", "wheel rates [rad/s]")
+    figure, path, rates, growth = _make_panels("off the circle [m]", "wheel rates [rad/s]", columns)
     _draw_circle(path, circle)
     for motion, look in ((ride.precise, _change_style(_PRECISE, color=REAR)), (ride.paper, _PAPER)):
         path.plot(motion.q[:, 0], motion.q[:, 1], **look)
@@ -108,7 +110,8 @@ def departure_figure(ride: FigureRide, circle: CircularMotion, growth_rate: floa
         rates.annotate(name, (0, rate), (3, 5), textcoords="offset points", color=(REAR, FRONT)[wheel - REAR_ANGLE])
     _draw_theory(growth, ride.precise, circle, growth_rate)
     growth.set_ylim(1e-15, 1e2)
-    _draw_legend(figure, [Line2D([], [], color=REAR, **_without_id(_PRECISE), label="precise, projected, order 8")])
+    precise = Line2D([], [], color=REAR, **_without_id(_PRECISE), label="precise, projected, order 8")
+    _draw_legend(figure, [precise], columns)
     return figure
 
 
@@ -124,7 +127,10 @@ def _draw_theory(axes: Axes, motion: PreciseMotion, circle: CircularMotion, grow
 
 
 def disturbed_figure(
-    rides: Sequence[FigureRide], circle: CircularMotion, neighbours: Mapping[str, CircularMotion]
+    rides: Sequence[FigureRide],
+    circle: CircularMotion,
+    neighbours: Mapping[str, CircularMotion],
+    columns: int = 2,
 ) -> Figure:
     """Draw disturbed rides about a stable circle: paths, rear-wheel rates, distance of the integrators.
 
@@ -136,12 +142,14 @@ def disturbed_figure(
         The undisturbed motion.
     neighbours : mapping
         Circular motion of each ride's energy, to which the ride tends, by the ride's name.
+    columns : int
+        Number of a journal's columns that the figure fills.
 
     Returns
     -------
     Figure
     """
-    figure, path, rates, apart = _make_panels("integrators apart [m]", "rear-wheel rate [rad/s]")
+    figure, path, rates, apart = _make_panels("integrators apart [m]", "rear-wheel rate [rad/s]", columns)
     lens = path.inset_axes((0.27, 0.27, 0.46, 0.46), xticks=[], yticks=[], aspect="equal")
     handles = []
     for ride, colour in zip(rides, DISTURBED_COLOURS, strict=False):
@@ -166,14 +174,18 @@ def disturbed_figure(
     rates.axhline(circle.rear_rate, color=GREY, lw=0.9, gid="undisturbed")
     handles.append(Line2D([], [], color=GREY, lw=0.9, label="undisturbed"))
     handles.append(Line2D([], [], color=GREY, lw=0.9, ls=":", label="circle of equal energy"))
-    _draw_legend(figure, handles)
+    _draw_legend(figure, handles, columns)
     return figure
 
 
-def _make_panels(lower: str, upper: str) -> tuple[Figure, Axes, Axes, Axes]:
+def _make_panels(lower: str, upper: str, columns: int) -> tuple[Figure, Axes, Axes, Axes]:
     """Make a figure with a square panel for the path, and two panels above one another over time."""
-    figure = new_figure(3.9)
-    panels = figure.subplot_mosaic([["path", "rates"], ["path", "lower"]], width_ratios=[1.0, 1.12])
+    if columns == 2:
+        figure = new_figure(3.9)
+        panels = figure.subplot_mosaic([["path", "rates"], ["path", "lower"]], width_ratios=[1.0, 1.12])
+    else:
+        figure = new_figure(7.6, WIDTHS[1])
+        panels = figure.subplot_mosaic([["path"], ["rates"], ["lower"]], height_ratios=[2.0, 1.0, 1.0])
     path, rates, last = panels["path"], panels["rates"], panels["lower"]
     path.set_aspect("equal", adjustable="datalim")
     path.set(xlabel="x of D [m]", ylabel="y of D [m]")
@@ -202,6 +214,6 @@ def _without_id(look: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in look.items() if name != "gid"}
 
 
-def _draw_legend(figure: Figure, handles: list[Line2D]) -> None:
+def _draw_legend(figure: Figure, handles: list[Line2D], columns: int) -> None:
     handles = [*handles, Line2D([], [], **_without_id(_PAPER), label="modified Euler, 1 ms")]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles) if columns == 2 else 1)

@@ -106,7 +106,7 @@ def test_no_name_covers_another_one(
     size: tuple[float, float], views: Views, view: str, content: Content, runs: dict[str, Trajectory]
 ) -> None:
     """The labels' boxes by the viewer's camera, at every time at which their places are set."""
-    camera, spots, sizes = eye(views, view), {}, {}
+    camera, spots, sizes, when = eye(views, view), {}, {}, np.empty(0)
     for name in runs:
         time, _, at = content.values(f"/world/{name}/here", "Transform3D:translation")
         when, _, beside = content.values(f"/world/{name}/here/name", "Points3D:positions")

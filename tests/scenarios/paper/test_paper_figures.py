@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +17,10 @@ from matplotlib.text import Annotation
 from tests.literature import published
 from velodrome.reference.kinematics import REAR_ANGLE
 from velodrome.reference.surface import Paraboloid
-from velodrome.reports.figures.families import family_figure, solution_figure
+from velodrome.reports.figures.families import family_figure
 from velodrome.reports.figures.solution_curve import SolutionCurve, make_curves, scaled_speed
-from velodrome.reports.figures.style import new_figure, use_style, write_figure
+from velodrome.reports.figures.style import new_figure, use_style, write_figure, write_formats
+from velodrome.scenarios.files import FigureOutput
 from velodrome.scenarios.motions.families import families_document
 from velodrome.scenarios.paper.figures.captions import families_caption, settled_rate
 from velodrome.scenarios.paper.figures.configurations import Configuration, configurations_figure
@@ -47,7 +48,7 @@ document = cache(families_document)
 @cache
 def drawn(alpha: float) -> Figure:
     with use_style():
-        return solution_figure(document(alpha), RADIUS, {})
+        return family_figure(document(alpha), RADIUS)
 
 
 def panels(figure: Figure) -> list[Axes]:
@@ -168,10 +169,11 @@ def test_large_circles_are_the_ones_that_tend_to_c() -> None:
 def test_a_figure_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     before = dict(mpl.rcParams)
     path = tmp_path / "families.svg"
-    family_figure(path, document(0.05), RADIUS)
+    draw = partial(family_figure, document(0.05), RADIUS)
+    assert write_formats(tmp_path / "families", lambda columns: draw(columns=columns), ["svg"]) == [path]
     first = path.read_bytes()
     assert first.endswith(b"</svg>\n")
-    family_figure(path, document(0.05), RADIUS)
+    write_formats(tmp_path / "families", lambda columns: draw(columns=columns), ["svg"])
     assert path.read_bytes() == first  # no date, no random names
     with use_style():
         figure = new_figure(1.0)
@@ -285,7 +287,7 @@ def _signs(text: str) -> list[str]:
 @pytest.mark.slow
 def test_everything_is_written(tmp_path: Path) -> None:
     seen: list[tuple[str, float, float]] = []
-    written = write_figures(tmp_path / "figures", lambda *step: seen.append(step), (".png",))
+    written = write_figures(tmp_path / "figures", lambda *step: seen.append(step), FigureOutput())
     assert sorted(written) == sorted((tmp_path / "figures").iterdir())
     assert [path.stem for path in written[:8]] == [f"figure-{k}" for k in range(2, 10)]
     assert [done for _, done, _ in seen] == list(range(9))

@@ -93,6 +93,7 @@ def test_a_fall_is_a_result(tmp_path: Path) -> None:
         (row,) = rows(tmp_path / "out", engine)
         assert row["status"] == "fell"
         assert f"fell at {row['fell_at']!r} s" in row["reason"]
+    (row,) = rows(tmp_path / "out", "mujoco-multipliers")
     assert row["position_error_max"] is not None
     # Its error is that up to the fall, and no error of a whole ride.
     assert summarise_sweep(plan, outcome)["engines"]["mujoco-multipliers"]["position_error"] is None

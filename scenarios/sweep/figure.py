@@ -1,0 +1,276 @@
+"""Figures of a sweep's data set: any quantity of its runs over any field, with all runs in one figure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from ...engines.format_version import read_version
+from ...engines.names import suggest_name
+from ...reports.measure import QUANTITIES
+from ..error import ScenarioError
+from ..files import FigureOutput, make_folder
+from ..run import read_json
+from ..scenario import find_unit, show_value
+from .plan import SweepPlan
+from .rows import METRICS, ROW_FACTS, TIMING
+from .store import MANIFEST, SWEEP_VERSION, TIMINGS, part_of
+
+if TYPE_CHECKING:
+    from ...reports.figures import SweepAxis, SweepRuns
+
+FIGURES = "figures"
+_ANY_ENGINE = "engines.*."  # begins a key that names a setting of each engine's own
+_UNITS = {"growth_rate": "1/s", "size": "m", "engine_time": "s", "task_time": "s"}  # of columns that are no metrics
+_TIMES = ("cpu_time", "real_time_factor", "engine_time", "task_time")
+_DIGITS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+
+
+@dataclass(frozen=True)
+class SweepPlot:
+    """A figure that ``--plot Y:X`` asks for.
+
+    Attributes
+    ----------
+    y, x : str
+        Columns of the data set; ``engines.*.KEY`` is a setting of each engine's own.
+    """
+
+    y: str
+    x: str
+
+    @property
+    def name(self) -> str:
+        """Name of its files, without ending."""
+        return f"{self.y}-over-{self.x}".replace("*", "any").replace("/", "-")
+
+
+def parse_plots(texts: Iterable[str]) -> list[SweepPlot]:
+    """Parse values of ``--plot``.
+
+    Raises
+    ------
+    ScenarioError
+        If one of them is not ``Y:X``.
+    """
+    plots = []
+    for text in texts:
+        y, colon, x = text.partition(":")
+        if not (y and colon and x) or ":" in x:
+            raise ScenarioError(
+                f"--plot {show_value(text)}: must be Y:X, e.g. position_error_max:motion.rear_rate or "
+                "position_error_max:engines.*.step"
+            )
+        plots.append(SweepPlot(y, x))
+    return plots
+
+
+def check_plots(plots: Iterable[SweepPlot], plan: SweepPlan) -> None:
+    """Refuse plots of columns that the data set of a sweep will not have, before anything runs.
+
+    Raises
+    ------
+    ScenarioError
+        With one line.
+    """
+    known = {key for task in plan.tasks for key in task.changes}
+    for plot in plots:
+        for column in (plot.y, plot.x):
+            _check_column(column, {**METRICS, **dict.fromkeys(_TIMES)}.keys() | known)
+
+
+def _check_column(column: str, known: Collection[str]) -> None:
+    patterns = {f"{_ANY_ENGINE}{key.split('.', 2)[2]}" for key in known if key.startswith("engines.")}
+    if column not in known and column not in patterns:
+        raise ScenarioError(
+            f"--plot: the sweep's rows have no {show_value(column)} ({suggest_name(column, [*known, *patterns])})"
+        )
+
+
+def read_sweep_folder(folder: Path) -> dict[str, Any]:
+    """Return the manifest of a finished sweep.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder is not of a sweep, or the sweep is not finished.
+    """
+    path = folder / MANIFEST
+    try:
+        manifest = read_json(path)
+        read_version(manifest, SWEEP_VERSION)
+    except FileNotFoundError as error:
+        raise ScenarioError(f"{folder}: is not the folder of a sweep: it has no {MANIFEST}") from error
+    except (OSError, ValueError, TypeError, AttributeError) as error:
+        raise ScenarioError(f"{path}: is not of a sweep: {show_value(str(error))}") from error
+    if not manifest.get("complete"):
+        raise ScenarioError(f"{folder}: the sweep is not finished: run its file with --out {folder} --resume first")
+    return manifest
+
+
+def write_sweep_figures(folder: Path, plots: Sequence[SweepPlot], output: FigureOutput) -> list[Path]:
+    """Draw figures of a finished sweep from its Parquet files.
+
+    Parameters
+    ----------
+    folder : Path
+        The sweep's folder; the figures are written into its subfolder `FIGURES`.
+    plots : sequence of SweepPlot
+    output : FigureOutput
+
+    Returns
+    -------
+    list of Path
+        Files written.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder is not that of a finished sweep, has no such column, or a column has no numbers.
+    """
+    from ...reports.figures import sweep_figure, write_formats
+
+    manifest = read_sweep_folder(folder)
+    title = str(manifest.get("title") or folder.resolve().name)
+    tables = _read_tables(folder, manifest["engines"])
+    known = {column for table in tables.values() for column in table.column_names}
+    written: list[Path] = []
+    for plot in plots:
+        for column in (plot.y, plot.x):
+            _check_column(column, known)
+        x_axis, y_axis, runs, joined = _select_runs(tables, plot)
+        make_folder(folder / FIGURES)
+        draw = partial(sweep_figure, title, x_axis, y_axis, runs, joined)
+        written += write_formats(folder / FIGURES / plot.name, draw, output.formats, output.columns)
+    return written
+
+
+def _read_tables(folder: Path, engines: Iterable[str]) -> dict[str, pa.Table]:
+    """Read the rows of each engine with their times, in the order of the sweep's file.
+
+    Raises
+    ------
+    ScenarioError
+        If a file is missing or cannot be read.
+    """
+    found = {}
+    try:
+        times = pq.ParquetFile(folder / TIMINGS).read(columns=["key", *_TIMES])
+        for engine in engines:
+            table = pq.ParquetFile(part_of(folder, engine)).read()
+            found[engine] = table.join(times, "key").sort_by("index")
+    except (OSError, pa.ArrowException, KeyError) as error:
+        raise ScenarioError(f"{folder}: its data set cannot be read: {show_value(str(error))}") from error
+    return found
+
+
+def _select_runs(
+    tables: Mapping[str, pa.Table], plot: SweepPlot
+) -> tuple[SweepAxis, SweepAxis, dict[str, SweepRuns], str]:
+    """Return both axes, the runs by engine, and what the runs on a line have in common."""
+    # Imported here, since a sweep without figures does not need matplotlib.
+    from ...reports.figures import SweepRuns
+
+    x, x_names = _read_values([_pick(table, plot.x, engine) for engine, table in tables.items()], plot.x, True)
+    y, _ = _read_values([_pick(table, plot.y, engine) for engine, table in tables.items()], plot.y, False)
+    varied = {engine: _list_varied(table, plot, engine) for engine, table in tables.items()}
+    runs = {
+        engine: SweepRuns(
+            x=x[k],
+            y=y[k],
+            whole=np.array([status == "done" for status in table.column("status").to_pylist()], bool),
+            lines=_name_lines(table, varied[engine]),
+        )
+        for k, (engine, table) in enumerate(tables.items())
+    }
+    shared = ", ".join(dict.fromkeys(key for keys in varied.values() for key in keys))
+    joined = f"a line: equal {shared}" if shared else ""
+    return _make_axis(plot.x, tables, x_names), _make_axis(plot.y, tables, ()), runs, joined
+
+
+def _pick(table: pa.Table, column: str, engine: str) -> list[Any]:
+    """Return a column's values in an engine's rows, None where it does not have it."""
+    name = column.replace(_ANY_ENGINE, f"engines.{engine}.", 1) if column.startswith(_ANY_ENGINE) else column
+    return table.column(name).to_pylist() if name in table.column_names else [None] * table.num_rows
+
+
+def _read_values(
+    columns: Sequence[Sequence[Any]], name: str, categories: bool
+) -> tuple[list[np.ndarray], tuple[str, ...]]:
+    """Return values as numbers, NaN for None; texts as positions in the list of those that there are.
+
+    Raises
+    ------
+    ScenarioError
+        If there are no values, or texts where categories are not allowed.
+    """
+    values = [value for column in columns for value in column if value is not None]
+    if not values:
+        raise ScenarioError(f"--plot: no row of the sweep has a value of {show_value(name)}")
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+        return [np.array([np.nan if v is None else v for v in column], float) for column in columns], ()
+    if not categories:
+        raise ScenarioError(f"--plot: {show_value(name)} has no numbers; only the X of Y:X may be text")
+    names = tuple(sorted({str(value) for value in values}))
+    return [np.array([np.nan if v is None else names.index(str(v)) for v in c], float) for c in columns], names
+
+
+def _list_varied(table: pa.Table, plot: SweepPlot, engine: str) -> list[str]:
+    """Return the fields beside those of the plot that differ between an engine's runs."""
+    fixed = {*ROW_FACTS, *METRICS, *TIMING, *(name.replace("*", engine) for name in (plot.x, plot.y))}
+    keys = [name for name in table.column_names if name not in fixed]
+    return [key for key in keys if len(table.column(key).unique()) > 1]
+
+
+def _name_lines(table: pa.Table, varied: Sequence[str]) -> np.ndarray:
+    """Return a text for each row with the values of the varied fields."""
+    columns = [table.column(key).to_pylist() for key in varied]
+    units = [_write_unit(find_unit(key)) for key in varied]
+    texts = [
+        ", ".join(f"{key} = {_format_value(value)}{unit}" for key, value, unit in zip(varied, row, units, strict=True))
+        for row in zip(*columns, strict=True)
+    ]
+    return np.array(texts if columns else [""] * table.num_rows)
+
+
+def _format_value(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _write_unit(unit: str | None) -> str:
+    """Return a unit behind a number, with exponents as such; nothing for a ratio."""
+    if unit in (None, "", "1"):
+        return ""
+    base, *powers = str(unit).split("^")
+    text = base
+    for power in powers:
+        digits = power[: len(power) - len(power.lstrip("-0123456789"))]
+        text += digits.translate(_DIGITS) + power[len(digits) :]
+    return f" {text}"
+
+
+def _make_axis(column: str, tables: Mapping[str, pa.Table], names: tuple[str, ...]) -> SweepAxis:
+    """Return an axis with a title of name and unit."""
+    from ...reports.figures import SweepAxis
+
+    quantity, part = (column, "") if column in QUANTITIES else column.rpartition("_")[::2]
+    given = False
+    if quantity in QUANTITIES and (not part or part in QUANTITIES[quantity].parts):
+        words = {"max": "largest ", "end": "final "}.get(part, "") + quantity.replace("_", " ")
+        unit: str | None = QUANTITIES[quantity].unit
+    elif column in METRICS or column in TIMING:
+        words, unit = column.replace("_", " "), _UNITS.get(column)
+    else:
+        keys = [column.replace("*", engine) for engine in tables] if column.startswith(_ANY_ENGINE) else [column]
+        units = {find_unit(key) for key in keys} - {None}
+        words, given = column.removeprefix(_ANY_ENGINE), True
+        unit = units.pop() if len(units) == 1 else None
+    shown = _write_unit(unit).strip()
+    return SweepAxis(f"{words} [{shown}]" if shown else words, given, names)
