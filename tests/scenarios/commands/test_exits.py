@@ -282,8 +282,8 @@ def test_a_ctrl_c_that_an_engine_swallows_still_ends_the_run(
             return trajectory
         raise AssertionError
 
-    def swallowing(name: str, values: Any) -> tuple[Engine, Settings]:
-        engine, settings = configure_engine(name, values)
+    def swallowing(name: str, values: Any, any_release: bool = False) -> tuple[Engine, Settings]:
+        engine, settings = configure_engine(name, values, any_release=any_release)
         return Altered(engine, after=swallow), settings
 
     monkeypatch.setattr(runner, "configure_engine", swallowing)
