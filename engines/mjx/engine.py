@@ -14,9 +14,11 @@ from ..engine import Problem, Progress, Trajectory, package_version
 from ..mujoco.engine import GIVES, assemble_trajectory, step_counts
 from ..mujoco.native import COMPARED_AT
 from ..mujoco.state import to_mujoco
+from ..releases import LibraryReach, refuse_releases
 from ..single_precision import SinglePrecision, SinglePrecisionVariant
 from .ground import choose_height
 from .process import process_kept
+from .releases import JACOBIAN_RATE, JAX, MJX
 from .settings import ArraySettings, MjxMultiplierSettings, MjxSettings
 
 S = TypeVar("S", bound=ArraySettings)
@@ -37,6 +39,8 @@ class MjxEngine(Generic[S]):
     gives : tuple of str
     single_precision : SinglePrecision or None
         How it rides in float32 what another engine rides in float64; None if no engine does.
+    reach : LibraryReach
+        The releases of MJX with which it rides.
     """
 
     name: str
@@ -45,6 +49,7 @@ class MjxEngine(Generic[S]):
     settings_source: str
     gives: tuple[str, ...] = GIVES
     single_precision: SinglePrecision | None = None
+    reach: LibraryReach = MJX
     takes_inputs = True
 
     @property
@@ -58,7 +63,8 @@ class MjxEngine(Generic[S]):
         return f"{package_version('mujoco-mjx')} (jax {package_version('jax')}, mujoco {package_version('mujoco')})"
 
     def check(self, problem: Problem, settings: Any) -> None:
-        """Refuse ground without a closed form, and output times that are not multiples of the step; see `Engine`."""
+        """Refuse untried releases, ground without a closed form, and output times between two steps; see `Engine`."""
+        refuse_releases(self.name, settings, self.reach, JAX)
         choose_height(problem.surface)
         step_counts(problem.times, settings.step)
 
@@ -89,6 +95,7 @@ class MjxEngine(Generic[S]):
         EngineError
             If the model is refused, a wheel has no contact point at the start, or the contact solver fails there.
         """
+        refuse_releases(self.name, settings, self.reach, JAX)
         counts = step_counts(problem.times, settings.step)
         with process_kept():
             from .ride import ride_in_mjx
@@ -114,4 +121,5 @@ MULTIPLIERS = MjxEngine(
     MjxMultiplierSettings,
     description="MJX's tree under the exact forces of rolling, without its contacts and integrators",
     settings_source="those of mujoco-multipliers: the suite's own choice",
+    reach=JACOBIAN_RATE,
 )

@@ -12,7 +12,9 @@ from typing import Any
 from ..engine import Problem, Progress, Trajectory, package_version
 from ..mujoco.engine import GIVES, assemble_trajectory, step_counts
 from ..mujoco.state import to_mujoco
+from ..releases import refuse_releases
 from ..single_precision import SinglePrecision, SinglePrecisionVariant
+from .releases import MUJOCO_WARP, WARP
 from .settings import WarpSettings
 
 
@@ -39,6 +41,7 @@ class WarpEngine:
     settings_source: str
     gives: tuple[str, ...] = GIVES
     single_precision: SinglePrecision | None = None
+    reach = MUJOCO_WARP
     takes_inputs = True
 
     @property
@@ -53,7 +56,8 @@ class WarpEngine:
         return f"{package_version('mujoco-warp')} (warp {warp}, mujoco {mujoco})"
 
     def check(self, problem: Problem, settings: Any) -> None:
-        """Refuse output times that are not multiples of the step, and a processor that is not there; see `Engine`."""
+        """Refuse untried releases, output times between two steps, and a processor that is not there; see `Engine`."""
+        refuse_releases(self.name, settings, MUJOCO_WARP, WARP)
         step_counts(problem.times, settings.step)
         if settings.device != "cpu":
             from .process import list_devices
@@ -89,6 +93,7 @@ class WarpEngine:
         EngineError
             If the model is refused, a wheel has no contact point at the start, or the contact solver fails there.
         """
+        refuse_releases(self.name, settings, MUJOCO_WARP, WARP)
         counts = step_counts(problem.times, settings.step)
         from .process import quiet_warp
 
