@@ -149,6 +149,22 @@ class LibraryReach:
         return f"{subject} needs {self.library} {since} or newer ({needs}), this is {self.version}"
 
 
+def refuse_releases(engine: str, settings: Settings, *reaches: LibraryReach) -> None:
+    """Refuse a ride with installed releases of libraries that are out of an engine's reach.
+
+    Raises
+    ------
+    UnsuitableProblem
+        With the reason.
+    """
+    from .engine import UnsuitableProblem  # that module imports this one
+
+    for reach in reaches:
+        refusal = reach.find_refusal(engine, settings)
+        if refusal is not None:
+            raise UnsuitableProblem(refusal)
+
+
 def split_adaptations(stated: Mapping[str, Any], own: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the settings that a trajectory states, and apart from them what was left out and replaced.
 

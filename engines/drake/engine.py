@@ -12,7 +12,7 @@ from ...reference.simulate import steps_per_output
 from ..contact_fields import observe_contact_fields
 from ..coordinates import coordinates_from_bodies, quaternions, start_on_turn
 from ..engine import Problem, Progress, Settings, Trajectory, UnsuitableProblem
-from ..releases import LibraryReach
+from ..releases import LibraryReach, refuse_releases
 from .releases import DRAKE
 from .settings import DrakeContactSettings, DrakeMultiplierSettings
 
@@ -61,9 +61,7 @@ class DrakeEngine(Generic[S]):
 
         See `velodrome.engines.engine.Engine`.
         """
-        refusal = self.reach.find_refusal(self.name, settings)
-        if refusal is not None:
-            raise UnsuitableProblem(refusal)
+        refuse_releases(self.name, settings, self.reach)
         steps_per_output(problem.times, settings.step)
         for wheel in WHEELS:
             if not getattr(problem.bicycle, f"{wheel}_wheel_Iyy") > 0:

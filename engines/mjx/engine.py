@@ -16,13 +16,11 @@ from ..mujoco.state import to_mujoco
 from ..single_precision import SinglePrecision, SinglePrecisionVariant
 from .ground import choose_height
 from .process import process_kept
+from .releases import JACOBIAN_RATE, JAX, MJX
 from .settings import MjxMultiplierSettings, MjxSettings
 
 if TYPE_CHECKING:
     from ..mujoco.ride import RideState
-
-PACKAGE = "mujoco-mjx"
-LIBRARIES = {"jax": "jax", "mujoco": "mujoco"}
 
 
 def _ride(problem: Problem, settings: Any, counts: list[int], progress: Progress) -> RideState:
@@ -39,8 +37,8 @@ def _refuse_unknown_ground(problem: Problem, settings: Any) -> None:
 ENGINE = PortEngine(
     "mjx",
     MjxSettings,
-    PACKAGE,
-    LIBRARIES,
+    MJX,
+    JAX,
     _ride,
     _refuse_unknown_ground,
     description="MJX, MuJoCo's port to JAX, with the model of mujoco-native",
@@ -55,8 +53,8 @@ ENGINE = PortEngine(
 MULTIPLIERS = PortEngine(
     "mjx-multipliers",
     MjxMultiplierSettings,
-    PACKAGE,
-    LIBRARIES,
+    JACOBIAN_RATE,
+    JAX,
     _ride,
     _refuse_unknown_ground,
     description="MJX's tree under the exact forces of rolling, without its contacts and integrators",

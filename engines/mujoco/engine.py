@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 
 from ..contact_fields import observe_contact_fields
-from ..engine import Problem, Progress, Trajectory, UnsuitableProblem
-from ..releases import LibraryReach
+from ..engine import Problem, Progress, Trajectory
+from ..releases import LibraryReach, refuse_releases
 from ..single_precision import AdvanceStates, SinglePrecision
 from .settings import StepSettings
 from .state import from_mujoco
@@ -87,9 +87,7 @@ class MujocoEngine(Generic[S]):
 
         See `velodrome.engines.engine.Engine`.
         """
-        refusal = self.reach.find_refusal(self.name, settings)
-        if refusal is not None:
-            raise UnsuitableProblem(refusal)
+        refuse_releases(self.name, settings, self.reach)
         step_counts(problem.times, settings.step)
 
     def step_noise(self, settings: Any) -> float:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ..engine import Problem, Progress, Trajectory, package_version
+from ..releases import LibraryReach, refuse_releases
 from ..single_precision import SinglePrecision
 from .engine import GIVES, assemble_trajectory, step_counts
 from .ports import BatchSettings
@@ -25,10 +26,10 @@ class PortEngine(Generic[S]):
     ----------
     name : str
     settings : type
-    package : str
-        The port's package, whose version is the engine's.
-    libraries : mapping
-        Short names of the libraries that the port needs, with their packages; their versions stand beside its own.
+    reach : LibraryReach
+        The releases of the port with which it rides; the port's version is the engine's.
+    compiler : LibraryReach
+        The releases of the library that compiles the port.
     ride : callable
         Function of a problem, settings, numbers of steps up to the outputs and progress that rides. It imports the
         port when it is called, so that listing the engines does not load the library.
@@ -45,8 +46,8 @@ class PortEngine(Generic[S]):
 
     name: str
     settings: type[S]
-    package: str
-    libraries: Mapping[str, str]
+    reach: LibraryReach
+    compiler: LibraryReach
     ride: Callable[[Problem, Any, list[int], Progress], RideState]
     refuse: Callable[[Problem, Any], None]
     description: str
@@ -62,12 +63,13 @@ class PortEngine(Generic[S]):
 
     @property
     def version(self) -> str:
-        """Version of the port, with those of the libraries that it needs."""
-        others = ", ".join(f"{short} {package_version(package)}" for short, package in self.libraries.items())
-        return f"{package_version(self.package)} ({others})"
+        """Version of the port, with those of the library that compiles it and of MuJoCo, which builds its model."""
+        compiler = f"{self.compiler.library.lower()} {self.compiler.version}"
+        return f"{self.reach.version} ({compiler}, mujoco {package_version('mujoco')})"
 
     def check(self, problem: Problem, settings: Any) -> None:
-        """Refuse what the port cannot ride, and output times that are not multiples of the step; see `Engine`."""
+        """Refuse untried releases, what the port cannot ride, and output times between two steps; see `Engine`."""
+        refuse_releases(self.name, settings, self.reach, self.compiler)
         self.refuse(problem, settings)
         step_counts(problem.times, settings.step)
 
@@ -94,7 +96,7 @@ class PortEngine(Generic[S]):
         Raises
         ------
         UnsuitableProblem
-            If the port does not know the ground.
+            If a release is out of reach, or the port does not know the ground.
         ValueError
             If an output time lies between two steps, or the port cannot ride with these settings here.
         EngineError

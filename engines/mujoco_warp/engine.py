@@ -12,6 +12,7 @@ from ..engine import Problem, Progress
 from ..mujoco.port_engine import PortEngine
 from ..mujoco.state import to_mujoco
 from ..single_precision import SinglePrecision, SinglePrecisionVariant
+from .releases import MUJOCO_WARP, WARP
 from .settings import WarpSettings
 
 if TYPE_CHECKING:
@@ -39,8 +40,8 @@ def _refuse_missing_device(problem: Problem, settings: Any) -> None:
 ENGINE = PortEngine(
     "mujoco-warp",
     WarpSettings,
-    "mujoco-warp",
-    {"warp": "warp-lang", "mujoco": "mujoco"},
+    MUJOCO_WARP,
+    WARP,
     _ride,
     _refuse_missing_device,
     description="MuJoCo Warp, MuJoCo's port to Warp in single precision, with the model of mujoco-native",

@@ -9,7 +9,9 @@ from ...reference.kinematics import quaternions
 from ...reference.simulate import steps_per_output
 from ..contact_fields import observe_contact_fields
 from ..coordinates import start_on_turn
-from ..engine import Problem, Progress, Trajectory, UnsuitableProblem, package_version
+from ..engine import Problem, Progress, Trajectory, UnsuitableProblem
+from ..releases import refuse_releases
+from .releases import PINOCCHIO
 from .settings import ROUND_OFF, ConstraintSettings
 
 # Least eigenvalue of a mass matrix with a unit diagonal. The benchmark's is 1e-2, that of a bicycle with wheels of 1 mg
@@ -48,15 +50,17 @@ class PinocchioEngine:
     )
     gives = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
     settings = ConstraintSettings
+    reach = PINOCCHIO
     takes_inputs = True
 
     @property
     def version(self) -> str:
         """Version of Pinocchio, whose package is named pin."""
-        return package_version("pin")
+        return self.reach.version
 
     def check(self, problem: Problem, settings: ConstraintSettings) -> None:
-        """Refuse bicycles without inertia and output times that are not multiples of the step; see `Engine.check`."""
+        """Refuse untried releases, bicycles without inertia, and output times between two steps; see `Engine.check`."""
+        refuse_releases(self.name, settings, PINOCCHIO)
         require_mass_matrix(problem)
         steps_per_output(problem.times, settings.step)
 
@@ -77,6 +81,7 @@ class PinocchioEngine:
         EngineError
             If a wheel has no contact at the start, or the solver fails there.
         """
+        refuse_releases(self.name, settings, PINOCCHIO)
         from .ride import ride_bicycle
         from .tree import from_pinocchio
 

@@ -35,7 +35,7 @@ from velodrome.scenarios.scenario.schema import load_scenario
 from velodrome.scenarios.scenario.start import make_start
 
 # Names of the suite's engines whose releases it knows begin so; other packages' may be installed too.
-OWN = ("drake", "exudyn", "mujoco")
+OWN = ("drake", "exudyn", "mjx", "mujoco", "pinocchio")
 DECLARED = {name: reach for name in engine_names() if (reach := find_reach(load_engine(name))) is not None}
 
 
