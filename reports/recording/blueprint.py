@@ -25,7 +25,7 @@ _VERDICT_HEIGHT = 84.0  # three lines of text in the smallest view [points]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Layout:
+class RecordingLayout:
     """What the views of a recording show.
 
     Attributes
@@ -88,7 +88,7 @@ def _place_eye(camera: Camera) -> rrb.EyeControls3D:
     )
 
 
-def _show_ride(layout: Layout) -> rrb.Spatial3DView:
+def _show_ride(layout: RecordingLayout) -> rrb.Spatial3DView:
     """Make the view of all engines."""
     followed = layout.overview.followed
     return rrb.Spatial3DView(
@@ -102,7 +102,7 @@ def _show_ride(layout: Layout) -> rrb.Spatial3DView:
     )
 
 
-def _show_engine(layout: Layout, engine: str) -> rrb.Spatial3DView:
+def _show_engine(layout: RecordingLayout, engine: str) -> rrb.Spatial3DView:
     """Make the view of one engine from behind, which turns with its yaw only, with a ghost of another one."""
     ghost = layout.ghosts.get(engine)
     visible = [engine] if ghost is None else [engine, ghost]
@@ -123,7 +123,7 @@ def _show_engine(layout: Layout, engine: str) -> rrb.Spatial3DView:
     )
 
 
-def _show_legend(layout: Layout) -> rrb.Spatial2DView:
+def _show_legend(layout: RecordingLayout) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(
         name="Engines",
         origin="/legend",
@@ -133,7 +133,7 @@ def _show_legend(layout: Layout) -> rrb.Spatial2DView:
     )
 
 
-def _show_plot(layout: Layout, plot: Plot) -> rrb.TimeSeriesView:
+def _show_plot(layout: RecordingLayout, plot: Plot) -> rrb.TimeSeriesView:
     """Make the view of a plot. It has no legend, which would cover curves: all views share the one below the ride."""
     axis, beyond = find_range(plot, layout.curves[plot.key], layout.staying)
     said = f"; {', '.join(beyond)} beyond" if beyond else ""
@@ -148,7 +148,7 @@ def _show_plot(layout: Layout, plot: Plot) -> rrb.TimeSeriesView:
     )
 
 
-def _show_plots(layout: Layout, name: str, plots: Sequence[Plot], columns: int) -> rrb.Container | None:
+def _show_plots(layout: RecordingLayout, name: str, plots: Sequence[Plot], columns: int) -> rrb.Container | None:
     """Make a tab of the plots that have a curve; None if there is none."""
     views = [_show_plot(layout, plot) for plot in plots if layout.curves.get(plot.key)]
     if not views:
@@ -156,7 +156,7 @@ def _show_plots(layout: Layout, name: str, plots: Sequence[Plot], columns: int) 
     return rrb.Vertical(*views, name=name) if columns == 1 else rrb.Grid(*views, grid_columns=columns, name=name)
 
 
-def make_blueprint(layout: Layout) -> rrb.Blueprint:
+def make_blueprint(layout: RecordingLayout) -> rrb.Blueprint:
     """Make the layout of a recording, paused at the start.
 
     On the left the ride, side by side and one at a time, above the legend; on the right the verdict above curves and

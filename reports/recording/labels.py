@@ -24,7 +24,7 @@ def measure_labels(names: Sequence[str]) -> np.ndarray:
     return np.array([[LETTER * len(name) + FRAME, HEIGHT] for name in names])
 
 
-def place_labels(anchors: np.ndarray, reach: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+def place_names(anchors: np.ndarray, reach: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Choose a place for every label near its bicycle at every time, so that no two labels overlap.
 
     The labels take their places in turn: each takes the first of a list of places around its bicycle that no earlier

@@ -12,7 +12,7 @@ from ...reference.bicycle import Bicycle
 from ...reference.kinematics import YAW
 from ..drawing import GroundMesh, to_nanoseconds
 from .camera import Camera, fit_camera
-from .labels import HANG, HEIGHT, measure_labels, place_labels
+from .labels import HANG, HEIGHT, measure_labels, place_names
 
 _AZIMUTH, _ELEVATION = np.radians(-105.5), np.radians(38.0)  # of the camera, from a ride around the axis
 _STEEPEST_ELEVATION = np.radians(80.0)
@@ -153,7 +153,7 @@ def name_bicycles(trajectories: Mapping[str, Trajectory], overview: Overview, ti
     camera = overview.camera
     anchors, depth = camera.project(seen)
     reach = np.nan_to_num(camera.scale * _HALF_HEIGHT / np.where(depth > 0, depth, np.nan))
-    placed = place_labels(anchors, reach, measure_labels([max(texts[name], key=len) for name in order]))
+    placed = place_names(anchors, reach, measure_labels([max(texts[name], key=len) for name in order]))
     hook = placed + np.array([0.0, HEIGHT / 2 + HANG])
     # The line ends at the side of the label that faces the bicycle. A label hangs on its point by as many points in
     # every view: the line's end is right in one larger than the smallest, and within the label's frame in that one.

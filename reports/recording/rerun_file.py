@@ -17,7 +17,7 @@ from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.surface import Surface
 from ..drawing import NANOSECONDS, PLOTS, Colour, RideData, assign_colours, body_meshes, make_ground, mode_plots
 from ..measure import find_modes
-from .blueprint import Layout, chase_camera, make_blueprint
+from .blueprint import RecordingLayout, chase_camera, make_blueprint
 from .clock import Clock
 from .curves import find_curves, send_curve
 from .legend import place_legend
@@ -127,7 +127,7 @@ def _write_stream(
     names = name_bicycles(shown, overview, Clock(shown.values()).times / NANOSECONDS)
     legend = {name: describe_end(name, run) for name, run in ride.trajectories.items()}
     middles, size = place_legend(tuple(legend.values()))
-    layout = Layout(
+    layout = RecordingLayout(
         engines=tuple(ride.trajectories),
         ghosts=_choose_ghosts(ride),
         chase={name: mirror_camera(chase_camera(), run) for name, run in ride.trajectories.items()},

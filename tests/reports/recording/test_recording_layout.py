@@ -17,7 +17,7 @@ from velodrome.reference.kinematics import LEAN
 from velodrome.reference.surface import Plane
 from velodrome.reports.drawing import make_ground
 from velodrome.reports.recording.camera import FIELD_OF_VIEW, VIEW, Camera, fit_camera
-from velodrome.reports.recording.labels import HANG, measure_labels, place_labels
+from velodrome.reports.recording.labels import HANG, measure_labels, place_names
 from velodrome.reports.recording.legend import place_legend
 from velodrome.reports.recording.overview import choose_overview, mirror_camera
 from velodrome.reports.recording.rerun_file import write_recording
@@ -106,10 +106,12 @@ def test_no_name_covers_another_one(
     size: tuple[float, float], views: Views, view: str, content: Content, runs: dict[str, Trajectory]
 ) -> None:
     """The labels' boxes by the viewer's camera, at every time at which their places are set."""
-    camera, spots, sizes, when = eye(views, view), {}, {}, np.empty(0)
+    camera, spots, sizes = eye(views, view), {}, {}
+    when, _, _ = content.values(f"/world/{REFERENCE}/here/name", "Points3D:positions")
     for name in runs:
         time, _, at = content.values(f"/world/{name}/here", "Transform3D:translation")
-        when, _, beside = content.values(f"/world/{name}/here/name", "Points3D:positions")
+        own, _, beside = content.values(f"/world/{name}/here/name", "Points3D:positions")
+        np.testing.assert_array_equal(own, when)
         spots[name] = at[np.isin(time, when)] + beside
         sizes[name] = measure_labels([f"{name} (ended)" if name == FELL else name])[0]
     assert len(when) > 30
@@ -143,13 +145,13 @@ def test_a_line_leads_from_every_name_to_its_bicycle(content: Content, runs: dic
 def test_labels_never_overlap(places: list[tuple[float, float]], names: list[str], reach: float) -> None:
     anchors = np.array([places])
     sizes = measure_labels(names)[: len(places)]
-    placed = place_labels(anchors, np.full(anchors.shape[:2], reach), sizes)
+    placed = place_names(anchors, np.full(anchors.shape[:2], reach), sizes)
     assert overlap(placed[0], sizes) == []
 
 
 def test_a_bicycle_behind_the_camera_has_no_place_and_takes_none() -> None:
     anchors = np.array([[[np.nan, np.nan], [0.0, 0.0]]])
-    placed = place_labels(anchors, np.zeros((1, 2)), measure_labels(["one", "two"]))
+    placed = place_names(anchors, np.zeros((1, 2)), measure_labels(["one", "two"]))
     assert np.isnan(placed[0, 0]).all()
     assert np.isfinite(placed[0, 1]).all()
 

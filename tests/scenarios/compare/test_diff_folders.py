@@ -20,7 +20,9 @@ from rich.console import Console
 from tests.sealing import age_folder, change_scenario, contents, sealed
 from velodrome.engines.storage import read_trajectory, write_trajectory
 from velodrome.scenarios.commands.present_diff import show_diff
-from velodrome.scenarios.compare.folders import diff_runs, read_pair, write_diff
+from velodrome.scenarios.compare.differences import DIFFERS, TO_THE_BIT, WITHIN_ROUND_OFF
+from velodrome.scenarios.compare.folders import _label_rides, diff_runs, read_pair, write_diff
+from velodrome.scenarios.compare.markdown import diff_summary, diff_verdict
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run.runner import plan_run, run_plan
 from velodrome.scenarios.scenario.schema import load_scenario
@@ -105,13 +107,51 @@ def test_document_page_and_recording_are_written(folder: Path, halved: Path, tmp
     assert "Distance between both rides" in page  # the figure
     entities = {chunk.entity_path for chunk in RrdReader(str(paths[3])).stream()}
     roots = {re.split(r"(?<!\\)/", entity)[2] for entity in entities if entity.startswith("/world/")}
-    # The runs' names, with every sign that a path gives a meaning of its own escaped. Folders that were made in the
-    # same second have their parents' names too.
-    names = [f"{NATIVE}\\ \\@\\ {run.name}".replace("/", "\\/") for run in (pair.before, pair.after)]
+    # What tells the rides apart, with every sign that a path gives a meaning of its own escaped.
+    names = [f"{NATIVE}\\ \\@\\ step\\ {step}" for step in (0.002, 0.001)]
     assert roots == {"reference", "ground", *names}
     assert [entity for entity in entities if entity.startswith("/plots/log_position_change/")] == [
         f"/plots/log_position_change/tested/{names[1]}"
     ]
+
+
+@pytest.mark.parametrize(
+    ("engine", "entry", "labels"),
+    [
+        ("exudyn", {"verdict": TO_THE_BIT, "version": ["1.9", "1.13"]}, ("exudyn", "exudyn")),
+        ("reference", {"verdict": WITHIN_ROUND_OFF, "version": ["1", "1"]}, ("reference", "reference")),
+        ("exudyn", {"version": ["1.9", "1.13"], "settings": {"step": [1, 2]}}, ("exudyn @ 1.9", "exudyn @ 1.13")),
+        (
+            "exudyn",
+            {"settings": {"step": [0.002, 0.001], "method": ["a", "b"]}},
+            ("exudyn @ step 0.002, method a", "exudyn @ step 0.001, method b"),
+        ),
+        (
+            "exudyn",
+            {"settings": {name: [1, 2] for name in ("a", "b", "c")}},
+            ("exudyn @ before", "exudyn @ after"),
+        ),
+        ("reference", {}, ("reference @ before", "reference @ after")),
+    ],
+)
+def test_rides_are_named_by_what_tells_them_apart(engine: str, entry: dict[str, Any], labels: tuple[str, str]) -> None:
+    assert _label_rides(engine, {"verdict": DIFFERS, "version": ["1", "1"], "settings": {}} | entry) == labels
+
+
+def test_a_recording_of_two_runs_says_which_they_are_and_what_is_drawn_once(folder: Path, halved: Path) -> None:
+    pair = read_pair(folder, halved)
+    found = diff_runs(pair)
+    assert diff_verdict(found).split("\n\n") == [
+        "**The engines in both runs are not the same.**",
+        f"before: {pair.before.name}; after: {pair.after.name}",
+        "The same to the bit, drawn once: reference\n",
+    ]
+    lines = diff_summary(found).splitlines()
+    assert lines[0] == f"# {found['title']}"
+    position = found["engines"][NATIVE]["position_difference"]
+    assert f"| {NATIVE} | {position['max']:.4g} | {position['exceeds_at']:.4g} | differs |" in lines
+    assert "| reference | 0 | – | same to the bit |" in lines
+    assert "- step 0.002 -> 0.001" in lines
 
 
 def test_one_engine_beside_the_reference(folder: Path, halved: Path) -> None:

@@ -24,7 +24,7 @@ from velodrome.scenarios.cli import app
 from velodrome.scenarios.gate import checks as gate
 from velodrome.scenarios.gate import sample as gate_sample
 from velodrome.scenarios.run.folder import RunPlan
-from velodrome.scenarios.run.runner import configure_engine, plan_run, run_plan
+from velodrome.scenarios.run.runner import RunOutcome, configure_engine, plan_run, run_plan
 from velodrome.scenarios.scenario.schema import Gate, library_names, load_scenario
 
 OWN = "own"
@@ -37,17 +37,16 @@ def plan_with(engine: Engine, name: str = "q2-plus", duration: float = 0.5) -> R
     return replace(plan, engines=plan.engines | {OWN: (engine, plan.engines[REFERENCE][1])})
 
 
-@pytest.fixture(autouse=True)
-def no_recording(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out the recording, which takes the longest."""
-    monkeypatch.setattr("velodrome.scenarios.run.runner.write_run_recording", lambda *_: None)
+def ride(plan: RunPlan, out: Path) -> RunOutcome:
+    """What comes of a run without a recording, which takes the longest."""
+    return run_plan(plan, out, lambda *_: None, lambda _: None, recording=False)
 
 
 @pytest.mark.parametrize("what", CONTRADICTIONS)
 def test_a_run_names_every_report_that_contradicts_the_coordinates(what: str, tmp_path: Path) -> None:
     after, named = CONTRADICTIONS[what]
     inner, _ = configure_engine(REFERENCE, {})
-    outcome = run_plan(plan_with(Altered(inner, after=after, called=OWN)), tmp_path, lambda *_: None, lambda _: None)
+    outcome = ride(plan_with(Altered(inner, after=after, called=OWN)), tmp_path)
     assert not outcome.failures
     measured = contents(outcome.folder / "metrics.json")
     assert measured[REFERENCE]["inconsistent_reports"] == []
@@ -72,7 +71,7 @@ def test_an_engine_that_reports_nothing_has_slip_gaps_and_energies(tmp_path: Pat
     inner, _ = configure_engine(REFERENCE, {})
     optional = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
     silent = Altered(inner, after=lambda one: replace(one, **dict.fromkeys(optional)), called=OWN)
-    measured = run_plan(plan_with(silent), tmp_path, lambda *_: None, lambda _: None).metrics[OWN]
+    measured = ride(plan_with(silent), tmp_path).metrics[OWN]
     assert measured["max_slip"] < 1e-13
     assert measured["max_gap"] < 1e-12
     assert measured["energy_drift"] < 1e-12
