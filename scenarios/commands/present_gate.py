@@ -41,12 +41,16 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed
             Column("moved most,\nagainst its limit", moved, right=False),
         ]
         print_table(console, columns)
+    changes = {(name, one.engine): one.reason for name, one in verdicts if one.quantity == CHANGES}
     for name, verdict in verdicts:
         if verdict.told:
-            # That the version or a setting is another is no verdict on a quantity.
-            what = "" if verdict.quantity == CHANGES else f"{verdict.quantity}: {status_word(verdict)}: "
-            style = "default" if verdict.quantity == CHANGES else STATUS_STYLES[verdict.status]
-            print_words(console, f"{name}: {verdict.engine}: {what}{verdict.reason}", style)
+            line, style = f"{name}: {verdict.engine}: {verdict.reason}", "default"
+            # That the version or a setting is another is no verdict on a quantity. It has a line of its own.
+            if verdict.quantity != CHANGES:
+                reason = verdict.reason.replace(f"; {changes.get((name, verdict.engine))}", "")
+                line = f"{name}: {verdict.engine}: {verdict.quantity}: {status_word(verdict)}: {reason}"
+                style = STATUS_STYLES[verdict.status]
+            print_words(console, line, style)
     if not renewed:
         _show_outcome(console, [verdict for _, verdict in verdicts])
 

@@ -52,7 +52,8 @@ def paper_command(
     figures = parse_figure_output(formats, columns, None if out is not None else "--out", ("svg", "png"))
     with ProgressBars() as progress:
         from ..files import make_folder
-        from ..paper import known_discrepancies, ledger_document, make_ledger, show_ledger, write_paper
+        from ..paper import known_discrepancies, ledger_document, make_ledger, write_paper
+        from .present_paper import show_ledger
 
         if out is not None:
             make_folder(out)  # first, so that half a minute of work is not lost if it fails

@@ -2,8 +2,22 @@
 
 from .claims import make_ledger
 from .figures.folder import write_paper
-from .ledger import ledger_document
+from .ledger import DEPENDS, FAILS, REPRODUCED, ROUNDS, TRUNCATED, UNTESTABLE, LedgerLine, ledger_document
 from .printed import known_discrepancies
-from .table import show_ledger
+from .table import describe_fault, ledger_summary
 
-__all__ = ["known_discrepancies", "ledger_document", "make_ledger", "show_ledger", "write_paper"]
+__all__ = [
+    "DEPENDS",
+    "FAILS",
+    "REPRODUCED",
+    "ROUNDS",
+    "TRUNCATED",
+    "UNTESTABLE",
+    "LedgerLine",
+    "describe_fault",
+    "known_discrepancies",
+    "ledger_document",
+    "ledger_summary",
+    "make_ledger",
+    "write_paper",
+]

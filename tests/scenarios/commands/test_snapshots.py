@@ -8,6 +8,7 @@ difference.
 from __future__ import annotations
 
 import io
+import json
 import os
 import re
 import sys
@@ -23,11 +24,13 @@ from velodrome.scenarios.commands.present_gate import show_verdicts
 from velodrome.scenarios.commands.present_history import show_history
 from velodrome.scenarios.commands.present_league import show_league
 from velodrome.scenarios.commands.present_motions import show_circular, show_critical, show_families
+from velodrome.scenarios.commands.present_paper import show_ledger
 from velodrome.scenarios.commands.present_precision import show_precision
 from velodrome.scenarios.commands.present_show import show_document
 from velodrome.scenarios.commands.present_sweep import show_summary
 from velodrome.scenarios.commands.run import show_list
 from velodrome.scenarios.gate import Verdict
+from velodrome.scenarios.paper.ledger import SelfCheck, below, claim_line, figure_line, source
 
 WIDTHS = (60, 80, 120)
 COLOURED = 80  # width of the coloured snapshot
@@ -47,6 +50,20 @@ def show_gate(name: str) -> Show:
     return show
 
 
+def show_paper(console: Console) -> None:
+    seen = source("something", json.dumps)
+    known = SelfCheck("residual of the equations", 1e-14, 1e-12)
+    near, far = below("distance from the cusp", 1e-7, 2e-3, "m"), below("distance from the cusp", 0.3, 2e-3, "m")
+    lines = [
+        figure_line("3", "the rear rate of Q2", "17.2", 17.2122, 1e-12, seen),
+        figure_line("3", "the steer angle of Q2", "2.78", 2.7857, 1e-12, seen),
+        claim_line("4.2", "the cusps of families 2 and 4 meet", [near], "they meet", seen, [known]),
+        claim_line("5", "the circles of family 3 can be ridden", [far], "none can", seen, [known]),
+    ]
+    show_ledger(console, lines, [], whole=True)
+    show_ledger(console, lines, ["5: the circles of family 3 can be ridden: does not hold, though known to"])
+
+
 SHOWN: dict[str, Show] = {
     "list": lambda console: show_list(console, **stored("list")),
     "show": lambda console: show_document(console, stored("show")),
@@ -60,6 +77,7 @@ SHOWN: dict[str, Show] = {
     "history": lambda console: show_history(console, stored("history")),
     "circular": lambda console: show_circular(console, stored("circular")),
     "families": lambda console: show_families(console, stored("families")),
+    "paper": show_paper,
     "critical": lambda console: show_critical(console, stored("critical")),
 }
 ENGINES: dict[str, Any] = {

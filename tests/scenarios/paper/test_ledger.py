@@ -7,6 +7,7 @@ import pytest
 from rich.console import Console
 
 from tests.literature import published
+from velodrome.scenarios.commands.present_paper import show_ledger
 from velodrome.scenarios.paper.ledger import (
     DEPENDS,
     FAILS,
@@ -28,7 +29,7 @@ from velodrome.scenarios.paper.ledger import (
     untestable_line,
 )
 from velodrome.scenarios.paper.printed import read_printed
-from velodrome.scenarios.paper.table import ledger_markdown, show_ledger
+from velodrome.scenarios.paper.table import ledger_markdown
 
 GOOD, BAD = SelfCheck("residual", 1e-14, 1e-12), SelfCheck("residual", 1e-3, 1e-12)
 HOLDS, FALLS = below("a length", 1.0, 2.0, "m"), below("a length", 3.0, 2.0, "m")
