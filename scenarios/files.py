@@ -33,6 +33,9 @@ class FigureOutput:
     columns: int = 2
 
 
+DEFAULT_FIGURES = FigureOutput()
+
+
 def make_folder(out: Path) -> None:
     """Make the folder that ``--out`` names if it does not exist.
 

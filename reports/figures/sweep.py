@@ -21,6 +21,7 @@ _DECADES = 2.0  # span of positive values from which their axis is logarithmic
 _MARGIN = 0.06  # of the axes beyond the values, as a share of their span
 _EQUAL_RATIOS = 1e-6  # relative spread of the ratios of values that are spaced geometrically
 _MOST_STYLES = 4
+_MOST_MARKS = 5000  # of an engine; more are stored as pixels, since files would take many megabytes
 _STYLES = ("-", "--", ":", "-.")
 
 
@@ -183,11 +184,13 @@ def _assign_styles(runs: Mapping[str, SweepRuns]) -> dict[str, str]:
 
 def _draw_lines(axes: Axes, runs: SweepRuns, shade: Any, styles: Mapping[str, str]) -> None:
     """Join the runs that differ in x alone; a line is interrupted where a run is absent or did not last."""
-    for text in np.unique(runs.lines):
-        own = np.flatnonzero((runs.lines == text) & np.isfinite(runs.x))
-        order = own[np.argsort(runs.x[own], kind="stable")]
+    placed = np.flatnonzero(np.isfinite(runs.x))
+    texts, line = np.unique(runs.lines[placed], return_inverse=True)
+    sorted_runs = placed[np.lexsort((runs.x[placed], line))]
+    counts = np.bincount(line, minlength=len(texts))
+    for text, order in zip(texts, np.split(sorted_runs, np.cumsum(counts)[:-1]), strict=False):
         y = np.where(runs.whole[order], runs.y[order], np.nan)
-        if np.isfinite(y).sum() > 1 and len(np.unique(runs.x[order])) == len(order):
+        if np.isfinite(y).sum() > 1 and np.all(np.diff(runs.x[order]) > 0):
             axes.plot(runs.x[order], y, color=shade, lw=0.9, ls=styles.get(str(text), "-"), gid="line")
 
 
@@ -195,7 +198,8 @@ def _draw_marks(axes: Axes, runs: SweepRuns, shade: Any, marker: str) -> None:
     """Draw a mark for each run: filled if it lasted, open if not, a cross at the lower edge if it has no value."""
     drawn = _drawable(runs)
     whole, early = drawn & runs.whole, drawn & ~runs.whole
-    look: dict[str, Any] = {"ls": "", "marker": marker, "color": shade, "ms": 3.5 if len(runs.x) < 300 else 2.0}
+    size, many = (3.5 if len(runs.x) < 300 else 2.0), len(runs.x) > _MOST_MARKS
+    look: dict[str, Any] = {"ls": "", "marker": marker, "color": shade, "ms": size, "rasterized": many}
     axes.plot(runs.x[whole], runs.y[whole], **look, gid="whole")
     if early.any():  # the layout engine would place an empty line, which is not clipped, at the figure's corner
         x, y = np.clip(runs.x[early], *axes.get_xlim()), np.clip(runs.y[early], *axes.get_ylim())

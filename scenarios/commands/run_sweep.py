@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ...engines.names import suggest_name
 from ..error import ScenarioError
-from ..files import FigureOutput
+from ..files import DEFAULT_FIGURES, FigureOutput
 from ..scenario import show_value
 from ..sweep import (
     STATUSES,
@@ -43,7 +43,7 @@ def run_sweep_command(
     retry: Sequence[str] = (),
     *,
     plots: Sequence[str] = (),
-    output: FigureOutput = FigureOutput(),  # noqa: B008
+    output: FigureOutput = DEFAULT_FIGURES,
 ) -> int:
     """Run a sweep file, or its missing runs, and print a summary.
 

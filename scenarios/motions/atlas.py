@@ -14,7 +14,7 @@ from ...reference.atlas import ATLAS_SIZE, Atlas, Boundary, compute_atlas, spaci
 from ...reference.rideability import OBSTACLES
 from ...reference.stability import VARIABLES
 from ..error import MissingMotionError, ScenarioError
-from ..files import FigureOutput, make_folder, write_json
+from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json
 from ..scenario import BicycleFile, name_bicycle
 from .families import check_inertia, critical_entry
 
@@ -43,7 +43,7 @@ def make_atlas(
     size: int = ATLAS_SIZE,
     largest: float = 1.0,
     progress: Callable[[float], None] = lambda _: None,
-    figures: FigureOutput = FigureOutput(),  # noqa: B008
+    figures: FigureOutput = DEFAULT_FIGURES,
 ) -> dict[str, Any]:
     """Compute the atlas and write ``atlas.parquet``, ``boundaries.json`` and the figures into a folder.
 

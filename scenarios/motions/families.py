@@ -24,7 +24,7 @@ from ...reference.special import SpecialPoint, special_points
 from ...reference.surface import Paraboloid, Surface, SurfaceOfRevolution
 from ...reports.measure import to_number
 from ..error import ScenarioError
-from ..files import FigureOutput, make_folder, write_json
+from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json
 from ..scenario import describe_missing_motion, find_unit, make_bowl, name_bicycle, name_surface
 
 if TYPE_CHECKING:
@@ -384,7 +384,7 @@ def _entry_or_null(point: CriticalPoint | None) -> dict[str, Any] | None:
     return None if point is None else critical_entry(point)
 
 
-def write_families(document: Mapping[str, Any], out: Path, output: FigureOutput) -> list[Path]:
+def write_families(document: Mapping[str, Any], out: Path, output: FigureOutput = DEFAULT_FIGURES) -> list[Path]:
     """Write the document and its figure into a folder, which is made if it does not exist, and return their paths.
 
     Raises

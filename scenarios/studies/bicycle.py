@@ -23,7 +23,7 @@ from ...reference.upright import (
     weave_speed,
 )
 from ..error import ScenarioError
-from ..files import FigureOutput, make_folder, write_json
+from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json
 from ..scenario import BicycleFile
 
 
@@ -136,7 +136,7 @@ def study_bicycle(source: BicycleFile, speeds: np.ndarray, steer_damping: float 
     )
 
 
-def write_bicycle(study: BicycleStudy, out: Path, output: FigureOutput) -> list[Path]:
+def write_bicycle(study: BicycleStudy, out: Path, output: FigureOutput = DEFAULT_FIGURES) -> list[Path]:
     """Write the document and the figure of a study into a folder, and return their paths."""
     # Imported here, since the document does not need matplotlib.
     from ...reports.figures import eigenvalue_figure, write_formats

@@ -39,7 +39,7 @@ from ...reports.measure import (
     measure_step_errors,
 )
 from ..error import ScenarioError
-from ..files import FigureOutput, make_folder, write_json
+from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json
 from ..run import RunPlan, RunWatch, Trace, configure_engine, installed_engines, library_versions, plan_run
 from ..scenario import Scenario, choose_engines, join_complaints, make_start, name_bicycle
 
@@ -450,7 +450,7 @@ def _measure_reference(plan: RunPlan, double: _Double, watch: RunWatch) -> list[
     ]
 
 
-def write_float32(document: Mapping[str, Any], out: Path, output: FigureOutput) -> list[Path]:
+def write_float32(document: Mapping[str, Any], out: Path, output: FigureOutput = DEFAULT_FIGURES) -> list[Path]:
     """Write the document and its figure into a folder, which is made if it does not exist.
 
     Raises

@@ -18,7 +18,7 @@ from ...reports.drawing import find_unsteadiness
 from ...reports.measure import IDENTIFY_LEVELS as IDENTIFY_LEVELS
 from ...reports.measure import Identified, Level, comparison_horizon, eigenvalue_document, engine_document, identify
 from ..error import ScenarioError
-from ..files import FigureOutput, make_folder, write_json, write_text
+from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json, write_text
 from ..run import RunPlan, RunWatch, Trace, claimed_noise, library_versions, measure_one, plan_run
 from ..scenario import Scenario, Start, name_bicycle
 
@@ -327,7 +327,7 @@ def _make_document(
     }
 
 
-def write_precision(document: Mapping[str, Any], out: Path, output: FigureOutput) -> list[Path]:
+def write_precision(document: Mapping[str, Any], out: Path, output: FigureOutput = DEFAULT_FIGURES) -> list[Path]:
     """Write the document, its page and its figure into a folder, which is made if it does not exist.
 
     Raises

@@ -34,7 +34,11 @@ def families_caption(document: Mapping[str, Any], front_radius: float) -> str:
         sentences.append("Dashed: the ground would have to pull a wheel, so no bicycle can ride there.")
     if "touching" in kinds:
         sentences.append("Dotted: a rim would lie inside the ground, so no bicycle can ride there.")
-    sentences.append("Open marks are limits: E and F lying flat at infinite speed, others on ever larger circles.")
+    sentences.append(
+        "Open marks are limits: circles lying flat at infinite speed (E and F), diamonds ever larger circles, "
+        "triangles a front wheel that turns ever faster. Small filled triangles are cusps that have no letter in the "
+        "paper."
+    )
     sections = []
     for family in document["families"]:
         for section in family["stable_sections"]:

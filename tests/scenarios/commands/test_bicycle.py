@@ -98,3 +98,29 @@ def test_bad_input_is_one_line(velodrome, arguments: list[str], said: str) -> No
     assert (result.status, result.stdout) == (2, "")
     assert said in result.stderr
     assert result.stderr.count("\n") == 1
+
+
+def test_figures_are_written_in_each_format_and_width(velodrome, tmp_path: Path) -> None:
+    out = str(tmp_path / "found")
+    velodrome("bicycle", "--out", out, "--format", "pdf", "--format", "svg", "--format", "pdf", "--columns", "1")
+    assert {path.name for path in (tmp_path / "found").iterdir()} == {
+        "bicycle.json",
+        "eigenvalues.pdf",
+        "eigenvalues.svg",
+    }
+    assert 'width="252.283465pt"' in (tmp_path / "found" / "eigenvalues.svg").read_text()  # 89 mm
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--format", "pdf"), "--format: it is of figures, which are written with --out only"),
+        (("--columns", "1"), "--columns: it is of figures, which are written with --out only"),
+        (("--out", "found", "--format", "gif"), "--format gif: no such format (there are png, svg, pdf)"),
+    ],
+)
+def test_figures_that_cannot_be_written_are_refused(velodrome, options: tuple[str, ...], said: str) -> None:
+    result = velodrome("bicycle", *options)
+    assert result.status == 2
+    assert said in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1

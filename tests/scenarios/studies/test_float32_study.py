@@ -24,7 +24,6 @@ from velodrome.engines.mujoco.state import from_mujoco
 from velodrome.engines.registry import load_engine
 from velodrome.reports.measure import carry_errors, find_deviations, measure_sensitivity, measure_step_errors
 from velodrome.scenarios.error import ScenarioError
-from velodrome.scenarios.files import FigureOutput
 from velodrome.scenarios.scenario import load_scenario, make_start
 from velodrome.scenarios.studies import all_rode_float32, study_float32, write_float32
 
@@ -121,7 +120,7 @@ def test_the_state_holds_numbers_of_float32(rounded: Any, parts: str) -> None:
 
 
 def test_the_document_and_the_figure_are_written(tmp_path: Path) -> None:
-    files = write_float32(circle(), tmp_path / "found", FigureOutput())
+    files = write_float32(circle(), tmp_path / "found")
     assert [file.name for file in files] == ["float32-plane-circle.json", "float32-plane-circle.png"]
     assert files[1].read_bytes().startswith(b"\x89PNG")
     assert contents(files[0])["engines"] == json.loads(json.dumps(circle()["engines"]))

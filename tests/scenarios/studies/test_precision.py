@@ -18,7 +18,6 @@ from velodrome.engines.registry import load_engine
 from velodrome.reports.measure.metrics import position_errors
 from velodrome.reports.measure.precision import SAME_BITS, Level, engine_document
 from velodrome.scenarios.error import ScenarioError
-from velodrome.scenarios.files import FigureOutput
 from velodrome.scenarios.run.runner import measure_one
 from velodrome.scenarios.scenario.schema import load_scenario
 from velodrome.scenarios.scenario.start import make_start
@@ -164,7 +163,7 @@ def test_steps_that_share_no_output_interval_are_refused_in_one_line() -> None:
 
 
 def test_document_and_figure_are_written(tmp_path: Path) -> None:
-    written = write_precision(soft(), tmp_path / "found", FigureOutput())
+    written = write_precision(soft(), tmp_path / "found")
     assert [path.name for path in written] == ["precision-q1.json", "precision-q1.html", "precision-q1.png"]
     assert contents(written[0]) == soft()
     assert "Steps and errors on q1" in written[1].read_text(encoding="utf-8")
@@ -173,4 +172,4 @@ def test_document_and_figure_are_written(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")
     with pytest.raises(ScenarioError, match="cannot be made"):
-        write_precision(soft(), blocked / "found", FigureOutput())
+        write_precision(soft(), blocked / "found")
