@@ -70,11 +70,14 @@ def families_command(
     steer_torque: SteerTorqueOption = 0.0,
     rear_wheel_torque: RearTorqueOption = 0.0,
     steer_damping: SteerDampingOption = 0.0,
-    out: Annotated[Path | None, typer.Option(help="Folder for families.json and the figure families.png.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for families.json, its page and the figure families.png.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """The four solution families by continuation: special points, stable sections."""
     from ..motions import follow_families, write_families
+    from ..run import library_versions
     from ..scenario import make_bowl
     from .present_motions import show_families
     from .progress import show_working
@@ -85,7 +88,7 @@ def families_command(
     with answering_missing_motion(as_json), show_working(STARTING):
         document = follow_families(source.bicycle, make_bowl(ground), inputs).as_json(source.name)
     if out is not None:
-        write_families(document, out)
+        write_families(document, out, library_versions())
     with ending_with(0):
         if as_json:
             print_json(document)

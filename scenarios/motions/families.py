@@ -24,7 +24,7 @@ from ...reference.special import SpecialPoint, special_points
 from ...reference.surface import Paraboloid, Surface, SurfaceOfRevolution
 from ...reports.measure import to_number
 from ..error import ScenarioError
-from ..files import make_folder, write_json
+from ..files import make_folder, write_json, write_text
 from ..scenario import describe_missing_motion, make_bowl, name_bicycle, name_surface
 
 # Longest step along the arc: 100 to 300 points per family. No known stable section is shorter than three steps.
@@ -372,8 +372,16 @@ def _entry_or_null(point: CriticalPoint | None) -> dict[str, Any] | None:
     return None if point is None else critical_entry(point)
 
 
-def write_families(document: Mapping[str, Any], out: Path) -> None:
-    """Write the document and its figure into a folder, which is made if it does not exist.
+def write_families(document: Mapping[str, Any], out: Path, libraries: Mapping[str, str]) -> None:
+    """Write the document, its page and its figure into a folder, which is made if it does not exist.
+
+    Parameters
+    ----------
+    document : mapping
+        As `SolutionFamilies.as_json` returns it.
+    out : Path
+    libraries : mapping of str to str
+        Versions by name, which the page states.
 
     Raises
     ------
@@ -381,9 +389,11 @@ def write_families(document: Mapping[str, Any], out: Path) -> None:
         If the folder cannot be made.
     """
     from ...reports.figures import family_figure
+    from ...reports.page import make_families_page
 
     make_folder(out)
     write_json(out / "families.json", document)
+    write_text(out / "families.html", make_families_page(document, libraries))
     family_figure(out / "families.png", document, document["bicycle"]["parameters"]["front_wheel_radius"])
 
 

@@ -22,8 +22,9 @@ from ...reference.upright import (
     weave_speed,
 )
 from ..error import ScenarioError
-from ..files import make_folder, write_json
-from ..scenario import BicycleFile
+from ..files import make_folder, write_json, write_text
+from ..run import library_versions
+from ..scenario import PARAMETERS, BicycleFile
 
 
 @dataclass(frozen=True)
@@ -136,12 +137,15 @@ def study_bicycle(source: BicycleFile, speeds: np.ndarray, steer_damping: float 
 
 
 def write_bicycle(study: BicycleStudy, out: Path) -> list[Path]:
-    """Write the document and the figure of a study into a folder, and return their paths."""
-    # Imported here, since the document does not need matplotlib.
+    """Write the document, the page and the figure of a study into a folder, and return their paths."""
+    # Imported here, since the document needs neither matplotlib nor jinja.
     from ...reports.figures import eigenvalue_figure
+    from ...reports.page import make_bicycle_page
 
     make_folder(out)
-    document, figure = out / "bicycle.json", out / "eigenvalues.png"
+    document, page, figure = out / "bicycle.json", out / "bicycle.html", out / "eigenvalues.png"
     write_json(document, study.as_json())
+    units = {name: parameter.unit for name, parameter in PARAMETERS.items()}
+    write_text(page, make_bicycle_page(study.as_json(), units, library_versions()))
     eigenvalue_figure(figure, study.source.name, study.speeds, study.followed, study.modes, study.stable_speeds)
-    return [document, figure]
+    return [document, page, figure]
