@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from .curve_chart import draw_plane
 from .document import list_engine_styles, load_template, read_part
-from .tables import PageTable, TableColumn
+from .tables import PageTable, TableColumn, format_complex
 
 _REAL_PARTS = (-10.0, 10.0)  # [1/s]: beyond, the castering mode is alone
 _ROWS = 11  # speeds of the table of eigenvalues, at most
@@ -105,14 +105,10 @@ def _make_eigenvalue_table(document: Mapping[str, Any]) -> PageTable:
         head="speed [m/s]",
         names=[f"{speeds[k]:.4g}" for k in chosen],
         columns=[
-            TableColumn(name, "1/s", [_format_eigenvalue(*found["eigenvalues"][k][mode]) for k in chosen])
+            TableColumn(name, "1/s", [format_complex(*found["eigenvalues"][k][mode], digits=4) for k in chosen])
             for mode, name in enumerate(found["names"])
         ],
     )
-
-
-def _format_eigenvalue(real: float, imaginary: float) -> str:
-    return f"{real:.4g}" if imaginary == 0 else f"{real:.4g} {'+' if imaginary > 0 else '−'} {abs(imaginary):.4g}i"
 
 
 def _make_parameter_table(document: Mapping[str, Any], units: Mapping[str, str]) -> PageTable:

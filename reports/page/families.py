@@ -101,7 +101,8 @@ def _draw(families: Mapping[str, Mapping[str, Any]], x: str, y: str) -> dict[str
         across, up = np.array(points[x], float), np.array(points[y], float)
         curves[name] = (across, up)
         strong[name] = [
-            tuple(_follow_section(section, points, key) for key in (x, y)) for section in family["stable_sections"]
+            (_follow_section(section, points, x), _follow_section(section, points, y))
+            for section in family["stable_sections"]
         ]
         spots += [(name, point[x], point[y], f"{title} of {name}") for title, point in family["special_points"].items()]
     return draw_plane(curves, list(families), strong=strong, spots=spots)

@@ -113,15 +113,8 @@ def make_chart(
         lines that are drawn wide, as pairs of an engine's index and an SVG path. ``spots``, single points as
         (engine's index, place across, place down, text).
     """
-    unused = {
-        "marked": False,
-        "guide": None,
-        "guide_text": "",
-        "coinciding": [],
-        "bands": [],
-        "strong": [],
-        "spots": [],
-    }
+    unused: dict[str, Any] = {"marked": False, "guide": None, "guide_text": ""}
+    unused |= {"coinciding": [], "bands": [], "strong": [], "spots": []}
     assert parts.keys() <= unused.keys()
     return {"x": x, "y": y, "lines": lines} | unused | parts
 
