@@ -1,6 +1,7 @@
 """The report of a run, and the pages of studies, each a self-contained HTML document."""
 
 from .anchors import AnchorNames
+from .atlas import make_atlas_page
 from .bicycle import make_bicycle_page
 from .document import make_page
 from .families import make_families_page
@@ -20,6 +21,7 @@ __all__ = [
     "describe_stop",
     "find_creeping",
     "group_releases",
+    "make_atlas_page",
     "make_bicycle_page",
     "make_diff_page",
     "make_families_page",

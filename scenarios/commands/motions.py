@@ -119,7 +119,7 @@ def critical_command(bicycle: BicycleOption = None, as_json: JsonOption = False)
 
 def atlas_command(
     out: Annotated[
-        Path, typer.Option(help="Folder for atlas.parquet (some 60 MB), boundaries.json and the figures.")
+        Path, typer.Option(help="Folder for atlas.parquet (some 60 MB), boundaries.json, the page and the figures.")
     ] = Path("atlas"),
     size: Annotated[int, typer.Option(help="Number of motions, roughly.")] = 400_000,
     largest: Annotated[float, typer.Option(help="Largest alpha [1/m], at most 1.")] = 1.0,
@@ -128,6 +128,7 @@ def atlas_command(
 ) -> None:
     """Stability of all circular motions over alpha and rear rate: data, boundaries, figures (half a minute)."""
     from ..motions import make_atlas
+    from ..run import library_versions
     from .present_motions import show_atlas
     from .progress import ProgressBars
     from .terminal import make_console
@@ -135,7 +136,12 @@ def atlas_command(
     source = load_bicycle(bicycle)
     with answering_missing_motion(as_json), ProgressBars() as progress:
         document = make_atlas(
-            source, out, size, largest, lambda done: progress.watch("atlas", done * size, size, "motions")
+            source,
+            out,
+            library_versions(),
+            size,
+            largest,
+            lambda done: progress.watch("atlas", done * size, size, "motions"),
         )
     with ending_with(0):
         if as_json:

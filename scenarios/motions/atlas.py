@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from ...reference.atlas import ATLAS_SIZE, Atlas, Boundary, compute_atlas, spaci
 from ...reference.rideability import OBSTACLES
 from ...reference.stability import VARIABLES
 from ..error import MissingMotionError, ScenarioError
-from ..files import make_folder, write_json
+from ..files import make_folder, write_json, write_text
 from ..scenario import BicycleFile, name_bicycle
 from .families import check_inertia, critical_entry
 
@@ -39,11 +39,12 @@ _SAMPLED = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "ra
 def make_atlas(
     source: BicycleFile,
     out: Path,
+    libraries: Mapping[str, str],
     size: int = ATLAS_SIZE,
     largest: float = 1.0,
     progress: Callable[[float], None] = lambda _: None,
 ) -> dict[str, Any]:
-    """Compute the atlas and write ``atlas.parquet``, ``boundaries.json`` and the figures into a folder.
+    """Compute the atlas and write ``atlas.parquet``, ``boundaries.json``, the page and the figures into a folder.
 
     Parameters
     ----------
@@ -51,6 +52,8 @@ def make_atlas(
         The bicycle.
     out : Path
         The folder, which is made if it does not exist.
+    libraries : mapping of str to str
+        Versions by name, which the page states.
     size : int
         Approximate number of motions.
     largest : float
@@ -72,6 +75,7 @@ def make_atlas(
         made.
     """
     from ...reports.figures import growth_figure, stable_figure
+    from ...reports.page import make_atlas_page
 
     if not SMALLEST <= size <= LARGEST:
         raise ScenarioError(f"--size {size}: an atlas has from {SMALLEST} to {LARGEST} motions")
@@ -89,6 +93,7 @@ def make_atlas(
     facts = {"longest_step": longest, "bicycle": asdict(found.bicycle), "obstacles": list(OBSTACLES)}
     write_atlas(columns, out / "atlas.parquet", facts)
     write_json(out / "boundaries.json", document)
+    write_text(out / "atlas.html", make_atlas_page(document, libraries))
     growth_figure(out / "growth.png", columns, document)
     stable_figure(out / "stable.png", columns, document)
     progress(1.0)

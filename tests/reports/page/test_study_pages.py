@@ -15,6 +15,7 @@ from parsed_page import Parsed, check_static_page
 
 from velodrome.engines.engine import REFERENCE
 from velodrome.reports.page import (
+    make_atlas_page,
     make_bicycle_page,
     make_diff_page,
     make_families_page,
@@ -424,6 +425,46 @@ def test_curves_are_cut_at_gaps_and_at_the_box() -> None:
     assert free["lines"][0]["path"].startswith(f"M{100 * 0.12 / 4.24:.5g} ")
 
 
+# The atlas.
+
+
+def atlas_document() -> dict[str, Any]:
+    def side(*rates: float) -> dict[str, Any]:
+        return {"rear_rate": list(rates), "cause": ["hopf", HOSTILE]}
+
+    region = {"family": 2, "alpha": [0.0, 0.01], "start": side(15.0, 14.0), "end": side(20.0, 18.0), "vanishing": None}
+    tip = {"alpha": 0.015, "rear_rate": 11.0}
+    return {
+        "bicycle": {"name": HOSTILE, "parameters": {}},
+        "warnings": [HOSTILE],
+        "alphas": [0.0, 0.01, 0.02],
+        "motions": 3000,
+        "stable": [region, region | {"family": 4, "vanishing": tip}],
+        "touching": [{"families": [2, 4], "alpha": 0.1, "rear_rate": 3.0}],
+        "absent": [{"family": 1, "alpha": alpha, "reason": HOSTILE} for alpha in (0.01, 0.02)],
+    }
+
+
+def atlas_page() -> str:
+    return make_atlas_page(atlas_document(), MACHINE["libraries"])
+
+
+def test_an_atlas_page_tells_how_far_families_are_stable() -> None:
+    page = atlas_page()
+    parsed = check_static_page(page, HOSTILE)
+    (headline,) = [text for attrs, text in parsed.all("p") if attrs.get("class") == "headline"]
+    assert headline == (
+        "Lyapunov stable motions: family 2 up to alpha 0.01 1/m at least; family 4 up to alpha 0.015 1/m."
+    )
+    said = [text for _, text in parsed.all("li")]
+    assert "! families 2 and 4 touch at alpha 0.1 1/m, rear rate 3 rad/s" in said
+    assert f"! family 1 was not followed in 2 of 3 bowls, alpha 0.01 to 0.02 1/m: {HOSTILE}" in said
+    assert page.count('title="the last stable motion of family 4"') == 1
+    none = check_static_page(make_atlas_page(atlas_document() | {"stable": []}, MACHINE["libraries"]), HOSTILE)
+    assert "No family has a Lyapunov stable motion." in [text for _, text in none.all("p")]
+    assert not none.all("figure")
+
+
 # All of the family, in a browser.
 
 PAGES: dict[str, Callable[[], str]] = {
@@ -431,6 +472,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "gate": gate_page,
     "precision": lambda: make_precision_page(precision_document()),
     "sweep": sweep_page,
+    "atlas": atlas_page,
     "bicycle": bicycle_page,
     "families": families_page,
     "league": lambda: make_league_page(test_league_page.document()),
