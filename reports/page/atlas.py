@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,7 @@ def make_atlas_page(document: Mapping[str, Any], libraries: Mapping[str, str]) -
     str
         A self-contained HTML document. All text is escaped.
     """
-    regions = {f"family {region['family']}": region for region in document["stable"]}
+    regions = _name_regions(document["stable"])
     return load_template("atlas.html").render(
         document=document,
         made={"libraries": libraries, "platform": {}},
@@ -52,6 +52,17 @@ def make_atlas_page(document: Mapping[str, Any], libraries: Mapping[str, str]) -
         ],
         style=Markup(read_part("page.css")),
     )
+
+
+def _name_regions(regions: Sequence[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+    """Return regions by the name of their family, with a number where a family has several."""
+    named: dict[str, Mapping[str, Any]] = {}
+    for k, region in enumerate(regions):
+        own = [other for other in regions if other["family"] == region["family"]]
+        earlier = sum(other["family"] == region["family"] for other in regions[:k])
+        number = f", region {earlier + 1}" if len(own) > 1 else ""
+        named[f"family {region['family']}{number}"] = region
+    return named
 
 
 def _write_headline(regions: Mapping[str, Mapping[str, Any]], largest: float) -> str:

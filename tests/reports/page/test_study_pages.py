@@ -460,6 +460,12 @@ def test_an_atlas_page_tells_how_far_families_are_stable() -> None:
     assert "! families 2 and 4 touch at alpha 0.1 1/m, rear rate 3 rad/s" in said
     assert f"! family 1 was not followed in 2 of 3 bowls, alpha 0.01 to 0.02 1/m: {HOSTILE}" in said
     assert page.count('title="the last stable motion of family 4"') == 1
+    twice = atlas_document()
+    twice["stable"].append(twice["stable"][1])
+    names = [text for _, text in Parsed(make_atlas_page(twice, MACHINE["libraries"])).all("th")]
+    assert [name for name in names if name.startswith("family ")] == [
+        *("family 2", "family 4, region 1", "family 4, region 2")
+    ]
     none = check_static_page(make_atlas_page(atlas_document() | {"stable": []}, MACHINE["libraries"]), HOSTILE)
     assert "No family has a Lyapunov stable motion." in [text for _, text in none.all("p")]
     assert not none.all("figure")
