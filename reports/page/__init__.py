@@ -1,7 +1,10 @@
 """The report of a run, and the pages of studies, each a self-contained HTML document."""
 
 from .anchors import AnchorNames
+from .atlas import make_atlas_page
+from .bicycle import make_bicycle_page
 from .document import make_page
+from .families import make_families_page
 from .findings import describe_stop
 from .gate import make_gate_page
 from .history import describe_run, group_releases, make_history_page
@@ -19,7 +22,10 @@ __all__ = [
     "describe_stop",
     "find_creeping",
     "group_releases",
+    "make_atlas_page",
+    "make_bicycle_page",
     "make_diff_page",
+    "make_families_page",
     "make_gate_page",
     "make_history_page",
     "make_league_page",

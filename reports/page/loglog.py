@@ -85,15 +85,38 @@ def draw_loglog(
         return [(across.place(x), round_values(100 - up.place(y), _DIGITS)) for x, y in points]
 
     marks = {name: trace(points) for name, points in kept.items()}
-    return {
-        "x": across.ticks,
-        "y": up.ticks,
-        "lines": [make_line(names.index(name), _write_path(places), places) for name, places in marks.items()],
-        "guide": _write_path(trace(guide)) if guide else None,
-        "guide_text": guide_text,
-        "coinciding": find_coinciding(marks),
-        "marked": True,
-    }
+    return make_chart(
+        across.ticks,
+        up.ticks,
+        [make_line(names.index(name), write_path(places), places) for name, places in marks.items()],
+        marked=True,
+        guide=write_path(trace(guide)) if guide else None,
+        guide_text=guide_text,
+        coinciding=find_coinciding(marks),
+    )
+
+
+def make_chart(
+    x: Sequence[Mapping[str, Any]], y: Sequence[Mapping[str, Any]], lines: Sequence[Mapping[str, Any]], **parts: Any
+) -> dict[str, Any]:
+    """Return a plot for the macro ``plot`` of charts.html.
+
+    Parameters
+    ----------
+    x, y : sequence of mapping
+        Ticks.
+    lines : sequence of mapping
+        As `make_line` returns them.
+    **parts
+        ``marked``: whether the points of lines have marks. ``guide``, an SVG path, and ``guide_text``. ``coinciding``,
+        groups of names whose lines lie on one another. ``bands``, pairs of places across. ``strong``, further parts of
+        lines that are drawn wide, as pairs of an engine's index and an SVG path. ``spots``, single points as
+        (engine's index, place across, place down, text).
+    """
+    unused: dict[str, Any] = {"marked": False, "guide": None, "guide_text": ""}
+    unused |= {"coinciding": [], "bands": [], "strong": [], "spots": []}
+    assert parts.keys() <= unused.keys()
+    return {"x": x, "y": y, "lines": lines} | unused | parts
 
 
 def make_line(
@@ -142,5 +165,6 @@ def find_coinciding(marks: Mapping[str, Points]) -> list[list[str]]:
     return [group for group in groups if len(group) > 1]
 
 
-def _write_path(places: Points) -> str:
+def write_path(places: Points) -> str:
+    """Return places [per cent], joined by straight lines, as an SVG path."""
     return "M" + "L".join(f"{x:g} {y:g}" for x, y in places)

@@ -13,7 +13,7 @@ from ..measure import compared_time
 from . import words
 from .document import list_engine_styles, load_template, read_part
 from .loglog import draw_loglog
-from .tables import PageTable, TableColumn, number_column
+from .tables import PageTable, TableColumn, format_complex, number_column
 
 _POINT_COLUMNS = (
     ("position error", "m", "position_error"),
@@ -152,7 +152,7 @@ def _make_steps_table(name: str, entry: Mapping[str, Any]) -> PageTable:
 def _make_eigenvalue_table(name: str, found: Mapping[str, Any] | None) -> PageTable | None:
     if found is None:
         return None
-    own, exact = ([_format_complex(*pair) for pair in found[key]] for key in ("values", "reference"))
+    own, exact = ([format_complex(*pair, digits=6) for pair in found[key]] for key in ("values", "reference"))
     return PageTable(
         caption=f"Eigenvalues of the circle as rides of {name} show them [1/s], beside the reference's.",
         head="number",
@@ -163,10 +163,6 @@ def _make_eigenvalue_table(name: str, found: Mapping[str, Any] | None) -> PageTa
             TableColumn("error", "1/s", format_numbers(found["errors"], 2)),
         ],
     )
-
-
-def _format_complex(real: float, imaginary: float) -> str:
-    return f"{real:.6g}" if imaginary == 0 else f"{real:.6g} {'+' if imaginary > 0 else '−'} {abs(imaginary):.6g}i"
 
 
 def _describe_failure(failure: Mapping[str, Any]) -> str:

@@ -83,3 +83,10 @@ def number_column(
     """
     upright = [name not in down for name in rows]
     return TableColumn(title, unit, format_after_upright([row[key] for row in rows.values()], upright, digits))
+
+
+def format_complex(real: float, imaginary: float, digits: int) -> str:
+    """Format a complex number with a number of significant digits of each part; a real one has no second part."""
+    if imaginary == 0:
+        return f"{real:.{digits}g}"
+    return f"{real:.{digits}g} {'+' if imaginary > 0 else '−'} {abs(imaginary):.{digits}g}i"

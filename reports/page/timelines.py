@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .curves import choose_samples, round_values
-from .loglog import DecadeAxis, find_coinciding, fit_axis, make_line
+from .loglog import DecadeAxis, find_coinciding, fit_axis, make_chart, make_line, write_path
 
 _MOST_POINTS = 400  # of a line: more than pixels beside another figure
 _MOST_TICKS = 6
@@ -115,21 +115,13 @@ def _draw_sizes(
         ]
     groups = find_coinciding({name: found for name, found in places.items() if name not in stops})
     turns = {name: (k, len(group)) for group in groups for k, name in enumerate(group)}
-    return {
-        "x": across.ticks,
-        "y": up.ticks,
-        "lines": [
-            make_line(
-                names.index(name),
-                "M" + "L".join(f"{x:g} {y:g}" for x, y in found),
-                found,
-                stops.get(name),
-                turns.get(name, (0, 1)),
-            )
+    return make_chart(
+        across.ticks,
+        up.ticks,
+        [
+            make_line(names.index(name), write_path(found), found, stops.get(name), turns.get(name, (0, 1)))
             for name, found in places.items()
         ],
-        "guide": None,
-        "guide_text": "",
-        "coinciding": groups,
-        "marked": marked,
-    }
+        marked=marked,
+        coinciding=groups,
+    )

@@ -37,7 +37,9 @@ def bicycle_command(
         str, typer.Option(metavar="FROM:TO", help="Range of forward speeds [m/s], or a list such as 1,3,5.")
     ] = "0:10",
     steer_damping: SteerDampingOption = 0.0,
-    out: Annotated[Path | None, typer.Option(help="Folder for bicycle.json and the figure eigenvalues.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for bicycle.json, its page and the figure eigenvalues.")
+    ] = None,
     formats: FormatOption = None,
     columns: ColumnsOption = None,
     as_json: JsonOption = False,

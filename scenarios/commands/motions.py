@@ -74,7 +74,9 @@ def families_command(
     steer_torque: SteerTorqueOption = 0.0,
     rear_wheel_torque: RearTorqueOption = 0.0,
     steer_damping: SteerDampingOption = 0.0,
-    out: Annotated[Path | None, typer.Option(help="Folder for families.json and the figure families.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for families.json, its page and the figure families.")
+    ] = None,
     formats: FormatOption = None,
     columns: ColumnsOption = None,
     as_json: JsonOption = False,
@@ -86,6 +88,7 @@ def families_command(
     figures = parse_figure_output(formats, columns, None if out is not None else "--out")
     with answering_missing_motion(as_json), ProgressBars() as progress:
         from ..motions import follow_families, write_families
+        from ..run import library_versions
         from ..scenario import make_bowl
         from .present_motions import show_families
 
@@ -100,8 +103,8 @@ def families_command(
         )
         document = families.as_json(source.name)
         if out is not None:
-            progress.say("drawing the figure")
-            write_families(document, out, figures)
+            progress.say("writing the page and the figure")
+            write_families(document, out, library_versions(), figures)
     with ending_with(0):
         if as_json:
             print_json(document)
@@ -133,7 +136,7 @@ def critical_command(bicycle: BicycleOption = None, as_json: JsonOption = False)
 
 def atlas_command(
     out: Annotated[
-        Path, typer.Option(help="Folder for atlas.parquet (some 60 MB), boundaries.json and the figures.")
+        Path, typer.Option(help="Folder for atlas.parquet (some 60 MB), boundaries.json, the page and the figures.")
     ] = Path("atlas"),
     size: Annotated[int, typer.Option(help="Number of motions, roughly.")] = 400_000,
     largest: Annotated[float, typer.Option(help="Largest alpha [1/m], at most 1.")] = 1.0,
@@ -149,11 +152,18 @@ def atlas_command(
     figures = parse_figure_output(formats, columns)
     with answering_missing_motion(as_json), ProgressBars() as progress:
         from ..motions import make_atlas
+        from ..run import library_versions
         from .present_motions import show_atlas
 
         source = load_bicycle(bicycle)
         document = make_atlas(
-            source, out, size, largest, lambda done: progress.watch("atlas", done * size, size, "motions"), figures
+            source,
+            out,
+            library_versions(),
+            size,
+            largest,
+            lambda done: progress.watch("atlas", done * size, size, "motions"),
+            figures,
         )
     with ending_with(0):
         if as_json:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -14,7 +14,7 @@ from ...reference.atlas import ATLAS_SIZE, Atlas, Boundary, compute_atlas, spaci
 from ...reference.rideability import OBSTACLES
 from ...reference.stability import VARIABLES
 from ..error import MissingMotionError, ScenarioError
-from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json
+from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json, write_text
 from ..scenario import BicycleFile, name_bicycle
 from .families import check_inertia, critical_entry
 
@@ -40,12 +40,13 @@ _SAMPLED = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "ra
 def make_atlas(
     source: BicycleFile,
     out: Path,
+    libraries: Mapping[str, str],
     size: int = ATLAS_SIZE,
     largest: float = 1.0,
     progress: Callable[[float], None] = lambda _: None,
     figures: FigureOutput = DEFAULT_FIGURES,
 ) -> dict[str, Any]:
-    """Compute the atlas and write ``atlas.parquet``, ``boundaries.json`` and the figures into a folder.
+    """Compute the atlas and write ``atlas.parquet``, ``boundaries.json``, the page and the figures into a folder.
 
     Parameters
     ----------
@@ -53,6 +54,8 @@ def make_atlas(
         The bicycle.
     out : Path
         The folder, which is made if it does not exist.
+    libraries : mapping of str to str
+        Versions by name, which the page states.
     size : int
         Approximate number of motions.
     largest : float
@@ -76,6 +79,7 @@ def make_atlas(
         made.
     """
     from ...reports.figures import growth_figure, stable_figure, write_formats
+    from ...reports.page import make_atlas_page
 
     if not SMALLEST <= size <= LARGEST:
         raise ScenarioError(f"--size {size}: an atlas has from {SMALLEST} to {LARGEST} motions")
@@ -93,6 +97,7 @@ def make_atlas(
     facts = {"longest_step": longest, "bicycle": asdict(found.bicycle), "obstacles": list(OBSTACLES)}
     write_atlas(columns, out / "atlas.parquet", facts)
     write_json(out / "boundaries.json", document)
+    write_text(out / "atlas.html", make_atlas_page(document, libraries))
     for name, draw in (("growth", growth_figure), ("stable", stable_figure)):
         write_formats(out / name, partial(draw, columns, document), figures.formats, figures.columns)
     progress(1.0)

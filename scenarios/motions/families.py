@@ -24,7 +24,7 @@ from ...reference.special import SpecialPoint, special_points
 from ...reference.surface import Paraboloid, Surface, SurfaceOfRevolution
 from ...reports.measure import to_number
 from ..error import ScenarioError
-from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json
+from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json, write_text
 from ..scenario import describe_missing_motion, find_unit, make_bowl, name_bicycle, name_surface
 
 if TYPE_CHECKING:
@@ -384,8 +384,25 @@ def _entry_or_null(point: CriticalPoint | None) -> dict[str, Any] | None:
     return None if point is None else critical_entry(point)
 
 
-def write_families(document: Mapping[str, Any], out: Path, output: FigureOutput = DEFAULT_FIGURES) -> list[Path]:
-    """Write the document and its figure into a folder, which is made if it does not exist, and return their paths.
+def write_families(
+    document: Mapping[str, Any], out: Path, libraries: Mapping[str, str], output: FigureOutput = DEFAULT_FIGURES
+) -> list[Path]:
+    """Write the document, its page and its figure into a folder, which is made if it does not exist.
+
+    Parameters
+    ----------
+    document : mapping
+        As `SolutionFamilies.as_json` returns it.
+    out : Path
+    libraries : mapping of str to str
+        Versions by name, which the page states.
+    output : FigureOutput
+        How the figure is written.
+
+    Returns
+    -------
+    list of Path
+        What is written.
 
     Raises
     ------
@@ -393,16 +410,19 @@ def write_families(document: Mapping[str, Any], out: Path, output: FigureOutput 
         If the folder cannot be made.
     """
     from ...reports.figures import family_figure, write_formats
+    from ...reports.page import make_families_page
 
     make_folder(out)
-    write_json(out / "families.json", document)
+    data, page = out / "families.json", out / "families.html"
+    write_json(data, document)
+    write_text(page, make_families_page(document, libraries))
     radius = document["bicycle"]["parameters"]["front_wheel_radius"]
     units = {name: find_unit(f"surface.{name}") or "" for name in document.get("surface", {})}
 
     def draw(columns: int) -> Figure:
         return family_figure(document, radius, columns=columns, units=units)
 
-    return [out / "families.json", *write_formats(out / "families", draw, output.formats, output.columns)]
+    return [data, page, *write_formats(out / "families", draw, output.formats, output.columns)]
 
 
 def _describe_section(start: SectionEnd, end: SectionEnd, parts: Sequence[tuple[PartEnd, PartEnd]]) -> dict[str, Any]:

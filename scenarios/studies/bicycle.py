@@ -23,8 +23,9 @@ from ...reference.upright import (
     weave_speed,
 )
 from ..error import ScenarioError
-from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json
-from ..scenario import BicycleFile
+from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json, write_text
+from ..run import library_versions
+from ..scenario import PARAMETERS, BicycleFile
 
 
 @dataclass(frozen=True)
@@ -137,12 +138,16 @@ def study_bicycle(source: BicycleFile, speeds: np.ndarray, steer_damping: float 
 
 
 def write_bicycle(study: BicycleStudy, out: Path, output: FigureOutput = DEFAULT_FIGURES) -> list[Path]:
-    """Write the document and the figure of a study into a folder, and return their paths."""
-    # Imported here, since the document does not need matplotlib.
+    """Write the document, the page and the figure of a study into a folder, and return their paths."""
+    # Imported here, since the document needs neither matplotlib nor jinja.
     from ...reports.figures import eigenvalue_figure, write_formats
+    from ...reports.page import make_bicycle_page
 
     make_folder(out)
-    write_json(out / "bicycle.json", study.as_json())
+    document, page = out / "bicycle.json", out / "bicycle.html"
+    write_json(document, study.as_json())
+    units = {name: parameter.unit for name, parameter in PARAMETERS.items()}
+    write_text(page, make_bicycle_page(study.as_json(), units, library_versions()))
     shown = study.source.name, study.speeds, study.followed, study.modes, study.stable_speeds
     draw = partial(eigenvalue_figure, *shown)
-    return [out / "bicycle.json", *write_formats(out / "eigenvalues", draw, output.formats, output.columns)]
+    return [document, page, *write_formats(out / "eigenvalues", draw, output.formats, output.columns)]

@@ -15,7 +15,10 @@ from parsed_page import Parsed, check_static_page
 
 from velodrome.engines.engine import REFERENCE
 from velodrome.reports.page import (
+    make_atlas_page,
+    make_bicycle_page,
     make_diff_page,
+    make_families_page,
     make_gate_page,
     make_history_page,
     make_league_page,
@@ -23,6 +26,7 @@ from velodrome.reports.page import (
     make_ride_pair_page,
     make_sweep_page,
 )
+from velodrome.reports.page.curve_chart import draw_plane
 from velodrome.reports.page.gate import SIGNS
 from velodrome.reports.page.tables import format_after_upright
 from velodrome.reports.page.timelines import LinearAxis, draw_over_time, draw_over_values
@@ -305,6 +309,168 @@ def test_values_of_two_decades_have_a_logarithmic_axis() -> None:
     assert draw_over_values({}, []) is None
 
 
+# A bicycle.
+
+
+def bicycle_document() -> dict[str, Any]:
+    speeds = [0.0, 5.0, 10.0]
+    eigenvalues = [[[3.0 - v, 2.0], [3.0 - v, -2.0], [v - 6.0, 0.0], [-20.0, 0.0]] for v in speeds]
+    return {
+        "name": HOSTILE,
+        "convention": HOSTILE,
+        "parameters": {"wheelbase": 1.02, "trail": 0.08},
+        "uncertainties": {"wheelbase": 0.01, "trail": 0.0},
+        "ignored": [HOSTILE],
+        "warnings": [HOSTILE],
+        "canonical": {name: [[1.0, 2.0], [3.0, 4.0]] for name in ("M", "C1", "K0", "K2")},
+        "steer_damping": 0.0,
+        "speeds": speeds,
+        "eigenvalues": eigenvalues,
+        "modes": {"names": ["weave", "weave", "capsize", "castering"], "eigenvalues": eigenvalues},
+        "weave_speed": 3.0,
+        "capsize_speed": 6.0,
+        "speed_deviations": {"weave": 0.25, "capsize": None},
+        "stability_changes": [
+            {"mode": "weave", "speed": 3.0, "stabilises": True},
+            {"mode": "capsize", "speed": 6.0, "stabilises": False},
+        ],
+        "stable_speeds": [[3.0, 6.0]],
+    }
+
+
+def bicycle_page(**changes: Any) -> str:
+    units = {"wheelbase": "m", "trail": "m"}
+    return make_bicycle_page(bicycle_document() | changes, units, MACHINE["libraries"])
+
+
+def test_a_bicycles_page_tells_at_which_speeds_it_is_stable() -> None:
+    page = bicycle_page()
+    parsed = check_static_page(page, HOSTILE)
+    (headline,) = [text for attrs, text in parsed.all("p") if attrs.get("class") == "headline"]
+    assert headline == (
+        "Upright riding is stable from 3 to 6 m/s. Weave becomes stable at 3 m/s; capsize becomes unstable at 6 m/s."
+    )
+    cells = [text for _, text in parsed.all("td", "dd")]
+    assert {"3 ± 0.25 m/s", "6 m/s", "± 0.01", "–", "-2 + 2i", "-2 − 2i"} <= set(cells)
+    keys = [text for _, text in parsed.all("li")]
+    assert keys[-4:] == ["weave 1", "weave 2", "capsize", "castering"]
+    assert '<rect class="band" x="30.0" y="0" width="30.0"' in page
+    one = check_static_page(bicycle_page(speeds=[5.0], stable_speeds=[[3.0, None]]), HOSTILE)
+    assert not one.all("figure")
+    assert "Upright riding is stable above 3 m/s." in " ".join(text for _, text in one.all("p"))
+    assert "at no speed" in bicycle_page(stable_speeds=[], stability_changes=[])
+
+
+# Families of circular motions.
+
+
+def families_document() -> dict[str, Any]:
+    keys = ("rear_rate", "lean", "steer")
+    points: dict[str, list[Any]] = {key: [0.0, 1.0, 2.0, 3.0] for key in keys}
+    points |= {"lyapunov_stable": [False, True, True, False], "physical": [True, True, True, False]}
+    ends = {key: [0.5, 2.5] for key in keys} | {"cause": ["hopf", HOSTILE]}
+    special = dict.fromkeys((*keys, "front_rate"), 1.0) | {"kind": HOSTILE, "physical": False}
+    family = {
+        "family": 2,
+        "joined_families": [4],
+        "ends": [HOSTILE, "flat"],
+        "points": points,
+        "rideable_parts": [ends],
+    }
+    family |= {"stable_sections": [ends | {"rideable": "partly", "rideable_parts": [ends]}]}
+    family |= {"special_points": {HOSTILE: special}}
+    plain = family | {"family": None, "joined_families": [], "stable_sections": [], "special_points": {}}
+    return {
+        "alpha": None,
+        "surface": {"kind": "sphere", "radius": 20.0},
+        "bicycle": {"name": HOSTILE, "parameters": {}},
+        "warnings": [HOSTILE],
+        "inputs": {"steer_torque": 0.5, "steer_damping": 0.0},
+        "families": [family, plain | {"rideable_parts": []}],
+        "absent": {"1": HOSTILE},
+    }
+
+
+def families_page() -> str:
+    return make_families_page(families_document(), MACHINE["libraries"])
+
+
+def test_a_page_of_families_tells_what_is_stable_and_can_be_ridden() -> None:
+    page = families_page()
+    parsed = check_static_page(page, HOSTILE)
+    (headline,) = [text for attrs, text in parsed.all("p") if attrs.get("class") == "headline"]
+    assert headline == (
+        "Lyapunov stable: families 2, 4 from a rear rate of 0.5 to 2.5 rad/s, of which a part can be ridden."
+    )
+    said = [text for _, text in parsed.all("li")]
+    assert f"• can be ridden: rear rate 0.5 rad/s (hopf) to 2.5 rad/s ({HOSTILE})" in said
+    assert "• cannot be ridden" in said
+    assert f"– family 1 has no curve: {HOSTILE}" in said
+    assert page.count('class="strong"') == 2  # the stable section, in both figures
+    assert [text for _, text in parsed.all("h2")][1:3] == ["families 2, 4", "curve 2"]
+    assert "sphere, radius 20.0" in [text for _, text in parsed.all("dd")]
+    none = families_document() | {"families": []}
+    empty = check_static_page(make_families_page(none, MACHINE["libraries"]), HOSTILE)
+    assert "No circular motion here is Lyapunov stable." in " ".join(text for _, text in empty.all("p"))
+
+
+def test_curves_are_cut_at_gaps_and_at_the_box() -> None:
+    x = np.array([0.0, 1.0, np.nan, 3.0, 4.0])
+    spots = [("a", 1.0, 1.0, "in"), ("a", 9.0, 1.0, "out")]
+    drawn = draw_plane({"a": (x, x)}, ["a"], box=(0.0, 4.0, 0.0, 4.0), spots=spots, bands=[(3.0, np.inf), (7.0, 8.0)])
+    assert drawn["lines"][0]["path"] == "M0 100L25 75M75 25L100 0"
+    assert [text for *_, text in drawn["spots"]] == ["in"]
+    assert drawn["bands"] == [(75.0, 100.0)]
+    free = draw_plane({"a": (x, x)}, ["a"])  # a margin of 3 %
+    assert free["lines"][0]["path"].startswith(f"M{100 * 0.12 / 4.24:.5g} ")
+
+
+# The atlas.
+
+
+def atlas_document() -> dict[str, Any]:
+    def side(*rates: float) -> dict[str, Any]:
+        return {"rear_rate": list(rates), "cause": ["hopf", HOSTILE]}
+
+    region = {"family": 2, "alpha": [0.0, 0.01], "start": side(15.0, 14.0), "end": side(20.0, 18.0), "vanishing": None}
+    tip = {"alpha": 0.015, "rear_rate": 11.0}
+    return {
+        "bicycle": {"name": HOSTILE, "parameters": {}},
+        "warnings": [HOSTILE],
+        "alphas": [0.0, 0.01, 0.02],
+        "motions": 3000,
+        "stable": [region, region | {"family": 4, "vanishing": tip}],
+        "touching": [{"families": [2, 4], "alpha": 0.1, "rear_rate": 3.0}],
+        "absent": [{"family": 1, "alpha": alpha, "reason": HOSTILE} for alpha in (0.01, 0.02)],
+    }
+
+
+def atlas_page() -> str:
+    return make_atlas_page(atlas_document(), MACHINE["libraries"])
+
+
+def test_an_atlas_page_tells_how_far_families_are_stable() -> None:
+    page = atlas_page()
+    parsed = check_static_page(page, HOSTILE)
+    (headline,) = [text for attrs, text in parsed.all("p") if attrs.get("class") == "headline"]
+    assert headline == (
+        "Lyapunov stable motions: family 2 up to alpha 0.01 1/m at least; family 4 up to alpha 0.015 1/m."
+    )
+    said = [text for _, text in parsed.all("li")]
+    assert "! families 2 and 4 touch at alpha 0.1 1/m, rear rate 3 rad/s" in said
+    assert f"! family 1 was not followed in 2 of 3 bowls, alpha 0.01 to 0.02 1/m: {HOSTILE}" in said
+    assert page.count('title="the last stable motion of family 4"') == 1
+    twice = atlas_document()
+    twice["stable"].append(twice["stable"][1])
+    names = [text for _, text in Parsed(make_atlas_page(twice, MACHINE["libraries"])).all("th")]
+    assert [name for name in names if name.startswith("family ")] == [
+        *("family 2", "family 4, region 1", "family 4, region 2")
+    ]
+    none = check_static_page(make_atlas_page(atlas_document() | {"stable": []}, MACHINE["libraries"]), HOSTILE)
+    assert "No family has a Lyapunov stable motion." in [text for _, text in none.all("p")]
+    assert not none.all("figure")
+
+
 # All of the family, in a browser.
 
 PAGES: dict[str, Callable[[], str]] = {
@@ -312,6 +478,9 @@ PAGES: dict[str, Callable[[], str]] = {
     "gate": gate_page,
     "precision": lambda: make_precision_page(precision_document()),
     "sweep": sweep_page,
+    "atlas": atlas_page,
+    "bicycle": bicycle_page,
+    "families": families_page,
     "league": lambda: make_league_page(test_league_page.document()),
     "history": lambda: make_history_page(test_history_page.document()),
     "pair": lambda: make_ride_pair_page(test_history_page.pair(), "../history.html"),

@@ -64,7 +64,7 @@ def test_the_two_mass_skate_is_stable_without_gyroscopes_and_trail(velodrome) ->
 def test_the_table_and_files_are_written(velodrome, tmp_path: Path) -> None:
     result = velodrome("bicycle", "--out", str(tmp_path / "found"))
     assert "weave speed: 4.29238253634 m/s" in result.stdout
-    assert {path.name for path in (tmp_path / "found").iterdir()} == {"bicycle.json", "eigenvalues.png"}
+    assert {path.name for path in (tmp_path / "found").iterdir()} == {"bicycle.json", "bicycle.html", "eigenvalues.png"}
 
 
 def test_the_table_shows_a_pair_of_two_modes_as_complex(velodrome, tmp_path: Path) -> None:

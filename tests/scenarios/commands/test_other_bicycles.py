@@ -75,7 +75,7 @@ def test_families_and_their_figure_are_those_of_the_bicycle(velodrome, tmp_path:
     (tmp_path / "long.toml").write_text("\n".join(f"{key} = {value!r}" for key, value in LONG.items()))
     found = velodrome("families", "--alpha", "0.2", "--bicycle", "long.toml", "--out", "found", "--json").json()
     assert found["bicycle"] == {"name": "long", "parameters": LONG}
-    assert {path.name for path in (tmp_path / "found").iterdir()} == {"families.json", "families.png"}
+    assert {path.name for path in (tmp_path / "found").iterdir()} == {"families.json", "families.html", "families.png"}
     for family in found["families"]:
         points = family["points"]
         total = np.add(points["normal_force_rear"], points["normal_force_front"])

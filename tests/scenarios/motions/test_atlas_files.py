@@ -20,16 +20,19 @@ BENCHMARK = BicycleFile("benchmark", Bicycle())
 def test_an_atlas_is_written_whole(tmp_path: Path) -> None:
     done: list[float] = []
     out = tmp_path / "new" / "atlas"
-    document = make_atlas(BENCHMARK, out, size=2000, largest=0.02, progress=done.append)
+    document = make_atlas(BENCHMARK, out, {}, size=2000, largest=0.02, progress=done.append)
     assert done == sorted(done)
     assert done[-1] == 1.0
     assert sorted(path.name for path in out.iterdir()) == [
+        "atlas.html",
         "atlas.parquet",
         "boundaries.json",
         "growth.png",
         "stable.png",
     ]
     assert contents(out / "boundaries.json") == document
+    page = (out / "atlas.html").read_text(encoding="utf-8")
+    assert "Lyapunov stable motions: family 2 up to the last bowl; family 4 up to alpha 0.00929505 1/m." in page
     table = pq.read_table(out / "atlas.parquet")
     assert table.num_rows == document["motions"]
     for name, unit in UNITS.items():
@@ -60,11 +63,11 @@ def test_an_atlas_is_written_whole(tmp_path: Path) -> None:
 )
 def test_impossible_atlases_are_refused(tmp_path: Path, size: int, largest: float, words: str) -> None:
     with pytest.raises(ScenarioError, match=words):
-        make_atlas(BENCHMARK, tmp_path / "atlas", size, largest)
+        make_atlas(BENCHMARK, tmp_path / "atlas", {}, size, largest)
     assert not (tmp_path / "atlas").exists()
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(ScenarioError, match="cannot be made"):
-        make_atlas(BENCHMARK, tmp_path / "file" / "atlas", 2000)
+        make_atlas(BENCHMARK, tmp_path / "file" / "atlas", {}, 2000)
