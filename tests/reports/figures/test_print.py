@@ -185,7 +185,7 @@ def test_text_is_text_in_svg_and_fonts_are_in_the_pdf(tmp_path: Path) -> None:
     svg, pdf = write_formats(tmp_path / "figure", DRAWN["growth"], ["svg", "pdf"])
     root = ElementTree.parse(svg).getroot()
     texts = ["".join(node.itertext()) for node in root.iter("{http://www.w3.org/2000/svg}text")]
-    assert "cannot be ridden: a wheel is pulled or a rim inside the ground" in texts
+    assert "cannot be ridden: contact lost, or a rim inside the ground" in texts
     # A title with a formula has its letters one by one and by their font, as text too.
     assert any(sorted("".join(text.split())) == sorted("rear-wheelrateωr[rad/s]") for text in texts)
     assert "DejaVu Sans" in svg.read_text(encoding="utf-8")

@@ -127,8 +127,8 @@ def test_plots_say_name_and_unit_and_draw_the_law() -> None:
     modes, run = find_modes(BICYCLE, BOWL, *Q2), ride(BOWL, Q2)
     shown = RideData(BOWL, {"reference": run}, modes=modes)
     plots = mode_plots(modes)
-    assert plots[2].title == "weave −0.141 ± 6.71i 1/s: log10 angle [rad]"
-    assert plots[4].title == "family 0 1/s: log10 rear rate [rad/s]"
+    assert plots[2].title == "weave −0.141 ± 6.71i 1/s: angle [10^x rad]"
+    assert plots[4].title == "family 0 1/s: rear rate [10^x rad/s]"
     law = plots[2].expected(shown)
     assert law is not None
     slope = np.polyfit(law[0], law[1], 1)[0]

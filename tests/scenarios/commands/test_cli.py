@@ -145,7 +145,16 @@ def test_run_as_json_is_one_document_and_the_rest_goes_to_stderr(velodrome, tmp_
     found = result.json()
     assert [entry["scenario"] for entry in found["runs"]] == ["q2", "iftomm-2"]  # each once
     for entry in found["runs"]:
-        assert set(entry) == {"scenario", "folder", "complete", "engines", "failures", "left_out", "verdicts"}
+        assert set(entry) == {
+            "scenario",
+            "release",
+            "folder",
+            "complete",
+            "engines",
+            "failures",
+            "left_out",
+            "verdicts",
+        }
         folder = tmp_path / entry["folder"]
         assert entry["engines"] == contents(folder / "metrics.json")
         assert "lean_rate = 0.2" in (folder / "scenario.toml").read_text()
@@ -179,8 +188,8 @@ def test_run_by_tag_takes_all_that_have_it(velodrome) -> None:
 def breaking(after: Callable[[Trajectory], Trajectory], monkeypatch: pytest.MonkeyPatch) -> None:
     """Make mujoco-native break in every run."""
 
-    def configure(name: str, values: Any) -> tuple[Engine, Settings]:
-        engine, settings = original(name, values)
+    def configure(name: str, values: Any, any_release: bool = False) -> tuple[Engine, Settings]:
+        engine, settings = original(name, values, any_release=any_release)
         return (Altered(engine, after=after) if name == "mujoco-native" else engine), settings
 
     original = runner.configure_engine
