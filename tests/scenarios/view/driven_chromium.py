@@ -24,7 +24,7 @@ from PIL import Image
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 SIZE = (1400, 900)
-PATIENCE = 120.0  # for a busy machine [s]
+PATIENCE = 300.0  # for drawing in software on a busy machine [s]
 _FLAGS = (
     *("--headless=new", "--hide-scrollbars", "--no-first-run", "--disable-background-networking", "--disable-sync"),
     # Its sandbox does not start as root, as in a container; the page is our own.
