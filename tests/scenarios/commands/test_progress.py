@@ -59,9 +59,9 @@ def test_a_bar_says_what_it_counts(
 def test_a_terminal_is_told_at_once_what_is_done(make_screen: MakeScreen) -> None:
     text = make_screen(True, 60)
     with ProgressBars() as bars:
-        assert f"{progress.LOADING} (0 s)" in text.getvalue()
+        assert f"{progress.LOADING} (" in text.getvalue()
         bars.say(progress.COMPUTING)
-    assert f"{progress.COMPUTING} (0 s)" in text.getvalue()
+    assert f"{progress.COMPUTING} (" in text.getvalue()
 
 
 def write_lines_often(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -81,10 +81,10 @@ def test_a_pipe_has_plain_lines_now_and_then(make_screen: MakeScreen, monkeypatc
     write_lines_often(monkeypatch)
     text = make_screen(False, 60)
     with ProgressBars() as bars:
-        wait_for(text, f"progress: {progress.LOADING} (0 s)\n")
+        wait_for(text, f"progress: {progress.LOADING} (")
         bars.watch("reference", 20.0, 20.0)
         bars.watch("mujoco-exact-contact", 3.2, 20.0)
-        wait_for(text, "progress: mujoco-exact-contact 3.2 of 20 s (0 s)\n")
+        wait_for(text, "progress: mujoco-exact-contact 3.2 of 20 s (")
     assert "\x1b" not in text.getvalue()
 
 
