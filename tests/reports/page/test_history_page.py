@@ -131,7 +131,7 @@ def pair() -> dict[str, Any]:
         "distance": {"time": [0.0, 0.5, 1.25], "distance": [0.0, 0.0625, 1.5e-9]},
         "libraries": {"velodrome": "0.1.0"},
         "command": f"velodrome history {HOSTILE}",
-        "commands": [f"velodrome run {HOSTILE}"],
+        "commands": [f"velodrome run {HOSTILE}", "velodrome diff before/* after/*"],
     }
 
 
