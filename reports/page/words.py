@@ -114,7 +114,7 @@ def keep_whole(text: str, names: Iterable[str]) -> Markup:
 
 
 def describe_own_steps(engines: Mapping[str, Mapping[str, Any]], duration: float) -> dict[str, str]:
-    """Describe the steps of engines that did not take those of their setting ``step``, by engine.
+    """Describe the setting ``step`` of engines that did not take such steps, with those that they took, by engine.
 
     Methods with steps of their own have such a setting too, for studies of convergence. Rides that ended early are
     left out, as their mean step is not known from the manifest.
@@ -126,7 +126,7 @@ def describe_own_steps(engines: Mapping[str, Mapping[str, Any]], duration: float
             continue
         mean = duration / steps
         if abs(mean / step - 1) > _ROUNDING_OF_STEPS:
-            found[name] = f"Its steps were not those of its setting: {mean:.2g} s on average."
+            found[name] = f"{describe_setting(step)}, but it took {mean:.2g} on average"
     return found
 
 

@@ -15,7 +15,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from html import unescape
+from html import escape, unescape
 from pathlib import Path
 from typing import Any
 
@@ -124,6 +124,16 @@ def examine(page: str, script: str, folder: Path, dark: bool = False, size: tupl
     result = json.loads(unescape(found[1]))
     assert not (isinstance(result, dict) and "error" in result), result
     return result
+
+
+def measure_width(page: str, width: int, folder: Path) -> int:
+    """How wide the contents of a page are in a window of a width, which may be less than Chromium's own least of 500.
+
+    Regions that scroll in themselves do not count.
+    """
+    frame = f'<iframe style="border:0" width="{width}" height="3000" srcdoc="{escape(page)}"></iframe>'
+    script = 'return document.querySelector("iframe").contentDocument.documentElement.scrollWidth;'
+    return examine(f"<!doctype html><body>{frame}</body>", script, folder)
 
 
 def find_violations(page: str, folder: Path, dark: bool = False, size: tuple[int, int] = (1400, 900)) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 import math
 import re
@@ -379,14 +378,6 @@ def test_a_browser_shows_the_pages_without_a_complaint(which: str, dark: bool, t
     assert (tmp_path / "page.png").stat().st_size > 10_000
 
 
-# A page that shows another one at 400 px and writes how wide its contents are. Scrolled regions do not count.
-_MEASURING = """<!doctype html><body>
-<iframe id="page" style="border:0" width="400" height="3000" srcdoc="{page}"></iframe>
-<script>
-page.onload = () => {{ document.body.dataset.width = page.contentDocument.documentElement.scrollWidth }};
-</script>"""
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(headless.missing() is not None, reason=str(headless.missing()))
 @pytest.mark.parametrize("which", ["history", "pair"])
@@ -403,8 +394,4 @@ def test_pages_fit_into_400_pixels(which: str, tmp_path: Any) -> None:
         made = make_history_page(found)
     else:
         made = make_ride_pair_page(found, "../history.html")
-    path = tmp_path / "measuring.html"
-    path.write_text(_MEASURING.format(page=html.escape(made)), encoding="utf-8")
-    width = re.search(r'data-width="(\d+)"', headless.document(path.as_uri()))
-    assert width is not None
-    assert int(width[1]) <= 400
+    assert headless.measure_width(made, 400, tmp_path) <= 400
