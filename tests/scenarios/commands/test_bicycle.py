@@ -105,6 +105,7 @@ def test_figures_are_written_in_each_format_and_width(velodrome, tmp_path: Path)
     velodrome("bicycle", "--out", out, "--format", "pdf", "--format", "svg", "--format", "pdf", "--columns", "1")
     assert {path.name for path in (tmp_path / "found").iterdir()} == {
         "bicycle.json",
+        "bicycle.html",
         "eigenvalues.pdf",
         "eigenvalues.svg",
     }
