@@ -20,7 +20,7 @@ TESTING := hypothesis pytest pytest-xdist
 # Run the tests in two processes, each file in one of them, so that fixtures of a file are computed once.
 PYTEST := -m pytest -n 2 --dist loadfile
 
-.PHONY: run test test-all test-engines test-packages test-lowest test-machines test-machines-short test-wheel lint check docs
+.PHONY: run test test-all test-engines test-packages test-lowest test-machines test-machines-short test-pages test-wheel lint check docs
 
 run: $(STAMP)
 	$(BIN)/velodrome run q2-plus
@@ -50,6 +50,11 @@ test-machines: $(STAMP)
 
 test-machines-short: $(STAMP)
 	$(BIN)/python -m tests.machines --short
+
+# Look at pages and recordings in Chromium, which is installed where it can be; tests that miss it say so.
+test-pages: $(STAMP)
+	-$(BIN)/python -m tests.reports.page.headless_page install
+	$(BIN)/python $(PYTEST) -m "" tests/reports/page tests/scenarios/view
 
 # Build the package, install it into an empty environment, and use it from there.
 test-wheel: $(STAMP)
