@@ -81,7 +81,7 @@ def find_remarks(metrics: Mapping[str, Any], duration: float) -> Iterator[Remark
         )
     if metrics["min_normal_force"] is not None and metrics["min_normal_force"] < 0:
         yield Remark(
-            "contact lost, but for wheels that are bound to roll: the ground would have to pull a wheel",
+            "contact would be lost, since the ground would have to pull a wheel",
             f"by up to {-metrics['min_normal_force']:.3g} N",
         )
     if metrics["ended"] is not None:

@@ -126,7 +126,7 @@ def test_no_news_is_no_remark() -> None:
         ({"fell_at": 2.5}, ["fell, figures are those up to there: exudyn at 2.50 s"]),
         (
             {"min_normal_force": -12.34},
-            ["contact lost, but for wheels that", "the ground would have to pull a wheel: exudyn by up to 12.3 N"],
+            ["contact would be lost, since the ground would have to pull a wheel: exudyn by up to 12.3 N"],
         ),
         (
             {"friction": 0.5, "friction_left_at": 1.234},
