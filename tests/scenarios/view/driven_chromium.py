@@ -10,7 +10,6 @@ import fcntl
 import io
 import json
 import os
-import shutil
 import signal
 import subprocess
 import time
@@ -22,7 +21,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-NAMES = ("chromium", "chromium-browser", "google-chrome")
+from tests.reports.page.headless_page import browser
+
 SIZE = (1400, 900)
 PATIENCE = 300.0  # for drawing in software on a busy machine [s]
 _FLAGS = (
@@ -32,18 +32,6 @@ _FLAGS = (
     *("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
     *("--window-size={},{}".format(*SIZE), "--remote-debugging-pipe"),
 )
-
-
-def find_browser() -> str | None:
-    """Path of a Chromium, if there is one."""
-    return next((path for path in map(shutil.which, NAMES) if path is not None), None)
-
-
-def missing() -> str | None:
-    """Why no page can be opened here; None if one can."""
-    if find_browser() is None:
-        return "no Chromium; python -m tests.reports.page.headless_page install gets Debian's, as root"
-    return None
 
 
 class RefusedCallError(RuntimeError):
@@ -135,7 +123,7 @@ class Chromium:
 @contextmanager
 def chromium(profile: Path) -> Iterator[Chromium]:
     """A running Chromium with a new profile in a folder."""
-    program = find_browser()
+    program = browser()
     assert program is not None
     theirs, to = os.pipe()
     back, ours = os.pipe()
