@@ -1,7 +1,15 @@
 """Measure rides: errors, drift, falls, friction, modes, orders, and the differences that round-off allows."""
 
 from .balance import InputWork, conserved_energy, measure_work
-from .consistency import LARGEST_NOISE, TURNING, Mismatch, describe_mismatch, evaluate_ride, find_mismatches
+from .consistency import (
+    LARGEST_NOISE,
+    TURNING,
+    Mismatch,
+    coordinate_differences,
+    describe_mismatch,
+    evaluate_ride,
+    find_mismatches,
+)
 from .convergence import extrapolate, observed_orders
 from .creep import Creep, contact_acceleration, measure_creep
 from .fall import cut_at_fall, fell_at, until_fall
@@ -59,6 +67,7 @@ __all__ = [
     "compute_metrics",
     "conserved_energy",
     "contact_acceleration",
+    "coordinate_differences",
     "cut_at_fall",
     "describe_mismatch",
     "disturb_states",

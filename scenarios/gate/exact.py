@@ -12,7 +12,7 @@ from ...engines.registry import load_engine
 from ...reference.height_field import HeightField
 from ...reference.profile import SplineProfile
 from ...reference.surface import Surface
-from ...reports.measure import Scale, relative_differences, state_error, steady_trajectory
+from ...reports.measure import Scale, coordinate_differences, relative_differences, steady_trajectory
 from ..error import ScenarioError
 from ..scenario import Start
 
@@ -22,6 +22,10 @@ _FINER_STEP = 0.75
 _CPU_REPEATS = 5
 # Least number of samples: in fewer, where hardly anything changes, equality to the last bit may be chance.
 _LEAST_SAMPLES = 10
+# Units in the last place by which a ride that was integrated differs at least from another one, as a root mean square:
+# conversions of its start alone round every number once or twice, and each of its steps does again.
+_LEAST_UNITS = 4.0
+_MOST_UNITS = 1e9  # that are told apart: a number near zero may differ by any number of its units
 
 
 @dataclass(frozen=True)
@@ -38,8 +42,6 @@ class Exact:
         start has an error.
     computed : tuple of Trajectory
         The reference's rides at its own settings and at finer ones.
-    round_off : Trajectory
-        The reference's ride from a start in which every number is one unit in the last place larger.
     cpu_time : float
         CPU time of the reference's ride [s].
     borders : int
@@ -49,22 +51,20 @@ class Exact:
     trajectory: Trajectory
     error: float
     computed: tuple[Trajectory, Trajectory]
-    round_off: Trajectory
     cpu_time: float
     borders: int
 
-    def is_copied_by(self, trajectory: Trajectory, scale: Scale) -> bool:
-        """Return whether a ride is one of the reference's, up to round-off.
+    def is_copied_by(self, trajectory: Trajectory) -> bool:
+        """Return whether a ride is one of the reference's, up to the last places of its numbers.
 
-        An engine that integrates by itself rounds its start to its own coordinates and rounds in every step after it.
-        Its ride therefore differs from the reference's by more than the reference's own ride changes by one unit in the
-        last place of the start alone. A ride that is closer was not integrated.
+        An engine that integrates by itself rounds its start to its own coordinates and rounds in every step after it. A
+        ride all of whose numbers agree with the reference's to a few units in the last place was not integrated. How
+        much the motion amplifies round-off does not matter: by chance an engine's own may end closer to the reference
+        than a ride of the reference from a start that is one unit off.
         """
-        n = len(trajectory.time)
-        if n < _LEAST_SAMPLES:
+        if len(trajectory.time) < _LEAST_SAMPLES:
             return False
-        least = state_error(self.round_off.first(n), self.computed[0], scale)
-        return any(state_error(trajectory, ride, scale) <= least for ride in self.computed)
+        return any(_count_units(trajectory, ride) < _LEAST_UNITS for ride in self.computed)
 
 
 def find_exact(start: Start) -> Exact:
@@ -97,10 +97,18 @@ def find_exact(start: Start) -> Exact:
         trajectory=trajectory,
         error=error,
         computed=(rides[0], finer),
-        round_off=shifted,
         cpu_time=cpu_time,
         borders=borders,
     )
+
+
+def _count_units(trajectory: Trajectory, other: Trajectory) -> float:
+    """Return the root mean square difference of two rides in units in the last place; zeros of both are left out."""
+    n = len(trajectory.time)
+    differences = np.array([coordinate_differences(trajectory, other), trajectory.qd - other.qd[:n]])
+    numbers = np.array([other.q[:n], other.qd[:n]])
+    units = np.minimum(np.abs(differences) / np.spacing(np.abs(numbers)), _MOST_UNITS)
+    return float(np.sqrt(np.mean(units[(numbers != 0) | (differences != 0)] ** 2)))
 
 
 def _borders_crossed(surface: Surface, trajectory: Trajectory) -> int:
