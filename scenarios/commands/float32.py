@@ -57,21 +57,22 @@ def float32_command(
 
     MuJoCo in C rides with its state rounded after every step; its ports that are installed ride in float32.
     """
-    from rich.console import Console
-
-    from ..files import make_folder
-    from ..scenario import load_scenario
-    from ..studies import all_rode_float32, study_float32, write_float32
-    from .present_float32 import show_float32
-    from .progress import ProgressBars
+    from .progress import COMPUTING, ProgressBars
+    from .terminal import make_console
 
     figures = parse_figure_output(formats, columns, None if out is not None else "--out")
-    changes = parse_changes(change, duration)
-    other = None if bicycle is None else load_bicycle(bicycle).bicycle
-    name, loaded = load_scenario(scenario, changes, "--set", other)
-    if out is not None:
-        make_folder(out)  # first, so that no work is lost if it fails
     with answering_missing_motion(as_json), showing_traceback(traceback), ProgressBars() as progress:
+        from ..files import make_folder
+        from ..scenario import load_scenario
+        from ..studies import all_rode_float32, study_float32, write_float32
+        from .present_float32 import show_float32
+
+        changes = parse_changes(change, duration)
+        other = None if bicycle is None else load_bicycle(bicycle).bicycle
+        name, loaded = load_scenario(scenario, changes, "--set", other)
+        if out is not None:
+            make_folder(out)  # first, so that no work is lost if it fails
+        progress.say(COMPUTING)
         trace = print_traceback if traceback else None
         document = study_float32(name, loaded, engine, starts, progress.watch, trace)
     written = [] if out is None else write_float32(document, out, figures)
@@ -79,5 +80,5 @@ def float32_command(
         if as_json:
             print_json(document)
         else:
-            show_float32(Console(), document)
+            show_float32(make_console(), document)
             show_written(written)

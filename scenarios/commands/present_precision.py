@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -24,13 +25,13 @@ _DIGITS = 3
 
 
 def show_precision(console: Console, document: Mapping[str, Any]) -> None:
-    """Print a work-precision study: one table per engine."""
+    """Print a work-precision study: one table per engine, the most accurate engine first."""
     limit = "" if document["horizon"] is None else "; beyond, the motion's own instability leaves nothing to compare"
     title = f"{document['scenario']}: errors over {compared_time(document):.4g} s{limit}"
     print_words(console, title, "bold")
     for line in document["warnings"]:
         print_words(console, f"warning: {line}", "yellow")
-    for name, entry in document["engines"].items():
+    for name, entry in sorted(document["engines"].items(), key=lambda item: _least_error(item[1])):
         console.print()
         console.print(name, style="bold", markup=False)
         points = entry["points"]
@@ -46,6 +47,10 @@ def show_precision(console: Console, document: Mapping[str, Any]) -> None:
         for failure in entry["failures"]:
             what = "" if failure["step"] is None else f"step {failure['step']:g}: "
             print_words(console, f"{what}{failure['reason']}", "yellow")
+
+
+def _least_error(entry: Mapping[str, Any]) -> float:
+    return min((point["position_error"] for point in entry["points"]), default=math.inf)
 
 
 def _precision_lines(entry: Mapping[str, Any]) -> Iterator[str]:
