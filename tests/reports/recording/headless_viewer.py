@@ -79,16 +79,18 @@ def open_tabs(client: ViewerClient, tabs: Sequence[str]) -> None:
     for archetypes in parts.values():
         container = archetypes.get("ContainerBlueprint", {})
         for child in container.get("contents", []):
-            if container.get("container_kind") == "Tabs" and names.get(child) in tabs:
+            if container.get("container_kind") == "Tabs" and names.get(child.lstrip("/")) in tabs:
                 container["active_tab"] = child
     client.set_blueprint(parts, of="recording")
 
 
 def switch(client: ViewerClient, view: str, entity: str, visible: bool) -> None:
-    """Show an entity and all below it in the view of this name, or do not."""
+    """Show an entity and all below it in the views of this name, or do not."""
     parts = client.get_blueprint().blueprint
-    [path] = [f"/{path}" for path, name in _names(parts).items() if name == view]
-    parts[f"{path}/ViewContents/overrides{entity}/visualizers"] = {"EntityBehavior": {"visible": visible}}
+    paths = [f"/{path}" for path, name in _names(parts).items() if name == view]
+    assert paths, f"no view is called {view}"
+    for path in paths:
+        parts[f"{path}/ViewContents/overrides{entity}/visualizers"] = {"EntityBehavior": {"visible": visible}}
     client.set_blueprint(parts, of="recording")
 
 
