@@ -11,7 +11,7 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogFormatterSciNotation, LogLocator, NullFormatter
 
 from ...engines.files import write_whole
 
@@ -84,7 +84,9 @@ def label_log_axes(axes: Axes) -> None:
         low, high = (math.log10(limit) for limit in limits)
         if math.floor(high) - math.ceil(low) < 1:
             axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axis.set_major_formatter(LogFormatterSciNotation(minor_thresholds=(math.inf, math.inf)))
+            powers = LogFormatterSciNotation(minor_thresholds=(math.inf, math.inf))
+            plain = FuncFormatter(lambda value, _: f"{value:g}")
+            axis.set_major_formatter(plain if low > -3 and high < 4 else powers)
 
 
 @contextmanager

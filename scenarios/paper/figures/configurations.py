@@ -51,7 +51,7 @@ def configurations_figure(
 ) -> Figure:
     """Draw each bicycle on its circle in its part of the bowl; call within `use_style`."""
     rows = (len(shown) + 1) // 2
-    figure = new_figure((2.95 if columns == 2 else 2.22) * rows, WIDTHS[columns])
+    figure = new_figure((3.15 if columns == 2 else 2.4) * rows, WIDTHS[columns])
     figure.set_layout_engine("compressed")  # pictures keep their shape: excess space goes outside, not between them
     panels = figure.subplots(rows, 2, squeeze=False).ravel()
     for axes in panels[len(shown) :]:
