@@ -39,6 +39,7 @@ def show_precision(console: Console, document: Mapping[str, Any]) -> None:
             for title, unit, key in _COLUMNS
         ]
         orders = ["", "", *("–" if order is None else f"{order:.3f}" for order in entry["orders"])]
+        orders += ["–"] * (len(points) - len(orders))  # of steps that change nothing
         columns.append(Column("order", orders[: len(points)], "1"))
         print_table(console, columns)
         for line in _precision_lines(entry):
