@@ -40,7 +40,8 @@ def show_precision(console: Console, document: Mapping[str, Any]) -> None:
         ]
         orders = ["", "", *("–" if order is None else f"{order:.3f}" for order in entry["orders"])]
         columns.append(Column("order", orders[: len(points)], "1"))
-        print_table(console, columns)
+        if points:
+            print_table(console, columns)
         for line in _precision_lines(entry):
             print_words(console, line)
         for failure in entry["failures"]:
@@ -51,8 +52,8 @@ def show_precision(console: Console, document: Mapping[str, Any]) -> None:
 def _precision_lines(entry: Mapping[str, Any]) -> Iterator[str]:
     if entry["richardson_error"] is not None:
         yield (
-            f"limit of the steps: {entry['richardson_error']:.2g} m from the reference over {entry['window']:.4g} s, "
-            f"known to {entry['richardson_uncertainty']:.2g} m"
+            f"limit of the steps: {entry['richardson_error']:.2g} m from the reference over {entry['window']:.4g} s; "
+            f"the last extrapolation moved it by {entry['richardson_uncertainty']:.2g} m"
         )
     found = entry["eigenvalues"]
     if found is not None:
