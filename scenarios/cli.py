@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import pairwise
 from typing import Annotated, NoReturn
 
@@ -141,5 +142,6 @@ def _is_completion(arguments: list[str]) -> bool:
 def _complain(message: str, status: int = 2) -> NoReturn:
     # The message may quote what was typed, so control characters are escaped.
     line = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in " ".join(message.split()))
-    print(f"velodrome: {line}", file=sys.stderr)
+    with suppress(BrokenPipeError):  # nobody reads it, and the status is the same
+        print(f"velodrome: {line}", file=sys.stderr)
     sys.exit(status)

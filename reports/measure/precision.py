@@ -115,11 +115,11 @@ def measure_order_range(levels: Sequence[Level], reference: Trajectory, size: fl
     if len(levels) < 3 or step_changes_nothing(levels):
         return None
     samples = _count_small_errors(levels, reference, size)
+    # A part needs two samples: in the first one all rides are at the start.
+    parts = [part for quarters in range(1, 5) for part in [samples * quarters // 4] if part > 1]
+    paths = [level.trajectory.q[:, :3] for level in levels[-3:]]
     found = [
-        order
-        for quarters in range(1, 5)
-        for order in observed_orders([level.trajectory.q[: samples * quarters // 4, :3] for level in levels[-3:]])
-        if samples * quarters // 4 > 1 and np.isfinite(order)
+        order for part in parts for order in observed_orders([path[:part] for path in paths]) if np.isfinite(order)
     ]
     return (min(found), max(found)) if found else None
 

@@ -113,8 +113,10 @@ def write_headline(
             since = min((t for name in first if (t := find_noted(ride, name)) is not None), default=None)
             when = "never a millimetre" if since is None else f"by more than a millimetre from {since:.2f} s on"
             each = " each" if len(first) > 1 else ""
+            among = "" if all(stays_up(measured[name]) for name in others) else "Of the engines that ride to the end, "
             sentences.append(
-                f"{_join(first)} {'drift' if each else 'drifts'} most:{each} {most:.2g} m from the reference, {when}. "
+                f"{among}{_join(first)} {'drift' if each else 'drifts'} most:{each} {most:.2g} m from the reference, "
+                f"{when}. "
                 f"What goes with it: {explain_error(measured[first[0]], duration)}."
             )
         closest = [name for name, error in up.items() if error <= (1 + _ALIKE) * least]

@@ -209,8 +209,8 @@
         group.forEach((each) => listed.add(each));
         const found = group.map(read);
         const texts = [...new Set(found.map((one) => one.reason || shown(panel, one.value)))];
-        const names = group.map((each) => data.engines[each]).join(" = ");
-        items.push(make("li", {}, ...group.map((each) => swatches[each].cloneNode(true)), `${names} ${texts.join(" / ")}`));
+        const names = group.flatMap((each, k) => [k ? " = " : "", make("span", { class: "whole" }, data.engines[each])]);
+        items.push(make("li", {}, ...group.map((each) => swatches[each].cloneNode(true)), ...names, ` ${texts.join(" / ")}`));
         found.forEach((one, k) => {
           if (one.reason || one.value < low || one.value > high) return;
           plot.append(make("span", { class: "dot", style: `left:${px(one.t)}%;top:${py(one.value)}%;background:${ink(group[k])}` }));

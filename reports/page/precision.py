@@ -110,7 +110,7 @@ def _make_overview(document: Mapping[str, Any]) -> PageTable:
             "step": entry["points"][-1]["step"] if entry["points"] else None,
             "error": entry["points"][-1]["position_error"] if entry["points"] else None,
             "limit": entry["richardson_error"],
-            "known": entry["richardson_uncertainty"],
+            "moved": entry["richardson_uncertainty"],
             "eigenvalues": (entry["eigenvalues"] or {}).get("error"),
         }
         for name, entry in document["engines"].items()
@@ -118,7 +118,8 @@ def _make_overview(document: Mapping[str, Any]) -> PageTable:
     orders = [entry["observed_order"] for entry in document["engines"].values()]
     return PageTable(
         caption="The limit is where the steps converge to, by Richardson's extrapolation, from the reference: an error "
-        "that no smaller step removes. The reference's own steps are held against its ride at full accuracy. A dash "
+        "that no smaller step removes; its last change is that by the last extrapolation, without the error of the "
+        "reference itself. The reference's own steps are held against its ride at full accuracy. A dash "
         "stands where the steps show nothing.",
         head="engine",
         names=list(rows),
@@ -127,7 +128,7 @@ def _make_overview(document: Mapping[str, Any]) -> PageTable:
             number_column("error there", "m", rows, "error", 2),
             TableColumn("observed order", "", ["–" if order is None else f"{order:.2f}" for order in orders]),
             number_column("limit of the steps", "m", rows, "limit", 2),
-            number_column("known to", "m", rows, "known", 2),
+            number_column("its last change", "m", rows, "moved", 2),
             number_column("error of its eigenvalues", "1/s", rows, "eigenvalues", 2),
         ],
     )

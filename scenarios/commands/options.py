@@ -250,8 +250,13 @@ def ending_with(status: int) -> Iterator[None]:
 
 def print_traceback(engine: str, error: Exception) -> None:
     """Print the traceback of an engine's exception on stderr."""
-    print(f"{engine}:", file=sys.stderr)
-    print_exception(error, file=sys.stderr)
+    from .terminal import leave_stderr
+
+    try:
+        print(f"{engine}:", file=sys.stderr)
+        print_exception(error, file=sys.stderr)
+    except BrokenPipeError:
+        leave_stderr()
 
 
 @contextmanager

@@ -40,8 +40,10 @@ def show_precision(console: Console, document: Mapping[str, Any]) -> None:
             for title, unit, key in _COLUMNS
         ]
         orders = ["", "", *("–" if order is None else f"{order:.3f}" for order in entry["orders"])]
+        orders += ["–"] * (len(points) - len(orders))  # of steps that change nothing
         columns.append(Column("order", orders[: len(points)], "1"))
-        print_table(console, columns)
+        if points:
+            print_table(console, columns)
         for line in _precision_lines(entry):
             print_words(console, line)
         for failure in entry["failures"]:
@@ -56,8 +58,8 @@ def _least_error(entry: Mapping[str, Any]) -> float:
 def _precision_lines(entry: Mapping[str, Any]) -> Iterator[str]:
     if entry["richardson_error"] is not None:
         yield (
-            f"limit of the steps: {entry['richardson_error']:.2g} m from the reference over {entry['window']:.4g} s, "
-            f"known to {entry['richardson_uncertainty']:.2g} m"
+            f"limit of the steps: {entry['richardson_error']:.2g} m from the reference over {entry['window']:.4g} s; "
+            f"the last extrapolation moved it by {entry['richardson_uncertainty']:.2g} m"
         )
     found = entry["eigenvalues"]
     if found is not None:

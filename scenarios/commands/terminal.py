@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import sys
 from textwrap import wrap
 
 from rich.console import Console
@@ -14,7 +16,22 @@ _BEFORE_UNIT, _NO_BREAK = re.compile(r"(?<=\d) (?=(?:m|s|N|J|%|rad|1/s|m/s|rad/s
 
 def make_console(stderr: bool = False) -> Console:
     """Return the console of stdout, or of stderr, which colours nothing by itself: a digit in a name is no number."""
-    return Console(stderr=stderr, highlight=False)
+    return _ErrorConsole(stderr=True, highlight=False) if stderr else Console(highlight=False)
+
+
+class _ErrorConsole(Console):
+    """The console of stderr: if its reader has gone, the command goes on."""
+
+    def on_broken_pipe(self) -> None:
+        # By default rich would close stdout, where the result goes, and exit.
+        leave_stderr()
+
+
+def leave_stderr() -> None:
+    """Let stderr lead nowhere, since its reader has gone; the result on stdout still has one."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stderr.fileno())
+    os.close(nowhere)
 
 
 def print_words(console: Console, words: str, style: str = "") -> None:

@@ -417,7 +417,7 @@ def test_what_fell_drifts_least_and_most_of_all_never() -> None:
     values["bare"] |= {"fell_at": 1.0}
     values["short"] |= {"ended": "it gave up"}
     said = write_headline(values, RideData(BOWL, RUNS), GROWTH, 3.0)
-    assert said.startswith("one drifts most: ")
+    assert said.startswith("Of the engines that ride to the end, one drifts most: ")
     assert "bare fell at 1.00 s." in said
     assert "short ended at 0.60 s." in said
     found = {row.name: row for row in list_findings(values, RideData(BOWL, RUNS), 3.0)}

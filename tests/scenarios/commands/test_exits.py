@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -245,6 +246,34 @@ def test_a_reader_who_has_gone_does_not_change_the_status(show: str, tmp_path: P
         process.stdout.close()
         assert process.stderr.read() == b""
     assert process.returncode == 1
+
+
+@pytest.mark.parametrize("show", ["ProgressBars().note('a remark')", "print_traceback('an engine', ValueError())"])
+def test_a_reader_of_stderr_who_has_gone_takes_no_result_along(show: str, tmp_path: Path) -> None:
+    code = (
+        "from velodrome.scenarios.commands.options import print_json, print_traceback\n"
+        "from velodrome.scenarios.commands.progress import ProgressBars\n"
+        f"{show}\n"
+        "print_json({'a': 1})"
+    )
+    done = without_reader_of_stderr(code, tmp_path)
+    assert (json.loads(done.stdout)["a"], done.returncode) == (1, 0)
+
+
+def test_bad_input_has_its_status_if_nobody_reads_stderr(tmp_path: Path) -> None:
+    code = "import sys; from velodrome.scenarios.cli import main; sys.argv[1:] = ['show', 'nothing']; main()"
+    done = without_reader_of_stderr(code, tmp_path)
+    assert (done.stdout, done.returncode) == ("", 2)
+
+
+def without_reader_of_stderr(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        command = [sys.executable, "-c", code]
+        return subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, stderr=writer, text=True, check=False)
+    finally:
+        os.close(writer)
 
 
 def test_an_exit_from_nowhere_is_no_success(velodrome, monkeypatch: pytest.MonkeyPatch) -> None:

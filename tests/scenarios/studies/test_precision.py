@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from dataclasses import replace
 from functools import cache
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from tests.sealing import contents
 from velodrome.engines.admission import ride_engine
@@ -17,6 +19,7 @@ from velodrome.engines.engine import REFERENCE
 from velodrome.engines.registry import load_engine
 from velodrome.reports.measure.metrics import position_errors
 from velodrome.reports.measure.precision import SAME_BITS, Level, engine_document
+from velodrome.scenarios.commands.present_precision import show_precision
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run.runner import measure_one
 from velodrome.scenarios.scenario.schema import load_scenario
@@ -99,6 +102,31 @@ def test_a_step_that_changes_nothing_shows_neither_order_nor_limit() -> None:
     entry = engine_document(levels, [], same, start.size, None)
     assert (entry["observed_order"], entry["richardson_error"], entry["window"]) == (None, None, None)
     assert [failure["reason"] for failure in entry["failures"]] == [SAME_BITS]
+    study = {"scenario": "plane-circle", "horizon": None, "duration": 0.2, "warnings": []}
+    console = Console(width=100, record=True, file=io.StringIO())
+    show_precision(console, study | {"engines": {"own": entry | {"eigenvalues": None}}})
+    rows = [line.split() for line in console.export_text().splitlines() if line.startswith("0.0")]
+    assert [row[-1] for row in rows][2:] == ["–"]
+
+
+def test_a_window_of_few_samples_shows_its_order() -> None:
+    """Quarters of a window of two or three samples hold no sample, or the start alone."""
+    start = make_start(load_scenario("plane-circle", {"simulation.duration": 0.2})[1])
+    engine = load_engine(REFERENCE)
+    exact = ride_engine(engine, start.problem, engine.settings(), lambda _: None)
+    measured = measure_one(start, exact, exact, step_noise=0.0)
+
+    def ride(step: float, beyond: int) -> Level:
+        q = exact.q.copy()
+        q[:, 0] += 1e-6 * step**2 * exact.time
+        q[beyond:, 0] += start.size
+        return Level(step, replace(exact, q=q), measured)
+
+    for samples, order in ((1, None), (2, 2.0), (3, 2.0)):
+        entry = engine_document([ride(step, samples) for step in (0.04, 0.02, 0.01)], [], exact, start.size, None)
+        expected = None if order is None else pytest.approx(order, abs=1e-3)
+        assert entry["observed_order"] == expected
+        assert entry["order_range"] == (None if order is None else [expected, expected])
 
 
 def test_an_order_that_is_not_settled_is_none() -> None:
