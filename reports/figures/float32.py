@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..drawing import assign_colours
-from .style import GREY, MARKERS, WIDTHS, darken, label_log_axes, new_figure
+from .style import GREY, MARKERS, WIDTHS, darken, escape_math, label_log_axes, new_figure
 
 
 def float32_figure(document: Mapping[str, Any], columns: int = 2) -> Figure:
@@ -42,7 +42,7 @@ def float32_figure(document: Mapping[str, Any], columns: int = 2) -> Figure:
         time = np.array([point["time"] for point in points])
         measured = np.array([point["rms_distance"] for point in points])
         predicted = np.array([np.hypot(point["unrelated_digits"], point["repeated_digits"]) for point in points])
-        ax.plot(time, measured, color=shade, marker=marker, ms=4, ls="none", label=label)
+        ax.plot(time, measured, color=shade, marker=marker, ms=4, ls="none", label=escape_math(label))
         ax.plot(time, predicted, color=shade, lw=1)
     rest = document["reference_distance"]
     if rest:

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from ...engines.engine import REFERENCE
 from ..drawing import assign_colours
 from ..measure import compared_time
-from .style import GREY, INK, MARKERS, WIDTHS, darken, label_log_axes, new_figure
+from .style import GREY, INK, MARKERS, WIDTHS, darken, escape_math, label_log_axes, new_figure
 
 
 def precision_figure(document: Mapping[str, Any], columns: int = 2) -> Figure:
@@ -67,7 +67,7 @@ def _draw_engine(by_step: Axes, by_cost: Axes, name: str, entry: Mapping[str, An
         return
     step, error, cost = (np.array([p[key] for p in points]) for key in ("step", "position_error", "cpu_time"))
     order = entry["observed_order"]
-    label = name if order is None else f"{name}: order {order:.2f}"
+    label = escape_math(name) if order is None else f"{escape_math(name)}: order {order:.2f}"
     by_step.plot(step, error, color=shade, marker=marker, ms=4, label=label)
     by_cost.plot(cost, error, color=shade, marker=marker, ms=4)
     limit = entry["richardson_error"]

@@ -104,6 +104,11 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def escape_math(text: str) -> str:
+    """Return a text, such as a name that a user gave, in which no $ begins a formula."""
+    return text.replace("$", r"\$")
+
+
 def write_figure(path: Path, figure: Figure) -> None:
     """Write a figure, completely or not at all.
 

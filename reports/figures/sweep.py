@@ -15,11 +15,13 @@ from matplotlib.lines import Line2D
 
 from ...engines.engine import REFERENCE
 from ..drawing import assign_colours
-from .style import GREY, INK, MARKERS, WIDTHS, darken, label_log_axes, new_figure
+from .style import GREY, INK, MARKERS, WIDTHS, darken, escape_math, label_log_axes, new_figure
 
 _DECADES = 2.0  # span of positive values from which their axis is logarithmic
 _MARGIN = 0.06  # of the axes beyond the values, as a share of their span
 _EQUAL_RATIOS = 1e-6  # relative spread of the ratios of values that are spaced geometrically
+_LARGEST = 1e300  # at the end of an axis
+_EXPONENTS = -200.0, 200.0  # of 10 at the ends of a logarithmic axis, whose ticks go on beyond them by a third of it
 _MOST_STYLES = 4
 _MOST_MARKS = 5000  # of an engine; more are stored as pixels, since files would take many megabytes
 _STYLES = ("-", "--", ":", "-.")
@@ -99,17 +101,21 @@ def sweep_figure(
     handles: list[Line2D] = []
     for marker, (name, own) in zip(cycle(MARKERS), runs.items(), strict=False):
         if name not in shown:
-            handles.append(Line2D([], [], ls="", label=f"{name}: no value"))
+            handles.append(Line2D([], [], ls="", label=f"{escape_math(name)}: no value"))
             continue
         shade = INK if name == REFERENCE else darken(shades[name])
         _draw_lines(axes, own, shade, styles)
         _draw_marks(axes, own, shade, marker)
-        handles.append(Line2D([], [], color=shade, marker=marker, ms=4, ls="", label=name))
+        handles.append(Line2D([], [], color=shade, marker=marker, ms=4, ls="", label=escape_math(name)))
     if any(line.get_gid() == "line" for line in axes.lines):
         if len(styles) > 1:
-            handles += [Line2D([], [], color=GREY, lw=0.9, ls=style, label=text) for text, style in styles.items()]
+            handles += [
+                Line2D([], [], color=GREY, lw=0.9, ls=style, label=escape_math(text)) for text, style in styles.items()
+            ]
         elif joined:
-            handles.append(Line2D([], [], color=GREY, lw=0.9, label=fill(joined, 60 if columns == 2 else 44)))
+            handles.append(
+                Line2D([], [], color=GREY, lw=0.9, label=fill(escape_math(joined), 60 if columns == 2 else 44))
+            )
     handles += _explain_marks(axes, shown)
     axes.grid(True)
     label_log_axes(axes)
@@ -149,20 +155,21 @@ def _set_axis(axes: Axes, name: str, axis: SweepAxis, values: np.ndarray) -> Non
     drawn = axes.xaxis if name == "x" else axes.yaxis
     drawn.label.set_parse_math(False)
     if axis.categories:
-        drawn.set_ticks(range(len(axis.categories)), list(axis.categories))
+        drawn.set_ticks(range(len(axis.categories)), [escape_math(text) for text in axis.categories])
         axes.set(**{f"{name}lim": (-0.5, len(axis.categories) - 0.5)})
         return
     if not len(values):
         return
     logarithmic = _is_logarithmic(values)
-    low, high = float(values.min()), float(values.max())
+    # The results of rides that nothing holds any more are finite, but their span may be no number.
+    low, high = np.clip([values.min(), values.max()], -_LARGEST, _LARGEST)
     if logarithmic:
         low, high = np.log10(low), np.log10(high)
     margin = _MARGIN * (high - low) or 0.1 * abs(high) or 1.0
     limits = low - margin, high + margin
     if logarithmic:
         axes.set(**{f"{name}scale": "log"})
-        limits = 10 ** limits[0], 10 ** limits[1]
+        limits = tuple(10 ** np.clip(limits, *_EXPONENTS))
     axes.set(**{f"{name}lim": limits})
 
 
@@ -171,9 +178,9 @@ def _is_logarithmic(values: np.ndarray) -> bool:
     distinct = np.unique(values)
     if distinct[0] <= 0 or len(distinct) < 3:
         return False
-    ratios = distinct[1:] / distinct[:-1]
-    geometric = np.ptp(ratios) < _EQUAL_RATIOS * ratios[0]
-    return bool(geometric or distinct[-1] > 10**_DECADES * distinct[0])
+    powers = np.log(distinct)
+    geometric = np.ptp(np.diff(powers)) < _EQUAL_RATIOS
+    return bool(geometric or powers[-1] - powers[0] > _DECADES * np.log(10))
 
 
 def _assign_styles(runs: Mapping[str, SweepRuns]) -> dict[str, str]:

@@ -103,3 +103,22 @@ def test_texts_on_the_abscissa_are_its_ticks() -> None:
             "A sweep", SweepAxis("surface.kind", True, ("cone", "sphere")), Y, {"exudyn": runs([1, 2])}
         )
     assert [tick.get_text() for tick in figure.axes[0].get_xticklabels()] == ["cone", "sphere"]
+
+
+def test_names_with_dollars_are_no_formulas() -> None:
+    """A bicycle's file may be called so, and a formula that cannot be parsed would end the drawing."""
+    names = ("a$_$b.toml", r"$\frac{$")
+    own = runs([1.0, 2.0, 2.0, 3.0], lines=["bicycle = $_$"] * 2 + ["bicycle = $^$"] * 2)
+    own = SweepRuns(np.array([0.0, 1, 0, 1]), own.y, own.whole, own.lines)
+    with use_style():
+        figure = sweep_figure("A $_$ sweep", SweepAxis("bicycle", True, names), Y, {"own$^$": own}, "equal $_$")
+        figure.canvas.draw()
+    assert [tick.get_text().replace(r"\$", "$") for tick in figure.axes[0].get_xticklabels()] == [*names]
+
+
+@pytest.mark.parametrize("values", [[1e300, 1e3, 1e-9], [1.7e308, -1.7e308, 0.0], [1.7e308, 5e-324, 1.0]])
+def test_rides_that_grow_to_the_largest_numbers_are_drawn(values: list[float]) -> None:
+    figure = draw(exudyn=runs(values, [False] * 3))
+    figure.canvas.draw()
+    assert np.isfinite(figure.axes[0].get_ylim()).all()
+    assert len(points(figure, "early")) == 3
