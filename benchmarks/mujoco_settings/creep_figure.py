@@ -128,11 +128,11 @@ def _draw_energy(ax: Axes, rows: Sequence[Row]) -> None:
     if first_order:
         text, above = f"{np.median(first_order):.2g} W a millisecond of step", max(abs(row["gain"]) for row in rows)
         ax.text(steps[-1], above / 8, text, ha="right", va="top", color=GREY, fontsize=7)
-    ax.set(xscale="log", yscale="log", xlabel="step [ms]", ylabel="energy added [W]")
+    ax.set(xscale="log", yscale="log", xlabel="step [ms]", ylabel="power added [W]")
     ax.set_xticks(steps, [f"{step:g}" for step in steps])
     ax.minorticks_off()
     ax.legend(loc="center left")
-    _set_title(ax, "One-step integrators add energy")
+    _set_title(ax, "First-order integrators add energy")
 
 
 def _draw_price(ax: Axes, rows: Sequence[Row], ground: str) -> None:
@@ -148,7 +148,7 @@ def _draw_price(ax: Axes, rows: Sequence[Row], ground: str) -> None:
             if best:
                 labels.append(Label(label(row), point))
         fallen = [row for row in rows if row["engine"] == engine and not row["changed"] and not rode(row)]
-        note = f", falls after {fallen[0]['ridden']:.2g} s as it is" if fallen else ""
+        note = f", off its circle after {fallen[0]['ridden']:.2g} s as it is" if fallen else ""
         ax.plot([], [], marker="o", ms=5, color=shade, ls="none", label=engine + note)
     ax.set(xscale="log", yscale="log", xlabel="CPU time [ms a simulated second]", ylabel="slip [mm/s]")
     ax.margins(x=0.12)

@@ -86,7 +86,7 @@ def _write_headline(families: Mapping[str, Mapping[str, Any]]) -> str:
     told = []
     for name, family in families.items():
         for section in family["stable_sections"]:
-            ends = " to ".join(f"{rate:.4g}" for rate in section["rear_rate"])
+            ends = " to ".join(f"{rate:.4g}" for rate in sorted(section["rear_rate"]))
             ridden = {"wholly": "", "partly": ", of which a part can be ridden", "not": ", which cannot be ridden"}
             told.append(f"{name} from a rear rate of {ends} rad/s{ridden[section['rideable']]}")
     if not told:

@@ -42,9 +42,9 @@ def show_diff(console: Console, document: Mapping[str, Any]) -> None:
     columns.append(Column("the same", [_format_verdict(entry) for entry in entries], right=False))
     print_table(console, columns, gap=1)
     if document["same"]:
-        console.print("the engines in both runs are the same within round-off", style="bold green")
+        console.print("the rides of the engines in both runs are the same within round-off", style="bold green")
     else:
-        console.print("the engines in both runs are not the same", style="bold red")
+        console.print("the rides of the engines in both runs are not the same", style="bold red")
     for line, style in _list_lines(document, names):
         print_words(console, line, style)
 

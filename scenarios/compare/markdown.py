@@ -17,7 +17,7 @@ def diff_markdown(document: Mapping[str, Any]) -> str:
     names = [run["name"] for run in document["runs"]]
     word = "the same within round-off" if document["same"] else "not the same"
     title = escape_markdown(f"{document['title']}: {names[0]} against {names[1]}")
-    lines = [f"# {title}", "", f"The engines in both runs are {word}.", ""]
+    lines = [f"# {title}", "", f"The rides of the engines in both runs are {word}.", ""]
     lines += _list_surroundings(document)
     for name, engine in document["engines"].items():
         lines += ["", f"## {escape_markdown(name)}: {engine['verdict']}", "", *_engine_lines(engine)]
@@ -29,7 +29,7 @@ def diff_verdict(document: Mapping[str, Any]) -> str:
     word = "the same within round-off" if document["same"] else "not the same"
     names = (f"{when}: {escape_markdown(run['name'])}" for when, run in zip(_WHEN, document["runs"], strict=True))
     once = [name for name, engine in document["engines"].items() if engine["verdict"] == TO_THE_BIT]
-    lines = [f"**The engines in both runs are {word}.**", "; ".join(names)]
+    lines = [f"**The rides of the engines in both runs are {word}.**", "; ".join(names)]
     lines += [f"The same to the bit, drawn once: {escape_markdown(', '.join(once))}"] if once else []
     return "\n\n".join(lines) + "\n"
 

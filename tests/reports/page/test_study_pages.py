@@ -109,7 +109,9 @@ def test_two_runs_are_told_by_how_far_they_moved() -> None:
     ]
     assert "100" not in [text for attrs, text in parsed.all("span") if attrs.get("class") == "tick y"]
     same = Parsed(diff_page(same=True, engines={REFERENCE: engine_difference(0.0)}))
-    assert "The engines in both runs are the same within round-off." in " ".join(text for _, text in same.all("li"))
+    assert "The rides of the engines in both runs are the same within round-off." in " ".join(
+        text for _, text in same.all("li")
+    )
 
 
 def test_sizes_over_time_follow_the_rides_that_stay_up() -> None:
@@ -402,6 +404,11 @@ def test_a_page_of_families_tells_what_is_stable_and_can_be_ridden() -> None:
     assert headline == (
         "Lyapunov stable: families 2, 4 from a rear rate of 0.5 to 2.5 rad/s, of which a part can be ridden."
     )
+    backwards = families_document()
+    for family in backwards["families"]:
+        for section in family["stable_sections"]:
+            section["rear_rate"] = section["rear_rate"][::-1]
+    assert headline in make_families_page(backwards, MACHINE["libraries"])
     said = [text for _, text in parsed.all("li")]
     assert f"• can be ridden: rear rate 0.5 rad/s (hopf) to 2.5 rad/s ({HOSTILE})" in said
     assert "• cannot be ridden" in said

@@ -63,7 +63,7 @@ def test_a_repeated_run_is_the_same_to_the_bit(folder: Path, tmp_path: Path) -> 
     found = diff_runs(read_pair(folder, ride(tmp_path)))
     assert found["same"]
     assert {entry["verdict"] for entry in found["engines"].values()} == {"same to the bit"}
-    assert "the engines in both runs are the same within round-off" in shown(found)
+    assert "the rides of the engines in both runs are the same within round-off" in shown(found)
 
 
 def test_a_changed_setting_differs_and_is_named(folder: Path, halved: Path) -> None:
@@ -78,7 +78,7 @@ def test_a_changed_setting_differs_and_is_named(folder: Path, halved: Path) -> N
     assert entry["step_noise"] == 1e-8
     text = shown(found)
     assert f"{NATIVE}\n  step 0.002 -> 0.001\n" in text
-    assert "the engines in both runs are not the same" in text
+    assert "the rides of the engines in both runs are not the same" in text
 
 
 def test_the_table_tears_no_verdict_at_eighty_columns(folder: Path, halved: Path) -> None:
@@ -142,7 +142,7 @@ def test_a_recording_of_two_runs_says_which_they_are_and_what_is_drawn_once(fold
     pair = read_pair(folder, halved)
     found = diff_runs(pair)
     assert diff_verdict(found).split("\n\n") == [
-        "**The engines in both runs are not the same.**",
+        "**The rides of the engines in both runs are not the same.**",
         f"before: {pair.before.name}; after: {pair.after.name}",
         "The same to the bit, drawn once: reference\n",
     ]
