@@ -47,7 +47,7 @@ _STYLE: Any = {
     "ytick.labelcolor": INK,
     "xtick.direction": "in",
     "ytick.direction": "in",
-    "xtick.major.pad": 4.5,
+    "xtick.major.pad": 5.5,
     "xtick.labelsize": 7.5,
     "ytick.labelsize": 7.5,
     "grid.color": PALE,
