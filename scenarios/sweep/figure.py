@@ -80,18 +80,20 @@ def check_plots(plots: Iterable[SweepPlot], plan: SweepPlan) -> None:
     ScenarioError
         With one line.
     """
-    known = {key for task in plan.tasks for key in task.changes}
+    facts = {**ROW_FACTS, **METRICS}
+    known = {*facts, *_TIMES, *(key for task in plan.tasks for key in task.changes)}
     for plot in plots:
         for column in (plot.y, plot.x):
-            _check_column(column, {**METRICS, **dict.fromkeys(_TIMES)}.keys() | known)
+            _check_column(column, known)
+        if facts.get(plot.y) == pa.string():
+            raise _refuse_texts(plot.y)
 
 
 def _check_column(column: str, known: Collection[str]) -> None:
     patterns = {f"{_ANY_ENGINE}{key.split('.', 2)[2]}" for key in known if key.startswith("engines.")}
     if column not in known and column not in patterns:
-        raise ScenarioError(
-            f"--plot: the sweep's rows have no {show_value(column)} ({suggest_name(column, [*known, *patterns])})"
-        )
+        hint = suggest_name(column, sorted({*known, *patterns}))
+        raise ScenarioError(f"--plot: the sweep's rows have no {show_value(column)} ({hint})")
 
 
 def read_sweep_folder(folder: Path) -> dict[str, Any]:
@@ -217,9 +219,13 @@ def _read_values(
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return [np.array([np.nan if v is None else v for v in column], float) for column in columns], ()
     if not categories:
-        raise ScenarioError(f"--plot: {show_value(name)} has no numbers; only the X of Y:X may be text")
+        raise _refuse_texts(name)
     names = tuple(sorted({str(value) for value in values}))
     return [np.array([np.nan if v is None else names.index(str(v)) for v in c], float) for c in columns], names
+
+
+def _refuse_texts(name: str) -> ScenarioError:
+    return ScenarioError(f"--plot: {show_value(name)} has no numbers; only the X of Y:X may be text")
 
 
 def _list_varied(table: pa.Table, plot: SweepPlot, engine: str) -> list[str]:

@@ -13,7 +13,7 @@ from sweeping import UPRIGHT, here, planned, swept, written
 from velodrome.scenarios.commands import run_sweep as command
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.files import FigureOutput
-from velodrome.scenarios.sweep import SweepPlot, parse_plots, write_sweep_figures
+from velodrome.scenarios.sweep import SweepPlot, check_plots, parse_plots, write_sweep_figures
 from velodrome.scenarios.sweep import figure as figure_module
 from velodrome.scenarios.sweep.store import MANIFEST
 
@@ -73,6 +73,20 @@ def test_a_finished_sweep_is_drawn_without_running(folder: Path, capsys: pytest.
     with Image.open(expected[0]) as image:
         assert image.width == int(300 * 89 / 25.4)
     assert expected[3].read_bytes().startswith(b"%PDF-")
+
+
+def test_plots_are_judged_before_a_sweep_as_after_it(folder: Path, tmp_path: Path) -> None:
+    plan = planned(tmp_path, RIDES)
+    check_plots(parse_plots(["max_slip:status"]), plan)
+    for name in ("ended", "status"):
+        plots = parse_plots([f"{name}:perturbation.lean_rate"])
+        with pytest.raises(ScenarioError, match="has no numbers; only the X of Y:X may be text"):
+            check_plots(plots, plan)
+    with pytest.raises(ScenarioError, match="the sweep's rows have no zzz") as before:
+        check_plots(parse_plots(["max_slip:zzz"]), plan)
+    with pytest.raises(ScenarioError) as after:
+        write_sweep_figures(folder, parse_plots(["max_slip:zzz"]), FigureOutput())
+    assert str(before.value) == str(after.value)
 
 
 def test_a_sweep_that_runs_is_drawn_at_its_end(
