@@ -507,3 +507,23 @@ def test_the_pages_can_be_used_by_everyone(name: str, dark: bool, tmp_path: Path
 @pytest.mark.parametrize("name", list(PAGES))
 def test_the_pages_fit_into_400_pixels(name: str, tmp_path: Path) -> None:
     assert headless.measure_width(PAGES[name](), 400, tmp_path) <= 400
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(headless.missing() is not None, reason=str(headless.missing()))
+def test_the_contents_of_a_page_do_not_cover_its_head(tmp_path: Path) -> None:
+    studied = precision_document()
+    studied["engines"] |= {f"a-long-name-of-engine-{k}": studied["engines"]["near"] for k in range(8)}
+    script = """
+    const extent = (element) => {  // of its text, which may be wider than its box
+      const range = document.createRange();
+      range.selectNodeContents(element);
+      return range.getBoundingClientRect();
+    };
+    const [kicker, ...others] = [...document.querySelectorAll("header > :not(nav), nav li")].map(extent);
+    const crosses = (low, high) => (box) => box[low] < kicker[high] && kicker[low] < box[high];
+    const covering = others.filter(crosses("left", "right")).filter(crosses("top", "bottom")).length;
+    return { covering, lines: new Set(others.map((box) => box.top)).size };"""
+    found = headless.examine(make_precision_page(studied), script, tmp_path)
+    assert found["lines"] > 4  # heading, lead, facts, and contents of more than one line
+    assert found["covering"] == 0
