@@ -127,8 +127,7 @@ def _make_table(rows: list[Mapping[str, Any]]) -> PageTable:
     judged = [row for row in rows if row["quantity"] != _CHANGES]
     ordered = sorted(judged, key=lambda row: (_rank(row), -(_find_share(row) or 0.0)))
     numbers = {
-        key: [text for row in ordered for text in format_numbers([row[key]], 6)]
-        for key in ("value", "baseline", "limit")
+        key: [_format_value(row["quantity"], row[key]) for row in ordered] for key in ("value", "baseline", "limit")
     }
     shares = ["–" if (share := _find_share(row)) is None else f"{share:.2g}" for row in ordered]
     return PageTable(
@@ -137,6 +136,7 @@ def _make_table(rows: list[Mapping[str, Any]]) -> PageTable:
         names=[row["engine"] for row in ordered],
         columns=[
             TableColumn("quantity", "", [format_title(row["quantity"]) for row in ordered], words=True),
+            TableColumn("unit", "", [find_quantity(row["quantity"]).unit for row in ordered], words=True),
             TableColumn("value", "", numbers["value"]),
             TableColumn("baseline", "", numbers["baseline"]),
             TableColumn("limit", "", numbers["limit"]),
@@ -144,6 +144,13 @@ def _make_table(rows: list[Mapping[str, Any]]) -> PageTable:
             TableColumn("verdict", "", [_describe(SIGNS[row["status"]]) for row in ordered], words=True),
         ],
     )
+
+
+def _format_value(quantity: str, value: float | None) -> str:
+    """Return a value with six digits, and a number of steps whole."""
+    if quantity.endswith("steps") and value is not None:
+        return f"{value:.0f}"
+    return format_numbers([value], 6)[0]
 
 
 def _describe(sign: GateSign) -> str:

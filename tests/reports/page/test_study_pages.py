@@ -243,8 +243,9 @@ def test_the_gates_page_puts_the_worst_first() -> None:
     cells = [text for _, text in parsed.all("td")]
     assert "✗worseposition error 4" in cells  # of the engine; it moved by 2 against a limit of 0.5
     assert "+improvedmax slip 1.5" in cells
+    assert "m" in cells  # the unit of the position error
     table = cells[cells.index("run") :]  # the worst of all quantities is the one that is missing
-    assert [row[-1] for row in zip(*[iter(table)] * 6, strict=False)][:4] == [
+    assert [row[-1] for row in zip(*[iter(table)] * 7, strict=False)][:4] == [
         "✗ missing",
         "✗ worse",
         "≠ changed",
