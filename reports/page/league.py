@@ -168,6 +168,7 @@ def make_league_page(document: Mapping[str, Any]) -> str:
         facts=_list_facts(document),
         engines=list_engine_styles(names),
         columns=LEAGUE_COLUMNS,
+        overview=_make_overview(document),
         sections=[_make_section(document, name, names) for name in document["scenarios"]],
         share=CREEPS,
         explained=EXPLAINED,
@@ -178,13 +179,36 @@ def make_league_page(document: Mapping[str, Any]) -> str:
 def _list_facts(document: Mapping[str, Any]) -> list[tuple[str, str]]:
     file = document["settings_file"]
     return [
-        ("Engines", ", ".join(document["engines"])),
+        ("Engines", f"{sum(name != REFERENCE for name in document['engines'])} beside the reference"),
         ("Scenarios", ", ".join(document["scenarios"])),
         ("Steps", f"that of the settings, halved {document['levels'] - 1} times"),
         ("Settings", "the engines' defaults" if file is None else f"the engines' defaults, replaced by {file}"),
         ("Run on", words.describe_date(document["created"])),
         ("State", "complete" if document["complete"] else "interrupted: the finished rides are shown"),
     ]
+
+
+def _make_overview(document: Mapping[str, Any]) -> list[tuple[str, list[str]]]:
+    """Return the position errors of every engine in all scenarios, in the order of the first scenario."""
+    scenarios = list(document["scenarios"])
+    ranked = [name for scenario in scenarios for name, _ in rank_rides(document, scenario) if name != REFERENCE]
+    rides = {name: document["engines"][name]["scenarios"] for name in dict.fromkeys(ranked)}
+    return [(name, [_describe_error(found.get(scenario)) for scenario in scenarios]) for name, found in rides.items()]
+
+
+def _describe_error(ride: Mapping[str, Any] | None) -> str:
+    """Return a whole ride's largest position error, or why there is none."""
+    if ride is None:
+        return "not reached"
+    if ride["status"] == "unsuitable":
+        return "not made for it"
+    if ride["status"] == "failed":
+        return "did not ride"
+    if ride["fell_at"] is not None:
+        return f"✕ fell at {ride['fell_at']:.2f} s"
+    if ride["status"] == "ended":
+        return "✕ ended early"
+    return "–" if ride["position_error"] is None else f"{ride['position_error']:.1e}"
 
 
 def _make_section(document: Mapping[str, Any], scenario: str, names: list[str]) -> dict[str, Any]:

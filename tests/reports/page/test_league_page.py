@@ -103,10 +103,27 @@ def test_what_an_engine_leaves_out_for_an_old_release_is_told() -> None:
     assert HOSTILE not in page
 
 
+def read_rows(table: str) -> list[str]:
+    """The text of each row of the first table's body."""
+    body = table[table.index("<tbody>") : table.index("</tbody>")]
+    return [" ".join(re.sub(r"<[^>]*>", " ", row).split()) for row in body.split("</tr>")[:-1]]
+
+
+def test_the_overview_says_of_every_engine_how_far_it_comes() -> None:
+    found = document()
+    found["engines"]["fallen"] = found["engines"]["worse"] | {
+        "scenarios": {HOSTILE: ride(1e-9, status="fell", fell_at=0.5)}
+    }
+    page = make_league_page(found)
+    rows = read_rows(page[page.index('id="overview"') :])
+    assert rows[:4] == ["better 3.0e-05", "worse 2.0e-02", "fallen ✕ fell at 0.50 s", "unsuitable not made for it"]
+    assert len(rows) == 6
+    assert all(row.endswith("did not ride") for row in rows[4:])
+
+
 def test_rows_stand_by_error_with_their_reasons() -> None:
     page = make_league_page(document())
-    body = page[page.index("<tbody>") : page.index("</tbody>")]
-    rows = [" ".join(re.sub(r"<[^>]*>", " ", row).split()) for row in body.split("</tr>")[:-1]]
+    rows = read_rows(page[page.index('id="ride-') :])
     assert [row.split()[0] for row in rows[:4]] == [REFERENCE, "better", "worse", "unsuitable"]
     assert "0.90 to 1.10" in rows[2]
     assert "not made for this ride: &lt;script&gt;" in rows[3]
