@@ -22,6 +22,7 @@ from typing import Any
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 SIZE = (1280, 5600)
 PATIENCE = 120  # for a busy machine [s]
+INSTALLING = 600  # for a slow registry [s]
 AXE = "axe-core@4.14.1"  # MPL-2.0; used by tests only
 AXE_FOLDER = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "velodrome-tests" / AXE
 AXE_SCRIPT = AXE_FOLDER / "node_modules" / "axe-core" / "axe.min.js"
@@ -59,7 +60,7 @@ def install() -> None:
     if browser() is not None:
         return
     for command in (["apt-get", "update"], ["apt-get", "install", "--yes", "--no-install-recommends", "chromium"]):
-        subprocess.run(command, check=True)
+        subprocess.run(command, check=True, timeout=INSTALLING)
 
 
 def _run(address: str, *options: str) -> tuple[str, list[str]]:
