@@ -201,9 +201,7 @@ def parse_figure_output(
     ScenarioError
         If there is no such format, or the command writes no figures.
     """
-    from ...engines.names import suggest_name
     from ..files import FIGURE_FORMATS, FigureOutput
-    from ..scenario import show_value
 
     if needed is not None:
         for option, value in (("--format", formats), ("--columns", columns)):
@@ -211,6 +209,10 @@ def parse_figure_output(
                 raise ScenarioError(f"{option}: it is of figures, which are written with {needed} only")
     for name in formats or ():
         if name not in FIGURE_FORMATS:
+            # Imported here: scenarios take half a second to load, in which the command has said nothing yet.
+            from ...engines.names import suggest_name
+            from ..scenario import show_value
+
             raise ScenarioError(f"--format {show_value(name)}: no such format ({suggest_name(name, FIGURE_FORMATS)})")
     return FigureOutput(tuple(dict.fromkeys(formats or usual)), 2 if columns is None else columns)
 
