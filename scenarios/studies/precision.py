@@ -263,10 +263,10 @@ def run_levels(
         measured = measure_one(start, trajectory, reference, step_noise=claimed_noise(engine, settings))
         simulated = _duration(problem) if trajectory.ended is None else float(trajectory.time[-1])
         level = Level(simulated / max(trajectory.steps, 1), trajectory, measured)
-        if trajectory.ended is not None:
-            yield LevelFailure(step, f"ended at {trajectory.time[-1]:.6g} s: {trajectory.ended}", level)
-        elif measured["fell_at"] is not None:
+        if measured["fell_at"] is not None:  # what lies may end the ride later
             yield LevelFailure(step, f"fell at {measured['fell_at']:.6g} s", level)
+        elif trajectory.ended is not None:
+            yield LevelFailure(step, f"ended at {trajectory.time[-1]:.6g} s: {trajectory.ended}", level)
         else:
             yield level
 

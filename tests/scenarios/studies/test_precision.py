@@ -178,6 +178,14 @@ def test_a_level_that_fails_is_a_row_with_its_reason() -> None:
     assert all(failure["step"] and failure["reason"] for failure in entry["failures"])
 
 
+def test_a_fall_is_told_though_the_engine_ends_the_ride_later() -> None:
+    """mujoco-default lies at 0.48 s, and its ride ends at 0.92 s, where a wheel lies flat."""
+    document = study("plane-circle", {"simulation.duration": 1.0}, ["mujoco-default"], 2)
+    reasons = [failure["reason"] for failure in document["engines"]["mujoco-default"]["failures"]]
+    assert len(reasons) == 2
+    assert all(reason.startswith("fell at 0.4") for reason in reasons)
+
+
 def test_steps_that_share_no_output_interval_are_refused_in_one_line() -> None:
     with pytest.raises(ScenarioError, match="no output interval") as caught:
         study("q2", {"simulation.duration": 0.75, "engines.mujoco-native.step": 0.005}, ["mujoco-native"], 3)
