@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -25,7 +25,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..gate import GivenBaselines
+    from ..gate import GivenBaselines, Verdict
     from .progress import ProgressBars
 
 
@@ -90,7 +90,7 @@ def check_command(
 ) -> None:
     """The drift gate: run the gated scenarios and hold them against the committed baselines."""
     from .progress import COMPUTING, ProgressBars
-    from .terminal import make_console, print_line, print_words
+    from .terminal import make_console
 
     with showing_traceback(traceback), ProgressBars() as progress:
         from ..files import write_text
@@ -107,11 +107,10 @@ def check_command(
             markdown_page,
             read_baselines,
             refused_verdicts,
-            update_baselines,
         )
         from ..history import find_stored_histories, name_origins
-        from ..run import configure_engine, installed_engines
-        from .present_gate import show_verdicts
+        from ..run import configure_engine
+        from .present_gate import show_unjudged, show_update, show_verdicts, show_warnings
 
         if reason is not None and not update:
             raise ScenarioError("--reason: it belongs to --update, which writes new baselines")
@@ -138,18 +137,7 @@ def check_command(
     for path, write in files:
         if path is not None:
             write_text(path, write(verdicts))
-    written = []
-    if update:
-        # Engines that are no longer installed are removed from the baselines; engines that failed must not be.
-        installed = installed_engines()
-        absent = [
-            verdict
-            for _, verdict in verdicts
-            if verdict.engine in installed and verdict.quantity == "run" and verdict.reason.startswith("did not")
-        ]
-        if absent:
-            raise ScenarioError(f"no baseline written: {absent[0].engine} {absent[0].reason}")
-        written = [str(path) for path in update_baselines(fresh, verdicts, reason, baselines)]
+    written = _write_baselines(fresh, verdicts, reason, baselines) if update else []
     refused = refused_verdicts(verdicts) if update else []
     warnings = list_bicycle_warnings(scenario)
     left_out = {} if engine or baseline_of else list_left_out(baselines, scenario)
@@ -174,24 +162,37 @@ def check_command(
         else:
             console = make_console()
             show_verdicts(console, verdicts, renewed=update)
-            if isinstance(held, GivenBaselines) and others:
-                line = f"not judged, not of the package {held.package}: {', '.join(others)}"
-                print_words(console, line)
-            if left_out:
-                install = "; ".join(dict.fromkeys(left_out.values()))
-                line = f"not judged, their libraries are not installed: {', '.join(left_out)}; install: {install}"
-                print_words(console, line)
-            for name, lines in warnings.items():
-                for line in lines:
-                    text = f"warning: {name}: {line}"
-                    print_words(console, text, "yellow")
-            if update and not written and not refused:
-                console.print("no baseline written: nothing moved beyond its limit")
-            for name in written:
-                print_line(console, f"baseline written: {name}")
-            for name, verdict in refused:
-                line = f"no baseline written of {verdict.engine} on {name}: {verdict.reason}"
-                print_words(console, line, "red")
+            package = held.package if isinstance(held, GivenBaselines) else None
+            show_unjudged(console, package, others, left_out)
+            show_warnings(console, warnings)
+            if update:
+                show_update(console, written, refused)
+
+
+def _write_baselines(
+    fresh: Mapping[str, Any], verdicts: Sequence[tuple[str, Verdict]], reason: str | None, baselines: Path | None
+) -> list[str]:
+    """Write new baselines, and return their files.
+
+    Engines that are no longer installed are removed from the baselines; engines that failed must not be.
+
+    Raises
+    ------
+    ScenarioError
+        If an installed engine did not run. Nothing is written then.
+    """
+    from ..gate import update_baselines
+    from ..run import installed_engines
+
+    installed = installed_engines()
+    absent = [
+        verdict
+        for _, verdict in verdicts
+        if verdict.engine in installed and verdict.quantity == "run" and verdict.reason.startswith("did not")
+    ]
+    if absent:
+        raise ScenarioError(f"no baseline written: {absent[0].engine} {absent[0].reason}")
+    return [str(path) for path in update_baselines(fresh, verdicts, reason, baselines)]
 
 
 def _check_baseline_options(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 
 from rich.console import Console
@@ -10,7 +11,7 @@ from rich.text import Text
 from ...reports.drawing import format_numbers
 from ..gate import CHANGES, NEW, SHOWN, Verdict, count_held, count_statuses, find_outcome, status_word
 from .tables import Column, print_table
-from .terminal import print_words
+from .terminal import print_line, print_words
 
 STATUS_STYLES = {
     "holds": "green",
@@ -53,6 +54,34 @@ def show_verdicts(console: Console, verdicts: list[tuple[str, Verdict]], renewed
             print_words(console, line, style)
     if not renewed:
         _show_outcome(console, [verdict for _, verdict in verdicts])
+
+
+def show_unjudged(console: Console, package: str | None, others: Sequence[str], left_out: Mapping[str, str]) -> None:
+    """Print which engines were not judged: ``others`` of a package's gate, and those whose libraries are missing."""
+    if others:
+        print_words(console, f"not judged, not of the package {package}: {', '.join(others)}")
+    if left_out:
+        install = "; ".join(dict.fromkeys(left_out.values()))
+        print_words(
+            console, f"not judged, their libraries are not installed: {', '.join(left_out)}; install: {install}"
+        )
+
+
+def show_warnings(console: Console, warnings: Mapping[str, Sequence[str]]) -> None:
+    """Print what is to be said of the scenarios' bicycles."""
+    for name, lines in warnings.items():
+        for line in lines:
+            print_words(console, f"warning: {name}: {line}", "yellow")
+
+
+def show_update(console: Console, written: Sequence[str], refused: Sequence[tuple[str, Verdict]]) -> None:
+    """Print which baselines were written, and which were not."""
+    if not written and not refused:
+        console.print("no baseline written: nothing moved beyond its limit")
+    for path in written:
+        print_line(console, f"baseline written: {path}")
+    for name, verdict in refused:
+        print_words(console, f"no baseline written of {verdict.engine} on {name}: {verdict.reason}", "red")
 
 
 def _show_outcome(console: Console, verdicts: list[Verdict]) -> None:

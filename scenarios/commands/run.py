@@ -278,9 +278,8 @@ def _open_release(
 
     children, environments = Children(), find_cache_folder(cache)
     try:
-        with ExitStack() as using:
-            plan = plan_release_run(wanted, engines or (), wheels or (), cache=environments, children=children)
-            opened = using.enter_context(open_release(plan, progress.note, cache=environments, children=children))
+        plan = plan_release_run(wanted, engines or (), wheels or (), cache=environments, children=children)
+        with open_release(plan, progress.note, cache=environments, children=children) as opened:
             yield opened
     finally:
         children.stop()
