@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from .curve_chart import draw_plane
-from .document import list_engine_styles, load_template, read_part
+from .document import list_engine_styles, render_page
 from .tables import PageTable, TableColumn
 
 
@@ -29,7 +28,8 @@ def make_atlas_page(document: Mapping[str, Any], libraries: Mapping[str, str]) -
         A self-contained HTML document. All text is escaped.
     """
     regions = _name_regions(document["stable"])
-    return load_template("atlas.html").render(
+    return render_page(
+        "atlas.html",
         document=document,
         made={"libraries": libraries, "platform": {}},
         facts=[
@@ -50,7 +50,6 @@ def make_atlas_page(document: Mapping[str, Any], libraries: Mapping[str, str]) -
             ),
             *_sum_up_absences(document),
         ],
-        style=Markup(read_part("page.css")),
     )
 
 

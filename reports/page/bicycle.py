@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from .curve_chart import draw_plane
-from .document import list_engine_styles, load_template, read_part
+from .document import list_engine_styles, render_page
 from .tables import PageTable, TableColumn, format_complex
 
 _REAL_PARTS = (-10.0, 10.0)  # [1/s]: beyond, the castering mode is alone
@@ -35,7 +34,8 @@ def make_bicycle_page(document: Mapping[str, Any], units: Mapping[str, str], lib
         A self-contained HTML document. All text is escaped.
     """
     modes = _number_modes(document["modes"]["names"])
-    return load_template("bicycle.html").render(
+    return render_page(
+        "bicycle.html",
         document=document,
         made={"libraries": libraries, "platform": {}},
         facts=[
@@ -50,7 +50,6 @@ def make_bicycle_page(document: Mapping[str, Any], units: Mapping[str, str], lib
         table=_make_eigenvalue_table(document),
         parameters=_make_parameter_table(document, units),
         canonical=document["canonical"],
-        style=Markup(read_part("page.css")),
     )
 
 

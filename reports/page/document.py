@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
+from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 
 from ...engines.engine import Trajectory
@@ -66,7 +66,7 @@ def make_page(
     str
         A self-contained HTML document with style, script and data. All text from the run is escaped.
     """
-    names, script = list(trajectories), read_part("page.js")
+    names, script = list(trajectories), _read_part("page.js")
     inputs = Inputs(**scenario.get("inputs") or {})
     ride = RideData(surface, trajectories, inputs=inputs)
     circular = scenario["motion"].get("kind") != "upright"
@@ -78,8 +78,9 @@ def make_page(
     unsteady = find_unsteadiness(surface, inputs, circular)
     duration, rate = scenario["simulation"]["duration"], manifest["start"]["growth_rate"]
     panels = [curves.panel_data(drawn, names, measured) for _, group in groups for drawn in group]
-    return load_template("page.html").render(
-        _result_values(measured, rate, duration, ends),
+    return render_page(
+        "page.html",
+        **_result_values(measured, rate, duration, ends),
         headline=words.keep_whole(write_headline(measured, ride, rate, duration), measured),
         findings=list_findings(measured, ride, duration),
         stops=stops,
@@ -105,7 +106,6 @@ def make_page(
             "panels": panels,
             "plan": trails,
         },
-        style=Markup(read_part("page.css")),
         script=Markup(script),
         script_hash=_script_hash(script),
     )
@@ -132,22 +132,37 @@ def _result_values(
     }
 
 
-def load_template(name: str) -> Template:
-    """Load a template of this folder."""
+def render_page(template: str, *styles: str, **parts: Any) -> str:
+    """Fill a template of this folder.
+
+    Parameters
+    ----------
+    template : str
+    *styles : str
+        Style sheets of this folder beside that of all pages.
+    **parts
+        What the template shows.
+
+    Returns
+    -------
+    str
+        A self-contained HTML document.
+    """
     # Strict: a misspelt name in the template is an error instead of a gap.
     environment = Environment(
         autoescape=True,
-        loader=FunctionLoader(read_part),
+        loader=FunctionLoader(_read_part),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     environment.filters["setting"] = words.describe_setting
-    return environment.get_template(name)
+    style = "".join(map(_read_part, ("page.css", *styles)))
+    return environment.get_template(template).render(parts, style=Markup(style))
 
 
-def read_part(name: str) -> str:
+def _read_part(name: str) -> str:
     """Return the text of a file of this folder."""
     return (_PARTS / name).read_text(encoding="utf-8")
 

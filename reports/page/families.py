@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from . import words
 from .curve_chart import draw_plane
-from .document import list_engine_styles, load_template, read_part
+from .document import list_engine_styles, render_page
 from .tables import PageTable, TableColumn
 
 _POINT_COLUMNS = (
@@ -38,7 +37,8 @@ def make_families_page(document: Mapping[str, Any], libraries: Mapping[str, str]
     """
     families = {_name_curve(family, k): family for k, family in enumerate(document["families"])}
     names = list(families)
-    return load_template("families.html").render(
+    return render_page(
+        "families.html",
         document=document,
         made={"libraries": libraries, "platform": {}},
         facts=_list_facts(document),
@@ -58,7 +58,6 @@ def make_families_page(document: Mapping[str, Any], libraries: Mapping[str, str]
             {"name": name, "sections": _list_sections(family), "table": _make_points_table(name, family)}
             for name, family in families.items()
         ],
-        style=Markup(read_part("page.css")),
     )
 
 

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from markupsafe import Markup
-
 from ..drawing import format_numbers
-from .document import list_engine_styles, load_template, read_part
+from .document import list_engine_styles, render_page
 from .judged_quantities import find_quantity, format_title
 from .tables import PageTable, TableColumn
 
@@ -68,7 +66,8 @@ def make_gate_page(
         A self-contained HTML document. All text is escaped.
     """
     engines = list(dict.fromkeys(verdict["engine"] for verdict in verdicts))
-    return load_template("gate.html").render(
+    return render_page(
+        "gate.html",
         outcome=outcome,
         counts=counts,
         failing=any(not verdict["passes"] for verdict in verdicts),
@@ -90,7 +89,6 @@ def make_gate_page(
             for name in dict.fromkeys(verdict["quantity"] for verdict in verdicts)
             if (meaning := find_quantity(name).meaning)
         ],
-        style=Markup(read_part("page.css")),
     )
 
 

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from markupsafe import Markup
-
 from .anchors import AnchorNames
-from .document import list_engine_styles, load_template, read_part
+from .document import list_engine_styles, render_page
 from .judged_quantities import find_quantity, format_title
 from .releases_figure import draw_releases, format_distinct
 
@@ -89,7 +87,9 @@ def make_history_page(document: Mapping[str, Any]) -> str:
     names = list(document["engines"])
     anchors = AnchorNames()
     sections = [_make_section(document, scenario, anchors) for scenario in document["scenarios"]]
-    return load_template("history.html").render(
+    return render_page(
+        "history.html",
+        "history.css",
         document=document,
         facts=_list_facts(document),
         engines=list_engine_styles(names),
@@ -99,7 +99,6 @@ def make_history_page(document: Mapping[str, Any]) -> str:
         gradual=_list_turns(document["gradual_moves"], document, sections),
         compared=any(row["since_previous"] is not None for row in document["releases"]),
         meanings=_list_meanings(document),
-        style=Markup(read_part("page.css") + read_part("history.css")),
     )
 
 

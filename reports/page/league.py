@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from markupsafe import Markup
-
 from ...engines.engine import REFERENCE
 from ..measure import QUANTITIES
 from . import words
-from .document import list_engine_styles, load_template, read_part
+from .document import list_engine_styles, render_page
 from .loglog import draw_loglog
 
 # Wheels whose slip is below this share of h J' q', the law's with one step h for 1 / b, are said to roll without creep.
@@ -163,7 +161,8 @@ def make_league_page(document: Mapping[str, Any]) -> str:
         A self-contained HTML document. All text from the league is escaped.
     """
     names = list(document["engines"])
-    return load_template("league.html").render(
+    return render_page(
+        "league.html",
         document=document,
         facts=_list_facts(document),
         engines=list_engine_styles(names),
@@ -172,7 +171,6 @@ def make_league_page(document: Mapping[str, Any]) -> str:
         sections=[_make_section(document, name, names) for name in document["scenarios"]],
         share=CREEPS,
         explained=EXPLAINED,
-        style=Markup(read_part("page.css")),
     )
 
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from markupsafe import Markup
-
 from ...engines.engine import REFERENCE
 from ..drawing import format_numbers
 from ..measure import compared_time
 from . import words
-from .document import list_engine_styles, load_template, read_part
+from .document import list_engine_styles, render_page
 from .loglog import draw_loglog
 from .tables import PageTable, TableColumn, format_complex, number_column
 
@@ -38,7 +36,8 @@ def make_precision_page(document: Mapping[str, Any]) -> str:
         A self-contained HTML document. All text is escaped.
     """
     names = list(document["engines"])
-    return load_template("precision.html").render(
+    return render_page(
+        "precision.html",
         document=document,
         made={"libraries": document["libraries"], "platform": {}},
         facts=_list_facts(document),
@@ -56,7 +55,6 @@ def make_precision_page(document: Mapping[str, Any]) -> str:
             }
             for name, entry in document["engines"].items()
         ],
-        style=Markup(read_part("page.css")),
     )
 
 

@@ -6,10 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from markupsafe import Markup
-
 from .curves import round_values
-from .document import list_engine_styles, load_template, read_part
+from .document import list_engine_styles, render_page
 from .history import describe_unit, find_moved_kind, format_figures, format_limit, rank_moves
 from .judged_quantities import format_title
 from .loglog import fit_axis
@@ -35,7 +33,9 @@ def make_ride_pair_page(document: Mapping[str, Any], history: str) -> str:
         A self-contained HTML document. All text from the history is escaped, and all its numbers are those of the
         document, rounded.
     """
-    return load_template("ride_pair.html").render(
+    return render_page(
+        "ride_pair.html",
+        "history.css",
         document=document,
         history=history,
         facts=_list_facts(document),
@@ -44,7 +44,6 @@ def make_ride_pair_page(document: Mapping[str, Any], history: str) -> str:
         distance=draw_distance(document["distance"]),
         rows=_make_rows(document),
         settings=_make_settings(document),
-        style=Markup(read_part("page.css") + read_part("history.css")),
     )
 
 

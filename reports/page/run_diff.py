@@ -6,11 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from ..drawing import format_numbers
 from . import words
-from .document import list_engine_styles, load_template, read_part
+from .document import list_engine_styles, render_page
 from .tables import PageTable, TableColumn, number_column
 from .timelines import draw_over_time
 
@@ -52,7 +51,8 @@ def make_diff_page(
     """
     names = list(document["engines"])
     before, after = (run["name"] for run in document["runs"])
-    return load_template("run_diff.html").render(
+    return render_page(
+        "run_diff.html",
         document=document,
         made=machine,
         before=before,
@@ -72,7 +72,6 @@ def make_diff_page(
             }
             for name, entry in document["engines"].items()
         ],
-        style=Markup(read_part("page.css")),
     )
 
 

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from . import words
-from .document import list_engine_styles, load_template, read_part
+from .document import list_engine_styles, render_page
 from .tables import PageTable, TableColumn, number_column
 from .timelines import draw_over_values
 
@@ -38,7 +37,8 @@ def make_sweep_page(
     """
     names = list(document["engines"])
     drawn = {parameter: draw_over_values(series, names) for parameter, series in errors.items()}
-    return load_template("sweep.html").render(
+    return render_page(
+        "sweep.html",
         document=document,
         made={"libraries": libraries, "platform": {}},
         facts=[
@@ -51,7 +51,6 @@ def make_sweep_page(
         table=_make_table(document),
         figures={parameter: figure for parameter, figure in drawn.items() if figure is not None},
         reasons=[f"{name}: {line}" for name, entry in document["engines"].items() for line in entry["reasons"]],
-        style=Markup(read_part("page.css")),
     )
 
 
