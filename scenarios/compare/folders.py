@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
@@ -46,6 +47,15 @@ class Pair:
     before: StoredRun
     after: StoredRun
     ground: StoredGround
+
+    @cached_property
+    def followed(self) -> list[dict[str, Trajectory]]:
+        """What follows from the coordinates of both runs' rides, by engine, up to their falls."""
+        where = self.ground.bicycle, self.ground.surface
+        return [
+            {name: cut_at_fall(evaluate_ride(ride, *where), *where) for name, ride in run.trajectories.items()}
+            for run in (self.before, self.after)
+        ]
 
 
 def read_pair(first: Path, second: Path, engines: Sequence[str] | None = None) -> Pair:
@@ -201,10 +211,9 @@ def _make_page(pair: Pair, found: Mapping[str, Any]) -> str:
 
     distances, stops = {}, {}
     for engine in found["engines"]:
-        rides = [run.trajectories.get(engine) for run in (pair.before, pair.after)]
-        if rides[0] is None or rides[1] is None:
+        before, after = (rides.get(engine) for rides in pair.followed)
+        if before is None or after is None:
             continue
-        before, after = (_follow(ride, pair.ground) for ride in (rides[0], rides[1]))
         apart = position_errors(after, before)
         distances[engine] = after.time[: len(apart)], apart
         told = {
@@ -218,11 +227,6 @@ def _make_page(pair: Pair, found: Mapping[str, Any]) -> str:
     remarks = {engine: diff_remarks(entry) for engine, entry in found["engines"].items()}
     machine = {part: pair.after.manifest[part] for part in ("libraries", "platform")}
     return make_diff_page(found, distances, remarks, stops, machine)
-
-
-def _follow(ride: Trajectory, ground: StoredGround) -> Trajectory:
-    """Return what follows from the coordinates of a stored ride, up to its fall."""
-    return cut_at_fall(evaluate_ride(ride, ground.bicycle, ground.surface), ground.bicycle, ground.surface)
 
 
 def record_pair(path: Path, pair: Pair, found: Mapping[str, Any]) -> str | None:
@@ -254,11 +258,9 @@ def record_pair(path: Path, pair: Pair, found: Mapping[str, Any]) -> str | None:
     for engine, entry in found["engines"].items():
         labels = _label_rides(engine, entry)
         # The later run has the engine's own colour, the earlier one a pale one.
-        for run, label, hue in zip(
-            (pair.before, pair.after), labels, (brighten(hues[engine]), hues[engine]), strict=True
-        ):
-            if engine in run.trajectories:
-                rides[label] = _follow(run.trajectories[engine], ground)
+        for followed, label, hue in zip(pair.followed, labels, (brighten(hues[engine]), hues[engine]), strict=True):
+            if engine in followed:
+                rides[label] = followed[engine]
                 paint[label] = hue
         if labels[0] != labels[1] and all(label in rides for label in labels):
             earlier[labels[1]] = labels[0]

@@ -7,13 +7,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from shlex import quote
 
-from ...reports.measure import cut_at_fall, evaluate_ride
 from ..error import ScenarioError
 from ..files import write_text
-from ..run import RECORDING, check_stored_scenario, find_part, read_document, read_ride, read_stored_scenario
-from ..scenario import show_value
+from ..run import RECORDING, check_stored_scenario, find_part, read_document, read_stored_scenario
 from .recording import record_stored_run
 from .server import LOOPBACK, Content, RunPageServer
+from .stored_rides import naming_broken_files, read_shown_rides
 from .viewer import ReplayError, rerun, viewer_files
 
 REPORT = "report.html"
@@ -70,7 +69,7 @@ def find_recording(folder: Path) -> Path:
     check_stored_scenario(folder, read_document(folder, "manifest.json"))
     if not (folder / RECORDING).exists():
         try:
-            record_stored_run(folder, folder)
+            record_stored_run(folder)
         except OSError as error:
             raise ScenarioError(f"{folder / RECORDING}: cannot be written: {error.strerror}") from error
     return find_part(folder, RECORDING)
@@ -176,14 +175,8 @@ def stored_page(folder: Path, docs: str | None = None) -> str:
 
     manifest, measured = read_document(folder, "manifest.json"), read_document(folder, "metrics.json")
     scenario = read_stored_scenario(folder, manifest)
-    try:
-        where = scenario.make_bicycle(), scenario.surface.make()
-        rides = {name: evaluate_ride(read_ride(folder, manifest, measured, name), *where) for name in measured}
-        runs = {name: cut_at_fall(ride, *where) for name, ride in rides.items()}
+    with naming_broken_files(folder, TemplateError):
+        surface = scenario.surface.make()
+        rides = read_shown_rides(folder, manifest, measured, scenario.make_bicycle(), surface)
         verdicts = manifest.get("verdicts", [])
-        return make_page(manifest, scenario.model_dump(), measured, verdicts, runs, where[1], docs)
-    except ScenarioError:
-        raise
-    except (LookupError, TypeError, AttributeError, ArithmeticError, ValueError, TemplateError) as error:
-        what = show_value(f"{type(error).__name__}: {error}")
-        raise ScenarioError(f"{folder}: not the files of one run: {what}") from error
+        return make_page(manifest, scenario.model_dump(), measured, verdicts, rides, surface, docs)
