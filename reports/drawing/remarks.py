@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..measure import describe_mismatch
+from .summary import is_whole_ride
 
 
 @dataclass(frozen=True)
@@ -127,5 +128,4 @@ def find_remarks(metrics: Mapping[str, Any], duration: float) -> Iterator[Remark
 def _equals_reference(metrics: Mapping[str, Any]) -> bool:
     """Return whether path, orientation of the frame and rate of the wheel have no error over the whole ride."""
     errors = [metrics.get("position_error"), metrics.get("orientation_error"), {"max": metrics.get("rear_rate_error")}]
-    whole = metrics["ended"] is None and metrics["fell_at"] is None
-    return whole and all(error is not None and error["max"] == 0 for error in errors)
+    return is_whole_ride(metrics) and all(error is not None and error["max"] == 0 for error in errors)

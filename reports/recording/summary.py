@@ -15,6 +15,7 @@ from ..drawing import (
     format_table,
     format_verdict,
     group_remarks,
+    is_whole_ride,
     rank_engines,
 )
 
@@ -59,7 +60,7 @@ def make_verdict(
         Duration of the run [s].
     """
     lines = [_judge(verdicts)] if verdicts else []
-    staying = [name for name in rank_engines(measured) if measured[name]["fell_at"] is measured[name]["ended"] is None]
+    staying = [name for name in rank_engines(measured) if is_whole_ride(measured[name])]
     total = len(measured) + len(failures)
     count = f"All {total}" if len(staying) == total else f"{len(staying)} of {total}"
     noun = "engine rides" if total == 1 else "engines ride"
@@ -85,7 +86,7 @@ def _list_ends(measured: Mapping[str, Mapping[str, Any]], failures: Mapping[str,
     ends = [
         f"{name} fell at {values['fell_at']:.2f} s" if values["fell_at"] is not None else f"{name} ended early"
         for name, values in measured.items()
-        if values["fell_at"] is not None or values["ended"] is not None
+        if not is_whole_ride(values)
     ]
     ends += [f"{name} did not run" for name in failures]
     return f" {escape_markdown('; '.join(ends))}." if ends else ""
