@@ -72,10 +72,10 @@ class LagrangeEngine:
         simulate(*where, problem.q, problem.qd, problem.times[:1])
         begin = time.process_time()
         if settings.integrator == "dop853":
-            motion = simulate(*where, *state, tolerance=settings.tolerance, progress=progress, inputs=problem.inputs)
+            motion = simulate(*where, *state, settings.tolerance, progress, problem.inputs, not problem.beyond_fall)
             clock = motion.time
         else:
-            motion = simulate_modified_euler(*where, *state, step=settings.step, inputs=problem.inputs)
+            motion = simulate_modified_euler(*where, *state, settings.step, problem.inputs, not problem.beyond_fall)
             stride = steps_per_output(problem.times, settings.step)
             clock = settings.step * (stride * np.arange(len(motion.time)))
         cpu_time = time.process_time() - begin
@@ -100,6 +100,7 @@ class LagrangeEngine:
             steps=motion.steps,
             cpu_time=cpu_time,
             ended=motion.ended,
+            fall=motion.fall,
             # A step that cannot be projected back onto the contact constraints ends the ride.
             unconverged_steps=0,
         )

@@ -10,6 +10,7 @@ from scipy.integrate import DOP853
 
 from .bicycle import Bicycle
 from .dae import contact_parameters
+from .fall import Fall, describe_fall, fall_criterion
 from .inputs import NO_INPUTS, Inputs
 from .kernels import integrate as kernel
 from .kinematics import WHEELS, constants
@@ -45,6 +46,8 @@ class PreciseMotion:
         Integration steps and evaluations of the right-hand side.
     ended : str or None
         Why the integration ended early.
+    fall : Fall or None
+        The states just before and just after the fall that ended it.
     """
 
     time: np.ndarray
@@ -55,6 +58,7 @@ class PreciseMotion:
     steps: int
     evaluations: int
     ended: str | None
+    fall: Fall | None = None
 
 
 def _make_motion(
@@ -66,12 +70,14 @@ def _make_motion(
     steps: int,
     evaluations: int,
     ended: str | None,
+    fall: Fall | None,
 ) -> PreciseMotion:
     n = len(rows)
     q, qd, p = (np.ascontiguousarray(part) for part in (rows[:, :9], rows[:, 9:18], rows[:, 18:]))
     force = np.empty((n, 6))
     kernel.contact_forces(rows, surface.function.real, surface.parameters, constants(bicycle, inputs), force)
-    return PreciseMotion(times[:n].copy(), q, qd, p.reshape(n, 2, 3), force.reshape(n, 2, 3), steps, evaluations, ended)
+    shaped = (q, qd, p.reshape(n, 2, 3), force.reshape(n, 2, 3))
+    return PreciseMotion(times[:n].copy(), *shaped, steps, evaluations, ended, fall)
 
 
 def simulate(
@@ -83,6 +89,7 @@ def simulate(
     tolerance: float = 1e-13,
     progress: Callable[[float], None] | None = None,
     inputs: Inputs = NO_INPUTS,
+    until_fall: bool = False,
 ) -> PreciseMotion:
     """Integrate precisely: Dormand-Prince 8(5,3), adaptive, projected onto all constraints.
 
@@ -103,6 +110,8 @@ def simulate(
         Called with the time reached.
     inputs : Inputs
         Held constant.
+    until_fall : bool
+        Whether the motion ends where the bicycle falls, see `velodrome.reference.fall`.
 
     Returns
     -------
@@ -117,7 +126,7 @@ def simulate(
     y = np.concatenate([q, qd, contact_parameters(bicycle, surface, np.asarray(q, float))])
     require_clear_rims(bicycle, surface, y[:9], y[18:])
     rims = bicycle_rim_search(bicycle, surface)
-    out = np.empty((len(times), kernel.SIZE))
+    out, fallen, at = np.empty((len(times), kernel.SIZE)), np.empty((2, kernel.SIZE)), np.empty(2)
     index, t, h, steps, evaluations = 0, 0.0, 1e-3, 0, 0
     status = kernel.MORE
     while status == kernel.MORE:
@@ -131,10 +140,13 @@ def simulate(
             _STEPS_A_CALL,
             _TABLEAU,
             rims,
+            fall_criterion(bicycle, until_fall),
             surface.function.real,
             surface.parameters,
             constants(bicycle, inputs),
             out,
+            fallen,
+            at,
         )
         steps, evaluations = steps + more, evaluations + count
         if progress is not None:
@@ -142,10 +154,17 @@ def simulate(
     ended = None
     if status in _TOUCHING_WHEEL:
         ended = second_touch(_TOUCHING_WHEEL[status], t)
+    elif status == kernel.FELL:
+        ended = describe_fall(t)
     elif status != kernel.DONE:
         why = _describe_edge_of_ground(surface, y[18:]) or "the equations of motion become singular"
         ended = f"no solution beyond t = {t:.6g} s: {why}"
-    return _make_motion(bicycle, surface, inputs, times, out[:index], steps, evaluations, ended)
+    fall = _make_fall(fallen, at) if status == kernel.FELL else None
+    return _make_motion(bicycle, surface, inputs, times, out[:index], steps, evaluations, ended, fall)
+
+
+def _make_fall(fallen: np.ndarray, at: np.ndarray) -> Fall:
+    return Fall(at, *(np.ascontiguousarray(part) for part in (fallen[:, :9], fallen[:, 9:18])))
 
 
 def _describe_edge_of_ground(surface: Surface, contact: np.ndarray) -> str | None:
@@ -166,6 +185,7 @@ def simulate_modified_euler(
     times: np.ndarray,
     step: float = 1e-3,
     inputs: Inputs = NO_INPUTS,
+    until_fall: bool = False,
 ) -> PreciseMotion:
     """Integrate as the paper does (section 4.2): modified Euler method with a fixed step, without projection.
 
@@ -183,6 +203,8 @@ def simulate_modified_euler(
         Step [s]; the paper's is 1 ms.
     inputs : Inputs
         Held constant.
+    until_fall : bool
+        As in `simulate`.
 
     Returns
     -------
@@ -197,7 +219,7 @@ def simulate_modified_euler(
     stride = steps_per_output(times, step)
     y = np.concatenate([q, qd, contact_parameters(bicycle, surface, np.asarray(q, float))])
     require_clear_rims(bicycle, surface, y[:9], y[18:])
-    out = np.empty((len(times), kernel.SIZE))
+    out, fallen, at = np.empty((len(times), kernel.SIZE)), np.empty((2, kernel.SIZE)), np.empty(2)
     out[0] = y
     count = stride * (len(times) - 1)
     status, rows, reached = kernel.modified_euler(
@@ -206,19 +228,24 @@ def simulate_modified_euler(
         count,
         stride,
         bicycle_rim_search(bicycle, surface),
+        fall_criterion(bicycle, until_fall),
         surface.function.real,
         surface.parameters,
         constants(bicycle, inputs),
         out[1:],
+        fallen,
+        at,
     )
     rows += 1
-    ended = None
+    ended, fall = None, None
     if status in _TOUCHING_WHEEL:
         ended = second_touch(_TOUCHING_WHEEL[status], reached)
+    elif status == kernel.FELL:
+        ended, fall = describe_fall(reached), _make_fall(fallen, at)
     elif status != kernel.DONE:
         ended = f"the state is no longer finite after t = {times[rows - 1]:.6g} s"
     steps = (rows - 1) * stride
-    return _make_motion(bicycle, surface, inputs, times, out[:rows], steps, 2 * steps, ended)
+    return _make_motion(bicycle, surface, inputs, times, out[:rows], steps, 2 * steps, ended, fall)
 
 
 def steps_per_output(times: np.ndarray, step: float) -> int:
