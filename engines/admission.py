@@ -154,8 +154,11 @@ def _list_fall_faults(problem: Problem, trajectory: Trajectory) -> Iterator[str]
     if not all(np.isfinite(getattr(fall, name)).all() for name in shapes) or not fall.time[0] < fall.time[1]:
         yield "its states around the fall are not finite, or their times do not rise"
         return
-    (before, after), rates = heights_above_fallen(problem.bicycle, problem.surface, fall.q, fall.qd)
+    where = problem.bicycle, problem.surface
+    (before, after), rates = heights_above_fallen(*where, fall.q, fall.qd)
     room = FALL_ERROR * fall_criterion(problem.bicycle).limit
+    if heights_above_fallen(*where, problem.q[None], problem.qd[None])[0][0] < room:
+        return  # it lies at the start already
     if not (before > -room and after < room):
         yield (
             f"its fall is no fall: the rear frame's centre of mass is {before:.3g} m above the height of a fallen "
