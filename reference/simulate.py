@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from .bicycle import Bicycle
 from .dae import contact_parameters
@@ -15,11 +14,8 @@ from .kernels import integrate as kernel
 from .kinematics import WHEELS, constants
 from .rim import bicycle_rim_search, require_clear_rims, second_touch
 from .surface import Surface, evaluate
+from .tableau import TABLEAU
 
-# The coefficients of the Dormand-Prince method as scipy has them.
-_TABLEAU = tuple(
-    np.ascontiguousarray(table, float) for table in (DOP853.A, DOP853.B, DOP853.E3, DOP853.E5, DOP853.A_EXTRA, DOP853.D)
-)
 _TOUCHING_WHEEL = {kernel.REAR_TOUCHED: WHEELS[0], kernel.FRONT_TOUCHED: WHEELS[1]}
 _STEPS_A_CALL = 200  # between two reports of progress; a step takes about 6 us
 # Steps shrink to `kernel.SMALLEST_STEP` before the edge of the ground: at 100 m/s a wheel is then within 1 um of it.
@@ -129,7 +125,7 @@ def simulate(
             h,
             tolerance,
             _STEPS_A_CALL,
-            _TABLEAU,
+            TABLEAU,
             rims,
             surface.function.real,
             surface.parameters,
