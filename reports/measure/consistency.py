@@ -39,6 +39,7 @@ ROOM = 4.0
 # Largest step noise that an engine may claim.
 LARGEST_NOISE = 1e-6
 _SAMPLES = 6  # samples per polynomial; the quadrature's error is of seventh order in the output interval
+_ROWS = 1 << 14  # output intervals that are integrated at once: a long ride's stencils would take six times its rates
 _FEWEST = 4  # least number of samples of a ride that shows the quadrature's error
 
 _WHEELS = tuple(f"{wheel}_wheel" for wheel in WHEELS)
@@ -296,4 +297,8 @@ def _integrate_samples(time: np.ndarray, values: np.ndarray, samples: int) -> np
     _, kinds, kind = np.unique(np.round(nodes, 9), axis=0, return_index=True, return_inverse=True)
     powers = nodes[kinds, None, :] ** np.arange(samples)[:, None]
     weights = np.linalg.solve(powers, np.broadcast_to(moments, (len(kinds), samples))[..., None])[..., 0]
-    return interval[:, None] * np.einsum("ks,ksj->kj", weights[kind.reshape(-1)], values[nearest])
+    weights, integral = weights[kind.reshape(-1)], np.empty((n - 1, values.shape[1]))
+    for begin in range(0, n - 1, _ROWS):
+        rows = slice(begin, begin + _ROWS)
+        np.einsum("ks,ksj->kj", weights[rows], values[nearest[rows]], out=integral[rows])
+    return interval[:, None] * integral
