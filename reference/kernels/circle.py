@@ -32,6 +32,7 @@ import numpy as np
 from .compilation import jit, jit_inline
 from .pose import pose, times, to_aligned, to_inertial
 from .reduction import build, front_force, solve
+from .surface_call import evaluate_surface
 from .vector import add, combine, cross, dot, scale, subtract
 
 COORDINATES, ROWS = 9, 8
@@ -74,7 +75,7 @@ def rim_point(here, wheel, x, y, z, function, parameters):
     """Return the `RimPoint` of a wheel of a `Pose` with D at (x, y, z)."""
     rho = to_inertial(here, wheel.rho)
     xi, eta = x + rho[0], y + rho[1]
-    f, fx, fy, _, _, _ = function(xi, eta, parameters)
+    f, fx, fy, _, _, _ = evaluate_surface(function, xi, eta, parameters)
     normal = subtract(here.z, combine(fx, here.x, fy, here.y))
     return RimPoint(z + rho[2] - f, dot(wheel.t, normal), normal, xi, eta)
 
