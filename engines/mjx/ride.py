@@ -220,7 +220,7 @@ def _record_ride(
     advance, given, state = _compile_ride(setup, (model, inputs), data)
     recording = Recording.empty(len(counts))
     steps, samples, unconverged, worst, cpu_time, ended = 0, 0, 0, 0.0, 0.0, None
-    fall: Fall | None = None
+    fall, standing = None, 0
 
     def ride_on(state: list[Any], steps: int, block: np.ndarray) -> tuple[list[Any], dict[str, np.ndarray]]:
         """Ride from a state after ``steps`` to each number of steps in a block, and sample there."""
