@@ -79,6 +79,12 @@ def jit(function: Callable[..., Any]) -> Any:
         return _declare(nb.njit(cache=True, error_model="numpy")(function))
 
 
+def jit_released(function: Callable[..., Any]) -> Any:
+    """Compile a kernel as `jit` does; it releases the interpreter's lock, so that threads can share its work."""
+    with _cache_folder_set(function):
+        return _declare(nb.njit(cache=True, error_model="numpy", nogil=True)(function))
+
+
 def jit_inline(function: Callable[..., Any]) -> Any:
     """Compile a kernel as `jit` does, and always inline it.
 
