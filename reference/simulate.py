@@ -172,7 +172,7 @@ def simulate_many(
     """
     times = np.ascontiguousarray(times, float)
     found: dict[int, PreciseMotion | ValueError] = {}
-    for kind in group_by_ground(starts):
+    for kind in _group_by_ground(starts):
         own = [starts[i] for i in kind]
         setups, states = _set_rides_up(own, len(times))
         function = own[0].surface.function.real
@@ -192,7 +192,12 @@ def simulate_many(
     return [found[i] for i in range(len(starts))]
 
 
-def group_by_ground(starts: Sequence[RideStart]) -> list[list[int]]:
+def kernels_are_loaded() -> bool:
+    """Return whether the kernels of a ride have been compiled, or loaded from the cache, in this process."""
+    return bool(kernel.continue_rides.signatures)
+
+
+def _group_by_ground(starts: Sequence[RideStart]) -> list[list[int]]:
     """Return the indices of starts whose grounds have the same height function, with any parameters, group by group."""
     groups: dict[Any, list[int]] = {}
     for i, start in enumerate(starts):

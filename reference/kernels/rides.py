@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from numba.np.unsafe.ndarray import to_fixed_tuple
+from numba.np.unsafe.ndarray import to_fixed_tuple  # pyright: ignore[reportMissingImports]
 
 from . import integrate
 from .compilation import jit, jit_released
