@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..reference.fall import Fall, fall_criterion, heights_above_fallen, solve_fall
 from ..reference.rim import find_second_touch, require_clear_rims
 from ..reference.wheel_overlap import find_wheel_collision, require_separate_wheels
 from .engine import (
@@ -29,6 +30,10 @@ from .releases import split_adaptations
 # step. An engine that sums up its steps errs by at most half a unit of round-off per addition: less than this limit in
 # nine million steps.
 CLOCK_ERROR = 1e-9
+# Largest height by which the states around a fall may miss the side of the criterion that they are said to lie on,
+# relative to the height of the criterion. Joints that drift make an engine's own height differ from that of its
+# coordinates, by far less than this in any ride whose reports agree.
+FALL_ERROR = 0.01
 
 
 def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
@@ -92,7 +97,7 @@ def admit_trajectory(engine: Engine, problem: Problem, settings: Any, trajectory
     if bad == 0:
         raise EngineError("its first state is not finite")
     ended = f"its state is not finite at {trajectory.time[bad]:.6g} s"
-    return _cut_at_collision(problem, replace(trajectory.first(bad), ended=trajectory.ended or ended))
+    return _cut_at_collision(problem, replace(trajectory.first(bad), ended=trajectory.ended or ended, fall=None))
 
 
 def _copy_arrays(trajectory: Trajectory) -> Trajectory:
@@ -114,7 +119,7 @@ def _cut_at_collision(problem: Problem, trajectory: Trajectory) -> Trajectory:
     ending = min((one for one in found if one is not None), key=lambda one: one.time, default=None)
     if ending is None:
         return trajectory
-    return replace(trajectory.until(ending.time), ended=ending.why)
+    return replace(trajectory.until(ending.time), ended=ending.why, fall=None)
 
 
 def _flatten_samples(values: np.ndarray) -> np.ndarray:
@@ -139,6 +144,45 @@ def _list_time_faults(asked: np.ndarray, own: np.ndarray) -> Iterator[str]:
             f"its sample {first} is at {own[first]:.9g} s by its own clock, not at the {asked[first]:.9g} s asked for: "
             f"{off[first]:.2g} s off"
         )
+
+
+def _list_fall_faults(problem: Problem, trajectory: Trajectory) -> Iterator[str]:
+    """List the faults of the states around a fall."""
+    fall: Any = trajectory.fall  # engines may return anything
+    if fall is None:
+        return
+    if problem.beyond_fall:
+        yield "it ends at a fall, but the problem asks for what follows"
+        return
+    shapes = {"time": (2,), "q": (2, 9), "qd": (2, 9)}
+    if not isinstance(fall, Fall) or any(
+        not isinstance(value := getattr(fall, name), np.ndarray) or value.shape != shape or value.dtype.kind != "f"
+        for name, shape in shapes.items()
+    ):
+        yield f"its fall is {fall!r}; it must be a Fall with arrays of floats of shapes (2,), (2, 9) and (2, 9)"
+        return
+    if not all(np.isfinite(getattr(fall, name)).all() for name in shapes) or not fall.time[0] < fall.time[1]:
+        yield "its states around the fall are not finite, or their times do not rise"
+        return
+    where = problem.bicycle, problem.surface
+    (before, after), rates = heights_above_fallen(*where, fall.q, fall.qd)
+    room = FALL_ERROR * fall_criterion(problem.bicycle).limit
+    if heights_above_fallen(*where, problem.q[None], problem.qd[None])[0][0] < room:
+        return  # it lies at the start already
+    if not (before > -room and after < room):
+        yield (
+            f"its fall is no fall: the rear frame's centre of mass is {before:.3g} m above the height of a fallen "
+            f"bicycle before it, and {after:.3g} m after it"
+        )
+        return
+    fell, samples = solve_fall(fall.time, np.array([before, after]), rates), len(trajectory.time)
+    if not 0 < samples < len(problem.times):
+        if samples:
+            yield f"it gives all samples and a fall at {fell:.9g} s"
+        return
+    low, high = problem.times[samples - 1], problem.times[samples]
+    if not low * (1 - CLOCK_ERROR) <= fell <= high * (1 + CLOCK_ERROR):
+        yield f"it fell at {fell:.9g} s, not between its last sample at {low:.9g} s and the next at {high:.9g} s"
 
 
 def _list_faults(engine: Engine, problem: Problem, settings: Settings, trajectory: Trajectory) -> Iterator[str]:
@@ -179,6 +223,7 @@ def _list_faults(engine: Engine, problem: Problem, settings: Settings, trajector
         value = getattr(trajectory, name)
         if not isinstance(value, kind) or isinstance(value, bool) or not 0 <= float(value) < np.inf:
             yield f"its {name} is {value!r}; it must be {what}, not negative"
+    yield from _list_fall_faults(problem, trajectory)
     ended = trajectory.ended
     if ended is not None and not _is_line(ended):
         yield f"its ended is {ended!r}; it must be one line of text, or None"

@@ -20,6 +20,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from ..reference.bicycle import Bicycle
+from ..reference.fall import Fall
 from ..reference.inputs import NO_INPUTS, Inputs
 from ..reference.kinematics import COORDINATES
 from ..reference.surface import Surface
@@ -50,6 +51,8 @@ class Problem:
         Output times, rising from 0 [s]; at least two.
     inputs : Inputs
         Torques and steer damping, constant during the ride; by default there are none.
+    beyond_fall : bool
+        Whether the ride goes on after the bicycle has fallen, see `velodrome.reference.fall`; by default it ends there.
 
     Raises
     ------
@@ -67,6 +70,7 @@ class Problem:
     qd: np.ndarray
     times: np.ndarray
     inputs: Inputs = NO_INPUTS
+    beyond_fall: bool = False
 
     def __post_init__(self) -> None:
         for name in ("q", "qd", "times"):
@@ -96,6 +100,7 @@ class Problem:
             f"  bicycle: {_shorten(self.bicycle)}",
             f"  surface: {_shorten(self.surface)}",
             *([f"  inputs: {self.inputs.describe()}"] if self.inputs != NO_INPUTS else []),
+            *(["  beyond a fall"] if self.beyond_fall else []),
         ]
         for name, values in (("q", self.q), ("qd", self.qd)):
             named = (f"{key} {value:.6g}" for key, value in zip(COORDINATES, values, strict=True))
@@ -158,6 +163,9 @@ class Trajectory:
         Process CPU time of the integration alone [s].
     ended : str or None
         Why the run ended before the problem's last time; None if it did not.
+    fall : Fall or None
+        The states just before and just after the fall that ended the run. The suite computes the time of the fall from
+        them; the samples are those before it.
     friction : float or None
         Coefficient of friction of its contacts in every direction; None if the wheels are constrained to roll.
     unconverged_steps : int or None
@@ -186,6 +194,7 @@ class Trajectory:
     kinetic_energy: np.ndarray | None = None
     potential_energy: np.ndarray | None = None
     ended: str | None = None
+    fall: Fall | None = None
     friction: float | None = None
     unconverged_steps: int | None = None
     largest_residual: float | None = None
@@ -308,6 +317,9 @@ class Engine(Protocol):
        in inertial axes.
     7. If a ride cannot go on, return the samples so far with the reason in ``ended``. If not even the first sample can
        be computed, raise `EngineError`. Count the steps whose iterations did not converge.
+       A ride ends where the bicycle falls, unless the problem asks for what follows (``beyond_fall``): watch for it
+       with `velodrome.reference.fall.FallWatch`, and return the states around it in ``fall``. The suite also finds the
+       fall of an engine that rides on, from its samples.
     8. Return from ``step_noise`` the relative error that a step may add beyond its method: 2^-52 for round-off, or the
        tolerance of its iterations or of its steps. The suite derives limits from it.
     9. Return the same bits for the same problem, whatever was simulated before. Do not print to stdout and do not

@@ -80,10 +80,10 @@ class LagrangeEngine:
         _load_kernels(problem)
         begin = time.process_time()
         if settings.integrator == "dop853":
-            motion = simulate(*where, *state, tolerance=settings.tolerance, progress=progress, inputs=problem.inputs)
+            motion = simulate(*where, *state, settings.tolerance, progress, problem.inputs, not problem.beyond_fall)
             clock = motion.time
         else:
-            motion = simulate_modified_euler(*where, *state, step=settings.step, inputs=problem.inputs)
+            motion = simulate_modified_euler(*where, *state, settings.step, problem.inputs, not problem.beyond_fall)
             stride = steps_per_output(problem.times, settings.step)
             clock = settings.step * (stride * np.arange(len(motion.time)))
         return self._make_trajectory(problem, settings, motion, clock, time.process_time() - begin)
@@ -107,7 +107,10 @@ class LagrangeEngine:
             What `simulate` returns or raises for each problem, to the bit, except for the CPU time: that of all
             problems is divided in proportion to their steps.
         """
-        starts = [RideStart(each.bicycle, each.surface, each.q, each.qd, each.inputs) for each in problems]
+        starts = [
+            RideStart(each.bicycle, each.surface, each.q, each.qd, each.inputs, not each.beyond_fall)
+            for each in problems
+        ]
         _load_kernels(problems[0])
         begin = time.process_time()
         motions = simulate_many(starts, problems[0].times, settings.tolerance, threads)
@@ -154,6 +157,7 @@ class LagrangeEngine:
             steps=motion.steps,
             cpu_time=cpu_time,
             ended=motion.ended,
+            fall=motion.fall,
             # A step that cannot be projected back onto the contact constraints ends the ride.
             unconverged_steps=0,
         )

@@ -18,6 +18,7 @@ import pyarrow.parquet as pq
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..reference.bicycle import BODIES
+from ..reference.fall import Fall
 from ..reference.kinematics import COORDINATES, WHEELS
 from .engine import REQUIRED, SHAPES, Trajectory
 from .files import write_whole
@@ -25,6 +26,23 @@ from .format_version import VERSION_KEY, read_version
 
 METADATA_KEY, DIGEST_KEY = b"velodrome", b"velodrome-sha256"
 PARQUET_VERSION = 1  # format version of the metadata and the columns
+
+
+_State = Annotated[list[float], Field(min_length=9, max_length=9)]
+
+
+class _FallFacts(BaseModel):
+    """The states around a fall in the schema's metadata."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+
+    time: Annotated[list[float], Field(min_length=2, max_length=2)]
+    q: Annotated[list[_State], Field(min_length=2, max_length=2)]
+    qd: Annotated[list[_State], Field(min_length=2, max_length=2)]
+
+    def make_fall(self) -> Fall:
+        """Return the states as arrays."""
+        return Fall(np.array(self.time), np.array(self.q), np.array(self.qd))
 
 
 class _Facts(BaseModel):
@@ -42,6 +60,7 @@ class _Facts(BaseModel):
     # Files of earlier versions do not have these fields.
     unconverged_steps: Annotated[int, Field(ge=0)] | None = None
     largest_residual: Annotated[float, Field(ge=0)] | None = None
+    fall: _FallFacts | None = None
 
 
 STORED_FACTS = tuple(_Facts.model_fields)
@@ -86,7 +105,8 @@ def trajectory_table(trajectory: Trajectory) -> pa.Table:
             continue
         flat = np.asarray(value, float).reshape(len(trajectory.time), len(names))
         found += [(column, flat[:, j], unit) for j, (column, unit) in enumerate(names)]
-    return _make_table(found, {key: getattr(trajectory, key) for key in STORED_FACTS})
+    facts = {key: getattr(trajectory, key) for key in STORED_FACTS}
+    return _make_table(found, facts | {"fall": None if trajectory.fall is None else trajectory.fall.as_json()})
 
 
 def write_columns(
@@ -161,7 +181,8 @@ def read_trajectory(path: Path) -> Trajectory:
     found = digest(table)
     if table.schema.metadata.get(DIGEST_KEY, found) != found:
         raise ValueError(f"{path} is not the trajectory that was written: its contents do not match their digest")
-    return Trajectory(**facts.model_dump(), **values)
+    fall = None if facts.fall is None else facts.fall.make_fall()
+    return Trajectory(**facts.model_dump(exclude={"fall"}), fall=fall, **values)
 
 
 def _read_table(path: Path) -> pa.Table:

@@ -8,13 +8,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
 from .bicycle import Bicycle
 from .circular import CONTACT, Condition, Steady, as_solved, newton, reverse_speeds
 from .kernels import curve as kernel
 from .kernels.circle import SIGMA_UNIT
 from .kernels.steady import UNKNOWNS
+from .roots import find_root
 from .surface import SurfaceOfRevolution, has_tip
 
 FARTHEST = 1e3  # distance of D from the origin [m]: a larger circle differs from its limit by round-off only
@@ -189,8 +189,7 @@ def root_between(equations: Steady, first: Point, second: Point, function: Calla
         To round-off of the arc's length.
     """
     at, length = _interpolate_arc(equations, first, second)
-    root: Any = brentq(lambda distance: function(at(distance)), 0.0, length, xtol=1e-15)
-    return at(root)
+    return at(find_root(lambda distance: function(at(distance)), 0.0, length, tolerance=1e-15))
 
 
 def sign_changes(values: Sequence[float] | np.ndarray, zero: float = 0.0) -> list[tuple[int, int]]:
@@ -289,6 +288,8 @@ def crossings(
 
 def least_between(equations: Steady, first: Point, second: Point, function: Callable[[Point], float]) -> Point:
     """Find the minimum of a function between two near points of a followed curve, to about 1e-6 of their distance."""
+    from scipy.optimize import minimize_scalar  # takes half a second
+
     at, length = _interpolate_arc(equations, first, second)
     found: Any = minimize_scalar(
         lambda distance: function(at(distance)),

@@ -18,7 +18,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from .bicycle import Bicycle
 from .circular import LEAN, SIGMA, STEER, CircularMotion, Steady, newton, plane_condition
@@ -302,6 +301,8 @@ def _find_sections(bicycle: Bicycle, alpha: float, number: int) -> list[tuple[Se
 
 def _solve_vanishing(bicycle: Bicycle, number: int, alpha: float) -> CriticalPoint:
     """Solve for the point where the ends of a section meet, starting from an alpha just before it vanishes."""
+    from scipy.optimize import minimize_scalar  # takes half a second
+
     ends = _find_sections(bicycle, alpha, number)[-1]
     family = trace(bicycle, Paraboloid(alpha), number, 0.02)
     middle = 0.5 * (ends[0].motion.lean + ends[1].motion.lean), 0.5 * (ends[0].motion.steer + ends[1].motion.steer)

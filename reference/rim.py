@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from .bicycle import Bicycle
 from .dae import contact_parameters
+from .fall import Ending
 from .kernels import rim as kernel
 from .kernels import touch
 from .kernels.dynamics import wheels
@@ -159,14 +159,6 @@ def _find_deepest(bicycle: Bicycle, surface: Surface, q: np.ndarray, k: int) -> 
     distance, angle = kernel.deepest(centre, x, z, radius, samples, surface.function.real, surface.parameters)
     radial, _ = kernel.rim(angle, x, z)
     return distance, k, (centre[0] + radius * radial[0], centre[1] + radius * radial[1])
-
-
-@dataclass(frozen=True)
-class Ending:
-    """Time [s] and reason of a ride's end."""
-
-    time: float
-    why: str
 
 
 class RimWatch:

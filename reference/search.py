@@ -16,7 +16,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from .anchors import above_ground, are_same_solution, start_on_plane
 from .bicycle import Bicycle
@@ -37,6 +36,7 @@ from .circular import (
 from .continuation import Point, largest_sigma, metric, tangent
 from .inputs import NO_INPUTS, Inputs
 from .kernels import curve as kernel
+from .roots import find_root
 from .surface import SurfaceOfRevolution, evaluate, is_level
 
 # Leans against the ground and steers of the starts [rad]. With left and right exchanged a hands-free motion has a steer
@@ -124,8 +124,7 @@ def _radii_of_curvature(surface: SurfaceOfRevolution, curvature: float) -> Itera
     radii = np.geomspace(inner, outer, 60)
     values = excess(radii)
     for k in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0):
-        root: float = brentq(excess, radii[k], radii[k + 1])  # type: ignore[assignment]
-        yield root
+        yield find_root(excess, radii[k], radii[k + 1])
 
 
 def _tilted(surface: SurfaceOfRevolution, level: np.ndarray, radius: float) -> np.ndarray:

@@ -8,21 +8,18 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from .bicycle import Bicycle
 from .dae import contact_parameters
+from .fall import Fall, describe_fall, fall_criterion
 from .inputs import NO_INPUTS, Inputs
 from .kernels import integrate
 from .kernels import rides as kernel
 from .kinematics import WHEELS, constants
 from .rim import bicycle_rim_search, require_clear_rims, second_touch
 from .surface import Surface, evaluate
+from .tableau import TABLEAU
 
-# The coefficients of the Dormand-Prince method as scipy has them.
-_TABLEAU = tuple(
-    np.ascontiguousarray(table, float) for table in (DOP853.A, DOP853.B, DOP853.E3, DOP853.E5, DOP853.A_EXTRA, DOP853.D)
-)
 _TOUCHING_WHEEL = {integrate.REAR_TOUCHED: WHEELS[0], integrate.FRONT_TOUCHED: WHEELS[1]}
 _ALL_CALLS = 1 << 40  # more calls than any ride takes
 _PARTS_A_THREAD = 8  # so that a thread with short rides takes over some of the others'
@@ -49,6 +46,8 @@ class PreciseMotion:
         Integration steps and evaluations of the right-hand side.
     ended : str or None
         Why the integration ended early.
+    fall : Fall or None
+        The states just before and just after the fall that ended it.
     """
 
     time: np.ndarray
@@ -59,15 +58,24 @@ class PreciseMotion:
     steps: int
     evaluations: int
     ended: str | None
+    fall: Fall | None = None
 
 
 def _make_motion(
-    times: np.ndarray, rows: np.ndarray, force: np.ndarray, steps: int, evaluations: int, ended: str | None
+    times: np.ndarray,
+    rows: np.ndarray,
+    force: np.ndarray,
+    steps: int,
+    evaluations: int,
+    ended: str | None,
+    fall: Fall | None,
 ) -> PreciseMotion:
     n = len(rows)
     q, qd, p = (np.ascontiguousarray(part) for part in (rows[:, :9], rows[:, 9:18], rows[:, 18:]))
     shape = (n, 2, 3)
-    return PreciseMotion(times[:n].copy(), q, qd, p.reshape(shape), force.reshape(shape), steps, evaluations, ended)
+    return PreciseMotion(
+        times[:n].copy(), q, qd, p.reshape(shape), force.reshape(shape), steps, evaluations, ended, fall
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +90,8 @@ class RideStart:
         Generalised coordinates and rates, on the constraints.
     inputs : Inputs
         Held constant.
+    until_fall : bool
+        Whether the ride ends where the bicycle falls.
     """
 
     bicycle: Bicycle
@@ -89,6 +99,7 @@ class RideStart:
     q: np.ndarray
     qd: np.ndarray
     inputs: Inputs = NO_INPUTS
+    until_fall: bool = False
 
 
 def simulate(
@@ -100,6 +111,7 @@ def simulate(
     tolerance: float = 1e-13,
     progress: Callable[[float], None] | None = None,
     inputs: Inputs = NO_INPUTS,
+    until_fall: bool = False,
 ) -> PreciseMotion:
     """Integrate precisely: Dormand-Prince 8(5,3), adaptive, projected onto all constraints.
 
@@ -120,6 +132,8 @@ def simulate(
         Called with the time reached.
     inputs : Inputs
         Held constant.
+    until_fall : bool
+        Whether the motion ends where the bicycle falls, see `velodrome.reference.fall`.
 
     Returns
     -------
@@ -130,12 +144,12 @@ def simulate(
     ValueError
         If a wheel has no contact at the start, or a rim lies inside the ground or touches it twice.
     """
-    start, times = RideStart(bicycle, surface, q, qd, inputs), np.ascontiguousarray(times, float)
+    start, times = RideStart(bicycle, surface, q, qd, inputs, until_fall), np.ascontiguousarray(times, float)
     setups, states = _set_rides_up([start], len(times))
     riding = True
     while riding:
         calls = _ALL_CALLS if progress is None else 1
-        kernel.continue_rides(0, 1, calls, times, tolerance, _TABLEAU, setups, surface.function.real, states)
+        kernel.continue_rides(0, 1, calls, times, tolerance, TABLEAU, setups, surface.function.real, states)
         riding = states.counts[0, 0] == integrate.MORE
         _require_start(start, states, 0)
         if progress is not None:
@@ -179,7 +193,7 @@ def simulate_many(
 
         def ride(part: range, setups=setups, states=states, function=function) -> None:
             kernel.continue_rides(
-                part.start, part.stop, _ALL_CALLS, times, tolerance, _TABLEAU, setups, function, states
+                part.start, part.stop, _ALL_CALLS, times, tolerance, TABLEAU, setups, function, states
             )
 
         _share(ride, len(own), threads)
@@ -229,6 +243,7 @@ def _set_rides_up(starts: Sequence[RideStart], samples: int) -> tuple[kernel.Rid
         widths=np.array([search.width for search in searches]),
         details=np.array([search.detail for search in searches]),
         samples=np.array([search.samples for search in searches]),
+        falls=np.array([fall_criterion(start.bicycle, start.until_fall) for start in starts], float),
     )
     states = kernel.RideStates(
         y=np.zeros((n, integrate.SIZE)),
@@ -236,6 +251,8 @@ def _set_rides_up(starts: Sequence[RideStart], samples: int) -> tuple[kernel.Rid
         counts=np.empty((n, 4), np.int64),
         rows=np.empty((n, samples, integrate.SIZE)),
         force=np.empty((n, samples, 6)),
+        fallen=np.empty((n, 2, integrate.SIZE)),
+        at=np.empty((n, 2)),
     )
     for i, start in enumerate(starts):
         states.y[i, :9], states.y[i, 9:18] = start.q, start.qd
@@ -259,10 +276,18 @@ def _finish_ride(start: RideStart, times: np.ndarray, states: kernel.RideStates,
     t, ended = float(states.clock[i, 0]), None
     if status in _TOUCHING_WHEEL:
         ended = second_touch(_TOUCHING_WHEEL[status], t)
+    elif status == integrate.FELL:
+        ended = describe_fall(t)
     elif status != integrate.DONE:
         why = _describe_edge_of_ground(start.surface, states.y[i, 18:]) or "the equations of motion become singular"
         ended = f"no solution beyond t = {t:.6g} s: {why}"
-    return _make_motion(times, states.rows[i, :index], states.force[i, :index], steps, evaluations, ended)
+    fall = _make_fall(states.fallen[i], states.at[i]) if status == integrate.FELL else None
+    # Copies, so that no motion keeps the samples of all others in memory.
+    return _make_motion(times, states.rows[i, :index], states.force[i, :index].copy(), steps, evaluations, ended, fall)
+
+
+def _make_fall(fallen: np.ndarray, at: np.ndarray) -> Fall:
+    return Fall(at.copy(), *(np.ascontiguousarray(part) for part in (fallen[:, :9], fallen[:, 9:18])))
 
 
 def _describe_edge_of_ground(surface: Surface, contact: np.ndarray) -> str | None:
@@ -283,6 +308,7 @@ def simulate_modified_euler(
     times: np.ndarray,
     step: float = 1e-3,
     inputs: Inputs = NO_INPUTS,
+    until_fall: bool = False,
 ) -> PreciseMotion:
     """Integrate as the paper does (section 4.2): modified Euler method with a fixed step, without projection.
 
@@ -300,6 +326,8 @@ def simulate_modified_euler(
         Step [s]; the paper's is 1 ms.
     inputs : Inputs
         Held constant.
+    until_fall : bool
+        As in `simulate`.
 
     Returns
     -------
@@ -314,7 +342,7 @@ def simulate_modified_euler(
     stride = steps_per_output(times, step)
     y = np.concatenate([q, qd, contact_parameters(bicycle, surface, np.asarray(q, float))])
     require_clear_rims(bicycle, surface, y[:9], y[18:])
-    out = np.empty((len(times), integrate.SIZE))
+    out, fallen, at = np.empty((len(times), integrate.SIZE)), np.empty((2, integrate.SIZE)), np.empty(2)
     out[0] = y
     count = stride * (len(times) - 1)
     status, rows, reached = integrate.modified_euler(
@@ -323,21 +351,26 @@ def simulate_modified_euler(
         count,
         stride,
         bicycle_rim_search(bicycle, surface),
+        fall_criterion(bicycle, until_fall),
         surface.function.real,
         surface.parameters,
         constants(bicycle, inputs),
         out[1:],
+        fallen,
+        at,
     )
     rows += 1
-    ended = None
+    ended, fall = None, None
     if status in _TOUCHING_WHEEL:
         ended = second_touch(_TOUCHING_WHEEL[status], reached)
+    elif status == integrate.FELL:
+        ended, fall = describe_fall(reached), _make_fall(fallen, at)
     elif status != integrate.DONE:
         ended = f"the state is no longer finite after t = {times[rows - 1]:.6g} s"
     steps = (rows - 1) * stride
     force = np.empty((rows, 6))
     integrate.contact_forces(out[:rows], surface.function.real, surface.parameters, constants(bicycle, inputs), force)
-    return _make_motion(times, out[:rows], force, steps, 2 * steps, ended)
+    return _make_motion(times, out[:rows], force, steps, 2 * steps, ended, fall)
 
 
 def steps_per_output(times: np.ndarray, step: float) -> int:

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from .bicycle import Bicycle
 from .circular import REAR_SPEED, CircularMotion, Steady
@@ -20,6 +18,7 @@ from .kernels.circle import STEP
 from .kernels.steady import steady_energy
 from .kinematics import FRONT_ANGLE, constants
 from .rideability import assess_motions, explain_motion, explain_obstacles
+from .roots import find_root
 from .stability import VARIABLES, linearise
 from .surface import Plane, is_level
 
@@ -146,7 +145,7 @@ def find_straight_motion(bicycle: Bicycle, name: str, steer: float) -> SpecialPo
     around = near * (1 - 1e-6), near * (1 + 1e-6)
     if np.sign(determinant(around[0])) * np.sign(determinant(around[1])) >= 0:
         return None  # it touches zero: no circles branch off
-    rear_rate: Any = brentq(determinant, *around, xtol=1e-13)
+    rear_rate = find_root(determinant, *around, tolerance=1e-13)
     q, rates = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.0, steer, (0.0, 0.0, rear_rate))
     now = dynamics(bicycle, Plane(), q, rates)
     why = explain_obstacles(bicycle, Plane(), q, now.contact, now.force)

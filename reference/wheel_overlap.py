@@ -10,9 +10,9 @@ import math
 import numpy as np
 
 from .bicycle import Bicycle
+from .fall import Ending
 from .kernels.wheel_overlap import TOUCHING, find_overlap, measure_overlaps
 from .kinematics import STEER, constants
-from .rim import Ending
 
 
 def require_separate_wheels(bicycle: Bicycle, q: np.ndarray) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from ...reference.kinematics import WHEELS
 from ...reference.simulate import steps_per_output
 from ..contact_fields import observe_contact_fields
-from ..coordinates import coordinates_from_bodies, quaternions, start_on_turn
+from ..coordinates import quaternions
 from ..engine import Problem, Progress, Settings, Trajectory, UnsuitableProblem
 from ..releases import LibraryReach, refuse_releases
 from .releases import DRAKE
@@ -99,7 +99,7 @@ class DrakeEngine(Generic[S]):
             If Drake refuses the bicycle, or a wheel has no contact point at the start.
         """
         self.check(problem, settings)
-        from .ride import ride_simulation
+        from .ride import read_coordinates, ride_simulation
 
         module, name = self.builder.split(":")
         build: Callable[[Problem, Any], DrakeRig] = getattr(import_module(module), name)
@@ -108,10 +108,7 @@ class DrakeEngine(Generic[S]):
         ride = ride_simulation(build(problem, settings), problem, settings.step, counts, progress)
         recording = ride.recording
         motion = recording.motion
-        q, qd = coordinates_from_bodies(
-            problem.bicycle, recording.time, motion.position[:, 0], motion.velocity[:, 0], motion.rotation, motion.spin
-        )
-        q = start_on_turn(q, problem.q)
+        q, qd = read_coordinates(problem, recording.time, motion)
         return Trajectory(
             engine=self.name,
             version=self.version,
@@ -128,6 +125,7 @@ class DrakeEngine(Generic[S]):
             steps=ride.steps,
             cpu_time=ride.cpu_time,
             ended=ride.ended,
+            fall=ride.fall,
             friction=settings.least_friction,
             # Drake ends a ride with an error where its contact solver does not converge.
             unconverged_steps=0,

@@ -11,7 +11,10 @@ from typing import Any
 import numpy as np
 
 from ...reference.bicycle import BODIES
-from ...reference.rim import Ending, RimWatch
+from ...reference.fall import Ending, Fall, FallWatch, fall_criterion
+from ...reference.rim import RimWatch
+from ...reference.surface import evaluate
+from ..coordinates import coordinates_from_bodies, start_on_turn
 from ..engine import EngineError, Problem, Progress
 from .tree import BodyMotions, DrakeTree, read_body_motions, read_wheel_motions
 
@@ -78,12 +81,69 @@ class DrakeRecording:
 
 @dataclass(frozen=True)
 class DrakeRide:
-    """Result of a ride: its samples, the number of steps, their CPU time [s] and why the ride ended early."""
+    """Result of a ride: samples, number of steps, their CPU time [s], why the ride ended early, and its fall."""
 
     recording: DrakeRecording
     steps: int
     cpu_time: float
     ended: str | None
+    fall: Fall | None = None
+
+
+class RideWatch:
+    """Watch over the rims of both wheels, and for the fall of the bicycle.
+
+    Parameters
+    ----------
+    rig : DrakeRig
+    problem : Problem
+
+    Raises
+    ------
+    EngineError
+        If a rim lies inside the ground at the start.
+    """
+
+    def __init__(self, rig: DrakeRig, problem: Problem) -> None:
+        self._rig, self._problem = rig, problem
+        try:
+            self._rims = RimWatch(problem.bicycle, problem.surface, problem.q)
+        except ValueError as error:
+            raise EngineError(str(error)) from error
+        self._fall = None if problem.beyond_fall else FallWatch(problem.bicycle, problem.surface, self._convert)
+
+    def look(self, time: float) -> Ending | None:
+        """Return when and why the ride ends at a time [s], None if it goes on."""
+        found = (self._look_at_rims(time), self._look_at_fall(time))
+        return min((one for one in found if one is not None), key=lambda ending: ending.time, default=None)
+
+    def _look_at_rims(self, time: float) -> Ending | None:
+        if not self._rims.needed:
+            return None
+        motion = BodyMotions.empty(2)
+        read_wheel_motions(self._rig.tree, self._rig.context, motion)
+        self._rims.centre[:], self._rims.axle[:] = motion.position, motion.rotation[:, :, 1]
+        return self._rims.look(time)
+
+    def _look_at_fall(self, time: float) -> Ending | None:
+        if self._fall is None or not self._fall.is_due(time):
+            return None
+        motion = BodyMotions.empty(len(BODIES))
+        read_body_motions(self._rig.tree, self._rig.context, motion)
+        x, y, z = motion.position[0]
+        height = float(z - evaluate(self._problem.surface, x, y)[0] - fall_criterion(self._problem.bicycle).limit)
+        return self._fall.look(time, height, motion)
+
+    def _convert(self, times: np.ndarray, states: tuple[BodyMotions, BodyMotions]) -> tuple[np.ndarray, np.ndarray]:
+        return read_coordinates(self._problem, times, BodyMotions.stack(states))
+
+
+def read_coordinates(problem: Problem, times: np.ndarray, motion: BodyMotions) -> tuple[np.ndarray, np.ndarray]:
+    """Compute generalised coordinates and rates (n, 9), with angles on the same turn as the problem's start."""
+    q, qd = coordinates_from_bodies(
+        problem.bicycle, times, motion.position[:, 0], motion.velocity[:, 0], motion.rotation, motion.spin
+    )
+    return start_on_turn(q, problem.q), qd
 
 
 def ride_simulation(rig: DrakeRig, problem: Problem, step: float, counts: list[int], progress: Progress) -> DrakeRide:
@@ -104,13 +164,10 @@ def ride_simulation(rig: DrakeRig, problem: Problem, step: float, counts: list[i
     EngineError
         If a wheel has no contact point at the start, or Drake cannot evaluate it.
     """
-    try:
-        watch = RimWatch(problem.bicycle, problem.surface, problem.q)
-    except ValueError as error:
-        raise EngineError(str(error)) from error
+    watch = RideWatch(rig, problem)
     recording = DrakeRecording.empty(len(counts))
     rig.follow(0)
-    _look_at_rims(rig, watch, 0.0)
+    watch.look(0.0)
     try:
         rig.simulator.Initialize()
         _record_sample(rig, recording, 0)
@@ -127,9 +184,9 @@ def ride_simulation(rig: DrakeRig, problem: Problem, step: float, counts: list[i
             steps, ended, touch = _advance(rig, watch, step, steps, until)
             cpu_time += process_time() - begun
             if touch is not None:
-                # The second touch may lie before the last sample.
+                # The end may lie before the last sample.
                 samples = max(1, bisect_right(counts[:k], touch.time / step))
-                return DrakeRide(recording.first(samples), steps, cpu_time, touch.why)
+                return DrakeRide(recording.first(samples), steps, cpu_time, touch.why, touch.fall)
             if ended is not None:
                 return DrakeRide(recording.first(k), steps, cpu_time, f"{ended} at {steps * step:.6g} s")
             if steps - reported >= steps_per_report:
@@ -143,7 +200,7 @@ def ride_simulation(rig: DrakeRig, problem: Problem, step: float, counts: list[i
 
 
 def _advance(
-    rig: DrakeRig, watch: RimWatch, step: float, steps: int, until: int
+    rig: DrakeRig, watch: RideWatch, step: float, steps: int, until: int
 ) -> tuple[int, str | None, Ending | None]:
     """Step from ``steps`` to ``until`` steps; return the number of steps and why the ride ends, if it does."""
     while steps < until:
@@ -157,20 +214,10 @@ def _advance(
             rig.follow(steps)
         except (EngineError, RuntimeError) as error:
             return steps, _join_lines(error), None
-        touch = _look_at_rims(rig, watch, steps * step)
+        touch = watch.look(steps * step)
         if touch is not None:
             return steps, None, touch
     return steps, None, None
-
-
-def _look_at_rims(rig: DrakeRig, watch: RimWatch, time: float) -> Ending | None:
-    """Return why the ride ends if a rim touches the ground at a second place."""
-    if not watch.needed:
-        return None
-    motion = BodyMotions.empty(2)
-    read_wheel_motions(rig.tree, rig.context, motion)
-    watch.centre[:], watch.axle[:] = motion.position, motion.rotation[:, :, 1]
-    return watch.look(time)
 
 
 def _record_sample(rig: DrakeRig, recording: DrakeRecording, k: int) -> None:

@@ -155,6 +155,12 @@ class BodyMotions:
         """Return arrays for as many bodies, filled with zeros."""
         return cls(np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros((*shape, 3, 3)), np.zeros((*shape, 3)))
 
+    @classmethod
+    def stack(cls, parts: Sequence[BodyMotions]) -> BodyMotions:
+        """Return the motions of k bodies at several times as one, (n, k)."""
+        names = ("position", "velocity", "rotation", "spin")
+        return cls(*(np.stack([getattr(part, name) for part in parts]) for name in names))
+
     def __getitem__(self, rows: int | slice) -> BodyMotions:
         """Return views of some rows."""
         return BodyMotions(self.position[rows], self.velocity[rows], self.rotation[rows], self.spin[rows])

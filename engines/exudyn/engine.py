@@ -7,7 +7,7 @@ the contact, `exudyn-builtin` by that disc without changes, on the level plane o
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -99,16 +99,18 @@ class ExudynEngine:
         EngineError
             If the engine does not accept the initial state.
         """
-        from .model import build_model, make_rim_check
+        from .model import build_model
         from .solve import integrate, no_progress
+        from .watch import make_looks
 
         self.check(problem, settings)
         with no_progress():
             model = build_model(problem, settings, self.put_on_ground())
-            look = make_rim_check(model, problem)
+            look = make_looks(model, problem)
             outcome = integrate(model.system, _make_integration(problem, settings, model), progress, look)
         trajectory = self._trajectory(problem, settings, model, outcome)
-        return trajectory.until(outcome.until)
+        ending = outcome.ending
+        return trajectory if ending is None else replace(trajectory.until(ending.time), fall=ending.fall)
 
     def _trajectory(
         self, problem: Problem, settings: SolverSettings, model: Model, outcome: IntegrationOutcome

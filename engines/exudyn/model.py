@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,8 +12,7 @@ from exudyn.rigidBodyUtilities import RigidBodyInertia
 
 from ...reference.bicycle import BODIES, Bicycle
 from ...reference.kinematics import angular_velocities, body_positions, body_velocities, rotations
-from ...reference.rim import Ending, RimWatch
-from ..engine import EngineError, Problem
+from ..engine import Problem
 from .library import connect
 from .settings import SolverSettings
 from .wheels import LEFT_AXIS, MASS_UNIT, PutOnGround, WheelRolling
@@ -33,15 +31,15 @@ class Model:
         Both wheels on the ground.
     sensors : tuple of dict
         For each body, in the order of `BODIES`, sensor numbers of position, velocity, rotation and spin.
-    wheels : tuple
-        Nodes of the rear and the front wheel.
+    nodes : tuple
+        Nodes of the bodies, in the order of `BODIES`.
     """
 
     container: exu.SystemContainer
     system: exu.MainSystem
     rolling: WheelRolling
     sensors: tuple[dict[str, Any], ...]
-    wheels: tuple[Any, Any]
+    nodes: tuple[Any, ...]
 
 
 def build_model(problem: Problem, settings: SolverSettings, put_on_ground: PutOnGround) -> Model:
@@ -55,8 +53,7 @@ def build_model(problem: Problem, settings: SolverSettings, put_on_ground: PutOn
     rolling = put_on_ground(system, bodies[2:], problem, settings)
     sensors = tuple(_add_sensors(system, body["bodyNumber"]) for body in bodies)
     system.Assemble()
-    rear, front = (body["nodeNumber"] for body in bodies[2:])
-    return Model(container, system, rolling, sensors, (rear, front))
+    return Model(container, system, rolling, sensors, tuple(body["nodeNumber"] for body in bodies))
 
 
 def _add_bodies(system: exu.MainSystem, problem: Problem) -> list[dict[str, Any]]:
@@ -140,31 +137,6 @@ def _add_sensors(system: exu.MainSystem, body: Any) -> dict[str, Any]:
         )
         for name, kind in kinds.items()
     }
-
-
-def make_rim_check(model: Model, problem: Problem) -> Callable[[float], Ending | None]:
-    """Make the check of both rims that `velodrome.engines.exudyn.solve.integrate` calls at every step.
-
-    Raises
-    ------
-    EngineError
-        If a rim lies inside the ground at the start.
-    """
-    try:
-        watch = RimWatch(problem.bicycle, problem.surface, problem.q)
-    except ValueError as error:
-        raise EngineError(f"exudyn could not start: {error}") from error
-    if not watch.needed:
-        return lambda _: None
-    system, kinds = model.system, exu.OutputVariableType
-
-    def look(time: float) -> Ending | None:
-        for k, node in enumerate(model.wheels):
-            watch.centre[k] = system.GetNodeOutput(node, kinds.Position)
-            watch.axle[k] = system.GetNodeOutput(node, kinds.RotationMatrix)[1::3]
-        return watch.look(time)
-
-    return look
 
 
 @dataclass(frozen=True)

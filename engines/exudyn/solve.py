@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import signal
 import threading
 import time
@@ -13,7 +12,7 @@ from typing import Any
 
 import exudyn as exu
 
-from ...reference.rim import Ending
+from ...reference.fall import Ending
 from ..engine import EngineError, Progress
 from .library import SOLVER_ERROR, choose_dense_solver, set_printing, write_no_files
 from .settings import SolverSettings
@@ -53,8 +52,8 @@ class IntegrationOutcome:
         Number of steps whose Newton iteration did not converge according to the engine.
     largest_residual : float
         Largest residual that Newton's method left in a step: a norm of forces and lengths, in the model's units.
-    until : float
-        Time after which samples do not belong to the ride [s].
+    ending : Ending or None
+        When and why the ride ended early, if not by a failure; samples after that do not belong to it.
     """
 
     steps: int
@@ -62,7 +61,7 @@ class IntegrationOutcome:
     ended: str | None
     unconverged_steps: int
     largest_residual: float
-    until: float = math.inf
+    ending: Ending | None = None
 
 
 class _Steps:
@@ -97,9 +96,12 @@ class _Steps:
         if self.taken % self._stride == 0:
             self._output.lastSensorsWritten = time
 
-    def outcome(self, done: int, cpu_time: float, ended: str | None, until: float = math.inf) -> IntegrationOutcome:
+    def outcome(
+        self, done: int, cpu_time: float, ended: str | None, ending: Ending | None = None
+    ) -> IntegrationOutcome:
         """Return the outcome of a run."""
-        return IntegrationOutcome(done, cpu_time, ended, self.unconverged, self.residual, until)
+        why = ended if ending is None else ending.why
+        return IntegrationOutcome(done, cpu_time, why, self.unconverged, self.residual, ending)
 
 
 def integrate(
@@ -168,12 +170,10 @@ def integrate(
     if interrupted.is_set():  # only if the caller ignores the signal
         return steps.outcome(steps.taken, cpu_time, "interrupted")
     if ending is not None:  # before a step that was not taken
-        return steps.outcome(steps.taken, cpu_time, ending.why, ending.time)
+        return steps.outcome(steps.taken, cpu_time, None, ending)
     if success:
         steps.end()
-        ending = look(steps.taken * step)
-        why, until = (None, math.inf) if ending is None else (ending.why, ending.time)
-        return steps.outcome(steps.taken, cpu_time, why, until)
+        return steps.outcome(steps.taken, cpu_time, None, look(steps.taken * step))
     failure = "the Jacobian is singular" if solver.conv.linearSolverFailed else "Newton's method did not converge"
     if steps.taken == 0:
         raise EngineError(f"exudyn could not start: {failure}")

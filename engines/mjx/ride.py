@@ -13,12 +13,14 @@ import jax.numpy as jnp
 import numpy as np
 from mujoco import mjx
 
+from ...reference.fall import Fall, heights_above_fallen
 from ...reference.kinematics import WHEELS
 from ..engine import EngineError, Problem, Progress
 from ..mujoco.convergence import share
 from ..mujoco.model import Touching
 from ..mujoco.ride import Recording, RideState, bodies, set_start
 from ..mujoco.settings import WRONG
+from ..mujoco.state import from_mujoco
 from . import multipliers, native
 from .ground import choose_height
 from .settings import ArraySettings, MjxMultiplierSettings, MjxSettings
@@ -199,10 +201,11 @@ def ride_in_mjx(problem: Problem, settings: ArraySettings, counts: list[int], pr
             data = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (settings.batch_size, *leaf.shape)), data)
         # Steps of RK4 have four evaluations, and only the last one's solution remains to be looked at.
         judged = setup.rolling == "multipliers" or settings.integrator != "RK4"
-        return _record_ride(setup, model, inputs, data, settings, counts, progress, judged)
+        return _record_ride(problem, setup, model, inputs, data, settings, counts, progress, judged)
 
 
 def _record_ride(
+    problem: Problem,
     setup: MjxSetup,
     model: Any,
     inputs: MjxInputs,
@@ -215,6 +218,7 @@ def _record_ride(
     advance, given, state = _compile_ride(setup, (model, inputs), data)
     recording = Recording.empty(len(counts))
     steps, samples, unconverged, worst, cpu_time, ended = 0, 0, 0, 0.0, 0.0, None
+    fall: Fall | None = None
     for first in range(0, len(counts), _BLOCK):
         block = np.array(counts[first : first + _BLOCK])
         # Behind the last output the ride stays there.
@@ -234,6 +238,10 @@ def _record_ride(
         samples += reached
         steps += int(found["steps"][last])
         unconverged, worst = unconverged + int(found["unconverged"][last]), max(worst, float(found["worst"][last]))
+        if not problem.beyond_fall:
+            standing, fall = _find_fall(problem, recording, max(first - 1, 0), samples)
+            if fall is not None:
+                samples, ended = standing, "the bicycle fell"
         if ended is not None:
             break
         progress(steps * settings.step)
@@ -247,7 +255,23 @@ def _record_ride(
         ended=ended,
         unconverged_steps=unconverged if judged else None,
         largest_residual=worst if judged and contacts and np.isfinite(worst) else None,
+        fall=fall,
     )
+
+
+def _find_fall(problem: Problem, recording: Recording, first: int, samples: int) -> tuple[int, Fall | None]:
+    """Look for a fall in samples from ``first`` on; return the number of samples before it, and those around it.
+
+    MJX rides many outputs in one compiled call, so the states around a fall are samples.
+    """
+    part = slice(first, samples)
+    q, qd = from_mujoco(recording.time[part], recording.qpos[part], recording.qvel[part], problem.q)
+    low = np.flatnonzero(heights_above_fallen(problem.bicycle, problem.surface, q, qd)[0] < 0)
+    if len(low) == 0 or low[0] == 0:
+        return samples, None
+    k = int(low[0])
+    around = slice(k - 1, k + 1)
+    return first + k, Fall(recording.time[part][around].copy(), q[around], qd[around])
 
 
 def _find_ending(found: dict[str, np.ndarray], i: int, time: float) -> str | None:

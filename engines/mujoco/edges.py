@@ -15,7 +15,7 @@ from ..engine import Problem
 from .callbacks import find_board
 from .edge_contacts import EdgeContacts
 from .knife_edge import ALL_AXES, stiffen, watched_edges, watched_rolling
-from .ride import Rig, bodies, look_at_rims, read_contact_forces, rim_stride, set_start, wheel_geoms
+from .ride import Rig, bodies, make_look, read_contact_forces, rim_stride, set_start, wheel_geoms
 from .settings import ExactContactSettings, MultiplierSettings
 
 GROUNDS: dict[str, str] = dict.fromkeys(WHEELS, "ground")
@@ -50,7 +50,7 @@ def build_contacts(problem: Problem, settings: ExactContactSettings) -> Rig:
         wheels=wheels,
         follow=lambda: find_block_contacts(model, data).complete(),
         stride=rim_stride(problem, settings.step),
-        look=look_at_rims(data, problem),
+        look=make_look(data, problem),
         forces=partial(read_contact_forces, model, data, wheels),
         callbacks=lambda: watched_edges(model, data, problem.surface, GROUNDS, settings.converged_below),
         judged=settings.noslip_iterations == 0,
@@ -77,7 +77,7 @@ def build_multipliers(problem: Problem, settings: MultiplierSettings) -> Rig:
         wheels=wheel_geoms(model),
         follow=lambda: find_block_contacts(model, data).complete(),
         stride=rim_stride(problem, settings.step),
-        look=look_at_rims(data, problem),
+        look=make_look(data, problem),
         forces=forces,
         callbacks=lambda: watched_rolling(
             model, data, problem.surface, GROUNDS, settings.stabilisation, [ALL_AXES] * len(GROUNDS)

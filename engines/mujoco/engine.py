@@ -184,6 +184,7 @@ def assemble_trajectory(
         steps=ridden.steps,
         cpu_time=ridden.cpu_time,
         ended=ridden.ended,
+        fall=ridden.fall,
         friction=settings.least_friction,
         unconverged_steps=ridden.unconverged_steps,
         largest_residual=ridden.largest_residual,

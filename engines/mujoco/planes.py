@@ -16,7 +16,7 @@ from ...reference.surface import is_level
 from ..engine import EngineError, Problem
 from .convergence import leave_unwatched, watch_solver
 from .releases import RESIDUAL, is_present
-from .ride import Rig, bodies, look_at_rims, look_stride, read_contact_forces, rim_stride, set_start, wheel_geoms
+from .ride import Rig, bodies, look_stride, make_look, read_contact_forces, rim_stride, set_start, wheel_geoms
 from .settings import ContactSettings
 from .tangent import place_planes
 
@@ -50,7 +50,7 @@ def build_planes(problem: Problem, settings: ContactSettings) -> Rig:
         wheels=wheels,
         follow=follow,
         stride=1 if moving else look_stride(settings.step),
-        look=look_at_rims(data, problem, rim_stride(problem, settings.step)),
+        look=make_look(data, problem, rim_stride(problem, settings.step)),
         forces=partial(read_contact_forces, model, data, wheels),
         callbacks=lambda: watch_solver(model, data, settings.converged_below) if watched else leave_unwatched(),
         judged=watched and settings.noslip_iterations == 0,

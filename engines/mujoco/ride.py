@@ -18,22 +18,21 @@ import numpy as np
 from numba import typeof
 
 from ...reference.bicycle import BODIES
+from ...reference.fall import LOOK_INTERVAL, Ending, Fall, FallWatch, fall_criterion
 from ...reference.kinematics import WHEELS, constants
-from ...reference.rim import Ending, RimWatch, bicycle_rim_search
+from ...reference.rim import RimWatch, bicycle_rim_search
 from ..engine import EngineError, Problem, Progress
 from .convergence import SolverConvergence, UnknownConvergence, share
 from .library import read_energy
 from .model import Touching, mjcf
 from .releases import ENERGY, is_present
 from .settings import StepSettings
-from .state import to_mujoco
-from .tangent import wheel_poses
+from .state import from_mujoco, to_mujoco
+from .tangent import find_height, wheel_poses
 
 Convergence = SolverConvergence | UnknownConvergence
 
 REPORT_INTERVAL = 0.05
-# Interval of the checks on ground that allows long ones [s]; a wheel turns by far less than half a turn in it.
-LOOK_INTERVAL = 0.01
 UNSTABLE = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
     mujoco.mjtWarning.mjWARN_BADQVEL,
@@ -96,7 +95,8 @@ class Rig:
     stride : int
         Counted from the start, so that the end of a ride does not depend on the output times.
     look : callable
-        Checks the rims. To be called after ``follow``, with the time [s]; returns why the ride ends there, or None.
+        Checks the rims, and whether the bicycle has fallen. To be called after ``follow``, with the time [s]; returns
+        why the ride ends there, or None.
     forces : callable
         Fills an array (2, 3) with the contact forces of the last evaluation, inertial axes [N].
     callbacks : callable
@@ -134,6 +134,8 @@ class RideState:
         Steps in which MuJoCo's contact solver stopped before it had converged; None where this is not known.
     largest_residual : float or None
         Largest residual of that solver, relative to the forces; None also where there is no solver.
+    fall : Fall or None
+        The states around the fall that ended the ride.
     """
 
     recording: Recording
@@ -142,6 +144,7 @@ class RideState:
     ended: str | None
     unconverged_steps: int | None
     largest_residual: float | None
+    fall: Fall | None = None
 
 
 def set_start(problem: Problem, settings: StepSettings, touching: Touching) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -165,14 +168,28 @@ def set_start(problem: Problem, settings: StepSettings, touching: Touching) -> t
     return model, data
 
 
-def look_at_rims(data: mujoco.MjData, problem: Problem, every: int = 1) -> Callable[[float], Ending | None]:
-    """Return the function that checks both rims for a `Rig`; it does so in one of ``every`` calls.
+def make_look(data: mujoco.MjData, problem: Problem, every: int = 1) -> Callable[[float], Ending | None]:
+    """Return the function that checks both rims for a `Rig`, and whether the bicycle has fallen.
+
+    It checks the rims in one of ``every`` calls, and the fall about every `LOOK_INTERVAL`.
 
     Raises
     ------
     EngineError
         If a rim lies inside the ground at the start.
     """
+    looks = [_look_at_rims(data, problem, every)]
+    if not problem.beyond_fall:
+        looks.append(_look_at_fall(data, problem))
+
+    def look(time: float) -> Ending | None:
+        found = [ending for watch in looks if (ending := watch(time)) is not None]
+        return min(found, key=lambda ending: ending.time, default=None)
+
+    return look
+
+
+def _look_at_rims(data: mujoco.MjData, problem: Problem, every: int) -> Callable[[float], Ending | None]:
     try:
         watch = RimWatch(problem.bicycle, problem.surface, problem.q)
     except ValueError as error:
@@ -188,6 +205,24 @@ def look_at_rims(data: mujoco.MjData, problem: Problem, every: int = 1) -> Calla
             return None
         pose()
         return watch.look(time)
+
+    return look
+
+
+def _look_at_fall(data: mujoco.MjData, problem: Problem) -> Callable[[float], Ending | None]:
+    def convert(times: np.ndarray, states: tuple[tuple[np.ndarray, np.ndarray], ...]) -> tuple[np.ndarray, np.ndarray]:
+        qpos, qvel = (np.array(part) for part in zip(*states, strict=True))
+        return from_mujoco(times, qpos, qvel, problem.q)
+
+    watch = FallWatch(problem.bicycle, problem.surface, convert)
+    function, parameters = problem.surface.function.real, problem.surface.parameters
+    arguments = (data.qpos, fall_criterion(problem.bicycle), function, parameters)
+    height = partial(find_height.compile(tuple(typeof(argument) for argument in arguments)), *arguments)
+
+    def look(time: float) -> Ending | None:
+        if not watch.is_due(time):
+            return None
+        return watch.look(time, height(), (data.qpos.copy(), data.qvel.copy()))
 
     return look
 
@@ -264,18 +299,17 @@ def find_unconverged(convergence: Convergence, step: float) -> str | None:
 def advance(rig: Rig, step: float, steps: int, until: int) -> tuple[int, bool, Ending | None]:
     """Step from ``steps`` to ``until`` steps of length ``step``, or until the wheels leave the ground.
 
-    Returns the number of steps, whether the wheels have contact, and why the ride ends if a rim touches twice.
+    Returns the number of steps, whether the wheels have contact, and why the ride ends if a rim touches twice or the
+    bicycle falls.
     """
     while steps < until:
         more = min(until - steps, rig.stride - steps % rig.stride)
         mujoco.mj_step(rig.model, rig.data, more)
         steps += more
         if steps % rig.stride == 0:
-            if not rig.follow():
-                return steps, False, None
-            ending = rig.look(steps * step)
-            if ending is not None:
-                return steps, True, ending
+            standing, ending = rig.follow(), rig.look(steps * step)
+            if ending is not None or not standing:
+                return steps, standing, ending
     return steps, True, None
 
 
@@ -317,7 +351,7 @@ def ride_rig(rig: Rig, step: float, counts: list[int], progress: Progress) -> Ri
         ended = find_unconverged(convergence, step)
         if ended is not None:
             raise EngineError(ended)
-        samples, steps, cpu_time, ended = _continue_ride(rig, step, counts, progress, recording, convergence)
+        samples, steps, cpu_time, ended, fall = _continue_ride(rig, step, counts, progress, recording, convergence)
         return RideState(
             recording=recording.first(samples),
             steps=steps,
@@ -326,13 +360,14 @@ def ride_rig(rig: Rig, step: float, counts: list[int], progress: Progress) -> Ri
             # The last sample is evaluated too; that evaluation belongs to a step that is not taken.
             unconverged_steps=min(convergence.unconverged, steps) if rig.judged else None,
             largest_residual=convergence.largest if rig.judged else None,
+            fall=fall,
         )
 
 
 def _continue_ride(
     rig: Rig, step: float, counts: list[int], progress: Progress, recording: Recording, convergence: Convergence
-) -> tuple[int, int, float, str | None]:
-    """Continue from the first sample; return samples, steps, their CPU time [s] and why the ride ended early."""
+) -> tuple[int, int, float, str | None, Fall | None]:
+    """Continue from the first sample; return samples, steps, their CPU time [s], why the ride ended, and a fall."""
     steps, cpu_time, reported = 0, 0.0, 0
     steps_per_report = max(1, int(REPORT_INTERVAL / step))
     for k in range(1, len(counts)):
@@ -344,17 +379,19 @@ def _continue_ride(
             ended = find_trouble(rig.data, standing)
             # An unconverged solver may be the cause of other trouble, so it is reported first.
             if (stopped := find_unconverged(convergence, step)) is not None:
-                return k, steps, cpu_time, stopped
-            if touch is not None and ended is None:
-                # The second touch may lie before the last sample.
-                return max(1, bisect_right(counts[:k], touch.time / step)), steps, cpu_time, touch.why
+                return k, steps, cpu_time, stopped, None
+            # A wheel that has lost its contact may do so because the bicycle has fallen.
+            if touch is not None and (ended is None or touch.fall is not None):
+                # The end may lie before the last sample.
+                samples = max(1, bisect_right(counts[:k], touch.time / step))
+                return samples, steps, cpu_time, touch.why, touch.fall
             if ended is not None:
-                return k, steps, cpu_time, f"{ended} at {steps * step:.6g} s"
+                return k, steps, cpu_time, f"{ended} at {steps * step:.6g} s", None
             if steps - reported >= steps_per_report:
                 reported = steps
                 progress(steps * step)
         convergence.begin(steps)
         record_sample(rig, recording, k)
         if (stopped := find_unconverged(convergence, step)) is not None:
-            return k, steps, cpu_time, stopped
-    return len(counts), steps, cpu_time, None
+            return k, steps, cpu_time, stopped, None
+    return len(counts), steps, cpu_time, None, None

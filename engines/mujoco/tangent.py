@@ -16,6 +16,7 @@ import numpy as np
 from ...reference.kernels import contact
 from ...reference.kernels.compilation import jit
 from ...reference.kernels.dynamics import find_contacts, wheels
+from ...reference.kernels.fall import height_above_fallen
 from ...reference.kernels.vector import dot
 
 # Half the thickness of a wheel, since MuJoCo has no knife edge [m].
@@ -42,6 +43,15 @@ def wheel_poses(qpos, c, centre, axle):
     for k in range(2):
         for i in range(3):
             centre[k, i], axle[k, i] = both[k][0][i], both[k][2][i]
+
+
+@jit
+def find_height(qpos, fall, function, parameters):
+    """Return the height of the bicycle at ``qpos`` (10,) above that of a fallen one."""
+    y = np.zeros(18)
+    y[:9] = tangent_coordinates(qpos)
+    height, _ = height_above_fallen(y, fall, function, parameters)
+    return height
 
 
 @jit

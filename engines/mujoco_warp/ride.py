@@ -21,7 +21,7 @@ import mujoco_warp
 import numpy as np
 import warp
 
-from ...reference.rim import Ending
+from ...reference.fall import Ending, Fall
 from ...reference.surface import is_level
 from ..engine import EngineError, Problem, Progress
 from ..mujoco.convergence import share
@@ -61,7 +61,7 @@ class WarpRide:
     standing : bool
         Whether both wheels stand on the ground, as far as looked at.
     touch : Ending or None
-        Why the ride ends if a rim touches twice.
+        Why the ride ends if a rim touches twice or the bicycle falls.
     unconverged : int
         Number of evaluations of new states whose residual counts as unconverged.
     largest : float
@@ -97,10 +97,11 @@ class WarpRide:
         _INTEGRATE[self.settings.integrator](self.model, self.data)
         self.steps += 1
         if self.steps % self.rig.stride == 0:
-            self.rig.data.qpos[:] = self.data.qpos.numpy()[self.settings.batch_place]
+            for name in ("qpos", "qvel"):
+                getattr(self.rig.data, name)[:] = getattr(self.data, name).numpy()[self.settings.batch_place]
             if self.standing and np.all(np.abs(self.rig.data.qpos) < _HUGE):
                 self.standing = self.rig.follow()
-                self.touch = self.rig.look(self.steps * self.settings.step) if self.standing else None
+                self.touch = self.rig.look(self.steps * self.settings.step)
                 self._move_planes()
         here = self._evaluate()
         self.unconverged += here.residual > self.settings.converged_below
@@ -192,7 +193,7 @@ def ride_in_warp(problem: Problem, settings: WarpSettings, counts: list[int], pr
             raise EngineError(trouble)
         recording = Recording.empty(len(counts))
         start.record(recording, 0, 0.0)
-        samples, cpu_time, ended = _continue_ride(ride, counts, progress, recording)
+        samples, cpu_time, ended, fall = _continue_ride(ride, counts, progress, recording)
     # Steps of RK4 have four evaluations, and only the last one's solution remains to be looked at.
     judged = settings.integrator != "RK4" and ride.rig.judged
     return RideState(
@@ -202,6 +203,7 @@ def ride_in_warp(problem: Problem, settings: WarpSettings, counts: list[int], pr
         ended=ended,
         unconverged_steps=ride.unconverged if judged else None,
         largest_residual=ride.largest if judged else None,
+        fall=fall,
     )
 
 
@@ -214,8 +216,8 @@ def _compile_kernels(problem: Problem, settings: WarpSettings) -> None:
 
 def _continue_ride(
     ride: WarpRide, counts: list[int], progress: Progress, recording: Recording
-) -> tuple[int, float, str | None]:
-    """Continue from the first sample; return samples, CPU time [s] of the steps and why the ride ended early."""
+) -> tuple[int, float, str | None, Fall | None]:
+    """Continue from the first sample; return samples, CPU time [s] of the steps, why the ride ended, and a fall."""
     step, cpu_time, reported = ride.settings.step, 0.0, 0
     steps_per_report = max(1, int(REPORT_INTERVAL / step))
     for k in range(1, len(counts)):
@@ -223,16 +225,18 @@ def _continue_ride(
         while ride.steps < counts[k]:
             here = ride.step()
             trouble = ride.find_trouble(here)
-            if trouble is not None:
-                return k, cpu_time + process_time() - begun, trouble
-            if ride.touch is not None:
-                # The second touch may lie before the last sample.
-                samples = max(1, bisect_right(counts[:k], ride.touch.time / step))
-                return samples, cpu_time + process_time() - begun, ride.touch.why
+            touch = ride.touch
+            # A wheel that has lost its contact may do so because the bicycle has fallen.
+            if trouble is not None and (touch is None or touch.fall is None):
+                return k, cpu_time + process_time() - begun, trouble, None
+            if touch is not None:
+                # The end may lie before the last sample.
+                samples = max(1, bisect_right(counts[:k], touch.time / step))
+                return samples, cpu_time + process_time() - begun, touch.why, touch.fall
         cpu_time += process_time() - begun
         if here is not None:
             here.record(recording, k, ride.steps * step)
         if ride.steps - reported >= steps_per_report:
             reported = ride.steps
             progress(ride.steps * step)
-    return len(counts), cpu_time, None
+    return len(counts), cpu_time, None, None

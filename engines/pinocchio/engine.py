@@ -8,7 +8,6 @@ from ...reference.dae import mass_matrix
 from ...reference.kinematics import quaternions
 from ...reference.simulate import steps_per_output
 from ..contact_fields import observe_contact_fields
-from ..coordinates import start_on_turn
 from ..engine import Problem, Progress, Trajectory, UnsuitableProblem
 from ..releases import refuse_releases
 from .releases import PINOCCHIO
@@ -82,21 +81,11 @@ class PinocchioEngine:
             If a wheel has no contact at the start, or the solver fails there.
         """
         refuse_releases(self.name, settings, PINOCCHIO)
-        from .ride import ride_bicycle
-        from .tree import from_pinocchio
+        from .ride import read_coordinates, ride_bicycle
 
         result = ride_bicycle(problem, settings, progress)
         seen = result.recording
-        q, qd = from_pinocchio(
-            problem.bicycle,
-            seen.time,
-            seen.configuration,
-            seen.velocity,
-            seen.position[:, 0],
-            seen.rotation,
-            seen.spin,
-        )
-        q = start_on_turn(q, problem.q)
+        q, qd = read_coordinates(problem, seen, seen.time)
         return Trajectory(
             engine=self.name,
             version=self.version,
@@ -113,6 +102,7 @@ class PinocchioEngine:
             steps=result.steps,
             cpu_time=result.cpu_time,
             ended=result.ended,
+            fall=result.fall,
             unconverged_steps=result.unconverged_steps,
             largest_residual=result.largest_residual,
         )

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Iterable
 from dataclasses import dataclass
 from time import process_time
 
@@ -13,13 +14,16 @@ import numpy as np
 import pinocchio as pin
 
 from ...reference.bicycle import BODIES
-from ...reference.rim import Ending, RimWatch
+from ...reference.fall import Ending, Fall, FallWatch, fall_criterion
+from ...reference.rim import RimWatch
 from ...reference.simulate import steps_per_output
+from ...reference.surface import evaluate
+from ..coordinates import start_on_turn
 from ..engine import EngineError, Problem, Progress
 from .dynamics import ConstrainedBicycle, NoAccelerationError
 from .integrators import step_euler, step_rk4
 from .settings import ConstraintSettings
-from .tree import JOINTS, to_pinocchio
+from .tree import JOINTS, from_pinocchio, to_pinocchio
 
 REPORT_INTERVAL = 0.05  # of simulated time between two calls of `progress` [s]
 # Contact forces with a larger error than this, relative to the largest of them, are unusable.
@@ -63,6 +67,12 @@ class PinocchioRecording:
         shapes = ((n,), (n, 10), (n, 9), (n, 4, 3), (n, 4, 3, 3), (n, 4, 3), (n, 2, 3), (n, 2))
         return cls(*(np.zeros(shape) for shape in shapes))
 
+    @classmethod
+    def join(cls, parts: Iterable[PinocchioRecording]) -> PinocchioRecording:
+        """Return the samples of several recordings in one."""
+        parts = list(parts)
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__dataclass_fields__))
+
     def first(self, n: int) -> PinocchioRecording:
         """Return the first n samples."""
         return PinocchioRecording(*(getattr(self, name)[:n] for name in self.__dataclass_fields__))
@@ -81,6 +91,8 @@ class PinocchioOutcome:
         Process CPU time of the steps [s].
     ended : str or None
         Why the ride ended early.
+    fall : Fall or None
+        The states around the fall that ended it.
     unconverged_steps : int
         Steps with an evaluation in which the solver did not meet its accuracy.
     largest_residual : float
@@ -91,8 +103,16 @@ class PinocchioOutcome:
     steps: int
     cpu_time: float
     ended: str | None
+    fall: Fall | None
     unconverged_steps: int
     largest_residual: float
+
+
+def read_coordinates(problem: Problem, seen: PinocchioRecording, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Compute generalised coordinates and rates (n, 9), with angles on the same turn as the problem's start."""
+    motion = (seen.configuration, seen.velocity, seen.position[:, 0], seen.rotation, seen.spin)
+    q, qd = from_pinocchio(problem.bicycle, times, *motion)
+    return start_on_turn(q, problem.q), qd
 
 
 class ProximalWatch:
@@ -144,6 +164,8 @@ class PinocchioRide:
         except ValueError as error:
             raise EngineError(str(error)) from error
         self.configuration, self.velocity = to_pinocchio(problem.bicycle, problem.q, problem.qd)
+        self._problem = problem
+        self._fall = None if problem.beyond_fall else FallWatch(problem.bicycle, problem.surface, self._convert_states)
         self._evaluate()
         self.look()
 
@@ -169,7 +191,7 @@ class PinocchioRide:
         return self.find_unconverged()
 
     def advance_by(self, steps: int) -> tuple[str | None, Ending | None]:
-        """Take some steps; return why the ride ends before they are done, and the second touch that ends it."""
+        """Take some steps; return why the ride ends before they are done, and the touch or fall that ends it."""
         for _ in range(steps):
             ended = self.advance()
             if ended is not None:
@@ -189,11 +211,30 @@ class PinocchioRide:
         )
 
     def look(self) -> Ending | None:
-        """Look at both rims; return when and why the ride ends, None if it goes on."""
+        """Look at both rims and at the height; return when and why the ride ends, None if it goes on."""
+        found = (self._look_at_rims(), self._look_at_fall())
+        return min((one for one in found if one is not None), key=lambda ending: ending.time, default=None)
+
+    def _look_at_rims(self) -> Ending | None:
         if not self._rims.needed:
             return None
         self._rims.centre[:], self._rims.axle[:] = self.bicycle.contacts.centre, self.bicycle.contacts.axle
         return self._rims.look(self.time)
+
+    def _look_at_fall(self) -> Ending | None:
+        if self._fall is None or not self._fall.is_due(self.time):
+            return None
+        here = PinocchioRecording.empty(1)
+        self.record(here, 0)
+        bicycle, surface = self._problem.bicycle, self._problem.surface
+        x, y, z = here.position[0, 0]
+        height = float(z - evaluate(surface, x, y)[0] - fall_criterion(bicycle).limit)
+        return self._fall.look(self.time, height, here)
+
+    def _convert_states(
+        self, times: np.ndarray, states: tuple[PinocchioRecording, PinocchioRecording]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        return read_coordinates(self._problem, PinocchioRecording.join(states), times)
 
     def record(self, recording: PinocchioRecording, k: int) -> None:
         """Record the present state as sample k."""
@@ -239,12 +280,13 @@ def ride_bicycle(problem: Problem, settings: ConstraintSettings, progress: Progr
     if ended is not None:
         raise EngineError(ended)
     ride.record(recording, 0)
-    samples, cpu_time, ended = _continue_ride(ride, stride, recording, progress)
+    samples, cpu_time, ended, fall = _continue_ride(ride, stride, recording, progress)
     return PinocchioOutcome(
         recording=recording.first(samples),
         steps=ride.steps,
         cpu_time=cpu_time,
         ended=ended,
+        fall=fall,
         unconverged_steps=ride.unconverged,
         largest_residual=ride.watch.largest,
     )
@@ -252,20 +294,20 @@ def ride_bicycle(problem: Problem, settings: ConstraintSettings, progress: Progr
 
 def _continue_ride(
     ride: PinocchioRide, stride: int, recording: PinocchioRecording, progress: Progress
-) -> tuple[int, float, str | None]:
-    """Continue from the first sample; return the number of samples, CPU time [s] and why the ride ended early."""
+) -> tuple[int, float, str | None, Fall | None]:
+    """Continue from the first sample; return samples, CPU time [s], why the ride ended early, and a fall."""
     cpu_time, reported = 0.0, 0.0
     for k in range(1, len(recording.time)):
         begin = process_time()
         ended, touch = ride.advance_by(stride)
         cpu_time += process_time() - begin
         if touch is not None:
-            # The second touch may lie before the last sample.
-            return max(1, bisect_right(recording.time[:k], touch.time)), cpu_time, touch.why
+            # The end may lie before the last sample.
+            return max(1, bisect_right(recording.time[:k], touch.time)), cpu_time, touch.why, touch.fall
         if ended is not None:
-            return k, cpu_time, ended
+            return k, cpu_time, ended, None
         ride.record(recording, k)
         if ride.time - reported >= REPORT_INTERVAL:
             reported = ride.time
             progress(reported)
-    return len(recording.time), cpu_time, None
+    return len(recording.time), cpu_time, None, None

@@ -14,15 +14,19 @@ import numpy as np
 from . import lean
 from .compilation import jit
 from .dynamics import wheels
+from .fall import height_above_fallen, may_fall_within
 from .lean import derivative
 from .pose import aligned
 from .projection import project
 from .rim import bound, least_clearance
 
 SIZE = 24
-DONE, MORE, FAILED, REAR_TOUCHED, FRONT_TOUCHED = 0, 1, 2, 3, 4
+DONE, MORE, FAILED, REAR_TOUCHED, FRONT_TOUCHED, FELL = range(6)
 _LOOKS = 8  # checks of the rims while a wheel rolls over a length of the ground's detail
 _BISECTIONS = 60
+# Looks at the height within a step in which the bicycle may fall, and halvings of the interval of a fall: the states at
+# its ends are then so close that the time follows from them to round-off.
+_FALL_LOOKS, _FALL_HALVINGS = 8, 20
 _GOLDEN = (math.sqrt(5) - 1) / 2
 # A rolling bicycle does not change within 10 ns: a smaller step means that the integration approaches a singularity
 # (a wheel flat on the ground, lean = +-pi/2), which would take millions of steps.
@@ -190,13 +194,39 @@ def _second_touch(y, new, coefficients, ground, function, parameters, c, work):
 
 
 @jit
-def dop853(y, times, index, t, h, tolerance, most_steps, tableau, ground, function, parameters, c, out):
+def _fall_within(y, coefficients, fall, function, parameters, work):
+    """Return the fractions of a step just before and just after the first fall in it; (2, 2) if there is none."""
+    standing = 0.0
+    for k in range(1, _FALL_LOOKS + 1):
+        lying = k / _FALL_LOOKS
+        _interpolate(y, coefficients, lying, work)
+        height, _ = height_above_fallen(work, fall, function, parameters)
+        if not height > 0:
+            for _ in range(_FALL_HALVINGS):
+                middle = 0.5 * (standing + lying)
+                _interpolate(y, coefficients, middle, work)
+                height, _ = height_above_fallen(work, fall, function, parameters)
+                if height > 0:
+                    standing = middle
+                else:
+                    lying = middle
+            return standing, lying
+        standing = lying
+    return 2.0, 2.0
+
+
+@jit
+def dop853(
+    y, times, index, t, h, tolerance, most_steps, tableau, ground, fall, function, parameters, c, out, fallen, at
+):
     """Advance ``y`` in place and fill rows ``index``... of ``out`` (n, 24) at ``times``.
 
     Each accepted step and each output is projected onto gaps, contact equations and rolling. Stops at the last time,
     after ``most_steps`` steps (call again with the returned values), where the step becomes too small or a contact is
-    lost, or where a rim touches the ground at a second place. That is searched for in the dense output, with the
-    `rim.RimSearch` ``ground``, so that it does not depend on the output times.
+    lost, where a rim touches the ground at a second place, or where the bicycle falls, if ``fall`` says so
+    (`fall.FallCriterion`). Both are searched for in the dense output, the touch with the `rim.RimSearch` ``ground``, so
+    that they do not depend on the output times. The states just before and after a fall fill ``fallen`` (2, 24), and
+    their times ``at`` (2,).
 
     Returns ``(status, index, t, h, steps, evaluations)``.
     """
@@ -207,6 +237,7 @@ def dop853(y, times, index, t, h, tolerance, most_steps, tableau, ground, functi
     derivative(y, function, parameters, bicycle, stages[0])
     steps, evaluations, rejected = 0, 1, False
     bounds = _rim_bounds(y, ground, function, parameters, c) if ground.curved else (1.0, 1.0)
+    height = height_above_fallen(y, fall, function, parameters) if fall.watched else (1.0, 0.0)
     while index < times.size and steps < most_steps:
         if not SMALLEST_STEP < h < 1e300:
             return FAILED, index, t, h, steps, evaluations
@@ -222,22 +253,33 @@ def dop853(y, times, index, t, h, tolerance, most_steps, tableau, ground, functi
             rejected = True
             continue
         next_bounds = _rim_bounds(new, ground, function, parameters, c) if ground.curved else bounds
-        clear = _are_clear(bounds, next_bounds)
-        end, status = t + h, MORE
-        if times[index] <= end or not clear:
+        next_height = height_above_fallen(new, fall, function, parameters) if fall.watched else height
+        clear, standing = _are_clear(bounds, next_bounds), not may_fall_within(h, height, next_height)
+        end, status, before, after = t + h, MORE, 2.0, 2.0
+        if times[index] <= end or not clear or not standing:
             _fill_dense_output(y, new, h, stages, a_extra, d, function, parameters, bicycle, work, coefficients)
             evaluations += 3
             if not clear:
                 touch, wheel = _second_touch(y, new, coefficients, ground, function, parameters, c, work)
                 if touch <= 1:
                     end, status = t + touch * h, FRONT_TOUCHED if wheel else REAR_TOUCHED
+            if not standing:
+                before, after = _fall_within(y, coefficients, fall, function, parameters, work)
+                if after <= 1 and t + after * h <= end:
+                    end, status = t + before * h, FELL
             while index < times.size and times[index] <= end:
                 _interpolate(y, coefficients, (times[index] - t) / h, out[index])
                 if not project(out[index], function, parameters, c, bicycle):
                     return FAILED, index, t, h, steps, evaluations
                 index += 1
+            if status == FELL:
+                for k, share in enumerate((before, after)):
+                    _interpolate(y, coefficients, share, fallen[k])
+                    at[k] = t + share * h
+                    if not project(fallen[k], function, parameters, c, bicycle):
+                        return FAILED, index, t, h, steps, evaluations
             if status != MORE:
-                # A touch after the last time is not part of this motion.
+                # What happens after the last time is not part of this motion.
                 return (DONE if index == times.size else status), index, end, h, steps + 1, evaluations
         factor = 10.0 if error == 0 else min(10.0, 0.9 * error ** (-1 / 8))
         for i in range(SIZE):
@@ -248,18 +290,19 @@ def dop853(y, times, index, t, h, tolerance, most_steps, tableau, ground, functi
         evaluations += 1
         t += h
         h *= min(1.0, factor) if rejected else factor
-        steps, rejected, bounds = steps + 1, False, next_bounds
+        steps, rejected, bounds, height = steps + 1, False, next_bounds, next_height
     return (DONE if index == times.size else MORE), index, t, h, steps, evaluations
 
 
 @jit
-def modified_euler(y, step, count, stride, ground, function, parameters, c, out):
+def modified_euler(y, step, count, stride, ground, fall, function, parameters, c, out, fallen, at):
     """Take ``count`` steps y += step (f(y) + f(y + step f(y))) / 2; every ``stride``-th fills a row of ``out``.
 
     Nothing is projected: the constraints drift with the method's error. Stops where the state is no longer finite,
-    and in the step in which a rim touches the ground at a second place.
+    in the step in which a rim touches the ground at a second place, and after the step in which the bicycle falls, if
+    ``fall`` says so. The states before and after that step fill ``fallen`` (2, 24), and their times ``at`` (2,).
 
-    Returns ``(status, rows filled, t)``, with t from linear interpolation of the clearance.
+    Returns ``(status, rows filled, t)``, with t of a touch from linear interpolation of the clearance.
     """
     bicycle = aligned(c)
     first, second, work = np.empty(SIZE), np.empty(SIZE), np.empty(SIZE)
@@ -272,6 +315,7 @@ def modified_euler(y, step, count, stride, ground, function, parameters, c, out)
         derivative(work, function, parameters, bicycle, second)
         total = 0.0
         for i in range(SIZE):
+            work[i] = y[i]
             y[i] += 0.5 * step * (first[i] + second[i])
             total += y[i]
         if not abs(total) < 1e300:
@@ -282,6 +326,10 @@ def modified_euler(y, step, count, stride, ground, function, parameters, c, out)
                 touch = (n - 1 + before / (before - clearance)) * step
                 return FRONT_TOUCHED if wheel else REAR_TOUCHED, rows, touch
             before = clearance
+        if fall.watched and not height_above_fallen(y, fall, function, parameters)[0] > 0:
+            fallen[0], fallen[1] = work, y
+            at[0], at[1] = (n - 1) * step, n * step
+            return FELL, rows, n * step
         if n % stride == 0:
             out[rows] = y
             rows += 1

@@ -12,6 +12,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple  # pyright: ignore[reportMiss
 from . import integrate
 from .compilation import jit, jit_released
 from .dynamics import find_contacts, guess_contacts, wheels
+from .fall import FallCriterion
 from .kinematics import Constants
 from .rim import RimSearch, bound, deepest, least_clearance
 
@@ -39,6 +40,8 @@ class RideSetups(NamedTuple):
     offsets : ndarray, shape (n + 1,), int
     widths, details : ndarray, shape (n,)
     samples : ndarray, shape (n,), int
+    falls : ndarray, shape (n, 4)
+        `fall.FallCriterion` of every start, 0 or 1 for ``watched``.
     """
 
     constants: Any
@@ -49,6 +52,7 @@ class RideSetups(NamedTuple):
     widths: Any
     details: Any
     samples: Any
+    falls: Any
 
 
 class RideStates(NamedTuple):
@@ -66,6 +70,10 @@ class RideStates(NamedTuple):
         Samples of ``y``.
     force : ndarray, shape (n, m, 6)
         Contact forces [N].
+    fallen : ndarray, shape (n, 2, 24)
+        States just before and just after the fall of a ride that ended with one.
+    at : ndarray, shape (n, 2)
+        Their times [s].
     """
 
     y: Any
@@ -73,6 +81,8 @@ class RideStates(NamedTuple):
     counts: Any
     rows: Any
     force: Any
+    fallen: Any
+    at: Any
 
 
 @jit
@@ -141,7 +151,8 @@ def continue_rides(first, last, most_calls, times, tolerance, tableau, setups, f
     for i in range(first, last):
         y, clock, counts, rows = states.y[i], states.clock[i], states.counts[i], states.rows[i]
         ground, parameters = unpack_rim_search(setups, i), setups.parameters[i]
-        c = unpack_constants(setups.constants[i])
+        c, falls = unpack_constants(setups.constants[i]), setups.falls[i]
+        fall = FallCriterion(falls[0], falls[1], falls[2], falls[3] > 0)
         calls = 0
         while counts[0] == integrate.MORE and calls < most_calls:
             status, index, t, h, steps, evaluations = integrate.dop853(
@@ -154,10 +165,13 @@ def continue_rides(first, last, most_calls, times, tolerance, tableau, setups, f
                 STEPS_A_CALL,
                 tableau,
                 ground,
+                fall,
                 function,
                 parameters,
                 c,
                 rows,
+                states.fallen[i],
+                states.at[i],
             )
             counts[0], counts[1], clock[0], clock[1] = status, index, t, h
             counts[2] += steps

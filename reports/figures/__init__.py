@@ -18,6 +18,7 @@ from .style import (
     write_formats,
 )
 from .sweep import SweepAxis, SweepRuns, sweep_figure
+from .sweep_map import CellGrid, MapRuns, SweepMap, average_cells, make_cells, sweep_map_figure
 
 __all__ = [
     "FAMILY_COLOURS",
@@ -25,17 +26,23 @@ __all__ = [
     "INK",
     "WIDTH",
     "WIDTHS",
+    "CellGrid",
+    "MapRuns",
     "SweepAxis",
+    "SweepMap",
     "SweepRuns",
+    "average_cells",
     "eigenvalue_figure",
     "family_figure",
     "float32_figure",
     "growth_figure",
+    "make_cells",
     "make_curves",
     "new_figure",
     "precision_figure",
     "stable_figure",
     "sweep_figure",
+    "sweep_map_figure",
     "use_style",
     "write_figure",
     "write_formats",

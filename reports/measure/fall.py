@@ -1,7 +1,6 @@
-"""Find when a bicycle falls, and cut rides there: nothing but the wheels touches the ground in the models.
+"""Find when a bicycle falls, and cut rides there.
 
-All functions use the rear frame's position. Pass them rides as returned by
-`velodrome.reports.measure.consistency.evaluate_ride`; otherwise the engine's own poses decide whether it fell.
+All functions use the rear frame's position, as it follows from the coordinates (`velodrome.reference.fall`).
 """
 
 from __future__ import annotations
@@ -12,31 +11,33 @@ import numpy as np
 
 from ...engines.engine import Trajectory
 from ...reference.bicycle import Bicycle
-from ...reference.surface import Surface, evaluate
-
-_FALLEN_HEIGHT = 0.1  # relative to the upright height of the rear frame's centre of mass; a lean of some 84 degrees
+from ...reference.fall import heights_above_fallen, solve_fall
+from ...reference.surface import Surface
 
 
 def fell_at(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> float | None:
     """Return the time at which the rear frame's centre of mass is nearly on the ground [s]; None if it never is.
 
-    The time is interpolated linearly between samples.
+    The time is solved between the two states around the fall: those that the engine gives, or two samples of an engine
+    that rode on. The height is the cubic polynomial with their heights and rates.
     """
-    height, time = _height_above_fallen(trajectory, bicycle, surface), trajectory.time
-    low = np.flatnonzero(height < 0)
-    if len(low) == 0:
-        return None
-    k = int(low[0])
-    if k == 0:
-        return float(time[0])
-    share = height[k - 1] / (height[k - 1] - height[k])
-    return float(time[k - 1] + share * (time[k] - time[k - 1]))
+    first = _first_fallen(trajectory, bicycle, surface)
+    if first is None:
+        fall = trajectory.fall
+        if fall is None:
+            return None
+        return solve_fall(fall.time, *heights_above_fallen(bicycle, surface, fall.q, fall.qd))
+    if first == 0:
+        return float(trajectory.time[0])
+    around = slice(first - 1, first + 1)
+    heights = heights_above_fallen(bicycle, surface, trajectory.q[around], trajectory.qd[around])
+    return solve_fall(trajectory.time[around], *heights)
 
 
 def until_fall(trajectory: Trajectory, bicycle: Bicycle, surface: Surface, beyond: int = 0) -> Trajectory:
     """Return the ride up to its fall and ``beyond`` samples more: at least one sample, and all if it does not fall."""
-    low = np.flatnonzero(_height_above_fallen(trajectory, bicycle, surface) < 0)
-    return trajectory if len(low) == 0 else trajectory.first(max(1, int(low[0]) + beyond))
+    first = _first_fallen(trajectory, bicycle, surface)
+    return trajectory if first is None else trajectory.first(max(1, first + beyond))
 
 
 def cut_at_fall(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> Trajectory:
@@ -45,8 +46,8 @@ def cut_at_fall(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> T
     return cut if len(cut.time) == len(trajectory.time) else replace(cut, ended="the bicycle fell")
 
 
-def _height_above_fallen(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> np.ndarray:
-    """Return the height of the rear frame's centre of mass above that at which it counts as fallen, shape (n,) [m]."""
-    centre = trajectory.body_position[:, 0]
-    ground = evaluate(surface, centre[:, 0], centre[:, 1])[:, 0]
-    return centre[:, 2] - ground - _FALLEN_HEIGHT * bicycle.rear_frame_z
+def _first_fallen(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> int | None:
+    """Return the index of the first sample in which the bicycle has fallen; None if there is none."""
+    height, _ = heights_above_fallen(bicycle, surface, trajectory.q, trajectory.qd)
+    low = np.flatnonzero(height < 0)
+    return int(low[0]) if len(low) else None

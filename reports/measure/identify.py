@@ -139,7 +139,7 @@ def _ride_disturbed(
     rates = float(v[4]), float(v[5]), float(v[6])
     state = consistent_state(problem.bicycle, problem.surface, position, v[2], v[3], rates, yaw, guess)
     times = 0.5 * interval * np.arange(4)
-    disturbed = Problem(problem.bicycle, problem.surface, *state, times, problem.inputs)
+    disturbed = Problem(problem.bicycle, problem.surface, *state, times, problem.inputs, problem.beyond_fall)
     engine.check(disturbed, settings)
     trajectory = ride_engine(engine, disturbed, settings, lambda _: None)
     if len(trajectory.time) < 4:

@@ -93,7 +93,7 @@ def compute_metrics(
         "real_time_factor": simulated / trajectory.cpu_time if trajectory.cpu_time > 0 else None,
         "min_normal_force": least_normal_force(trajectory, surface),
         "fell_at": fall,
-        "ended": trajectory.ended,
+        "ended": None if trajectory.fall is not None else trajectory.ended,
     }
     result["horizon"] = None if reference is None else find_horizon(trajectory, reference, growth_rate, size)
     return {name: _replace_non_finite(value) for name, value in result.items()}

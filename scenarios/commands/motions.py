@@ -48,12 +48,10 @@ def circular_command(
     If there is no such motion, the exit status is 1; --json then gives the reason, no-such-motion or search-failed.
     """
     from .progress import COMPUTING, ProgressBars
-    from .terminal import make_console
 
     with answering_missing_motion(as_json), ProgressBars() as progress:
         from ..motions import solve_circular
         from ..scenario import make_bowl
-        from .present_motions import show_circular
 
         angles, ground, source = parse_angles(near), parse_ground(alpha, surface), load_bicycle(bicycle)
         inputs = make_inputs(steer_torque, rear_wheel_torque, steer_damping)
@@ -64,6 +62,9 @@ def circular_command(
         if as_json:
             print_json(found)
         else:
+            from .present_motions import show_circular
+            from .terminal import make_console
+
             show_circular(make_console(), found)
 
 

@@ -1,17 +1,23 @@
-"""Documents and files of circular motions, their families and their atlas."""
+"""Documents and files of circular motions, their families and their atlas.
 
-from .atlas import make_atlas
-from .circular import CircularSolution, solve_circular
-from .families import (
-    MERGING,
-    CriticalShapes,
-    FamilyCurve,
-    SolutionFamilies,
-    families_document,
-    find_critical_shapes,
-    follow_families,
-    write_families,
-)
+Names are imported when they are first used: one motion needs a third of what families and the atlas need.
+"""
+
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .atlas import make_atlas as make_atlas
+    from .circular import CircularSolution as CircularSolution
+    from .circular import solve_circular as solve_circular
+    from .families import MERGING as MERGING
+    from .families import CriticalShapes as CriticalShapes
+    from .families import FamilyCurve as FamilyCurve
+    from .families import SolutionFamilies as SolutionFamilies
+    from .families import families_document as families_document
+    from .families import find_critical_shapes as find_critical_shapes
+    from .families import follow_families as follow_families
+    from .families import write_families as write_families
 
 __all__ = [
     "MERGING",
@@ -26,3 +32,16 @@ __all__ = [
     "solve_circular",
     "write_families",
 ]
+
+_HOME = {"make_atlas": ".atlas", "CircularSolution": ".circular", "solve_circular": ".circular"}
+
+
+if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
+
+    def __getattr__(name: str) -> object:
+        """Import a name of the room when it is first used."""
+        if name not in __all__:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = getattr(_import_module(_HOME.get(name, ".families"), __name__), name)
+        globals()[name] = value
+        return value

@@ -103,6 +103,7 @@ class Simulation(Table):
     output_rate: float = Field(
         default=100.0, gt=0, le=1e5, description="samples a second", json_schema_extra={"unit": "1/s"}
     )
+    beyond_fall: bool = Field(default=False, description="whether a ride goes on after the bicycle has fallen")
 
     @model_validator(mode="after")
     def _whole_samples(self) -> Simulation:

@@ -85,7 +85,7 @@ def make_start(scenario: Scenario) -> Start:
         raise ScenarioError(f"motion: {error}") from error
     times = output_times(scenario.simulation)
     size = float(np.hypot(*motion.position[:2])) if motion is not None else bicycle.wheelbase
-    problem = Problem(bicycle, surface, q, qd, times, scenario.make_inputs())
+    problem = Problem(bicycle, surface, q, qd, times, scenario.make_inputs(), scenario.simulation.beyond_fall)
     return Start(problem, undisturbed, family, motion, rate, size)
 
 

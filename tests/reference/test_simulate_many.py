@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.bowls import Sphere
 from velodrome.reference.dae import consistent_state
+from velodrome.reference.fall import Fall
 from velodrome.reference.inputs import Inputs
 from velodrome.reference.simulate import PreciseMotion, RideStart, simulate, simulate_many
 from velodrome.reference.surface import Paraboloid, Plane, Surface
@@ -21,21 +22,29 @@ INPUTS = [Inputs(), Inputs(steer_torque=0.1, steer_damping=0.5)]
 BICYCLES = [BICYCLE, replace(BICYCLE, trail=0.06), replace(BICYCLE, rear_frame_mass=70.0)]
 
 
-def make_start(lean: float, rate: float, ground: int = 0, inputs: int = 0, bicycle: int = 0) -> RideStart:
+def make_start(
+    lean: float, rate: float, ground: int = 0, inputs: int = 0, bicycle: int = 0, until_fall: bool = False
+) -> RideStart:
     surface, own = GROUNDS[ground], BICYCLES[bicycle]
     q, qd = consistent_state(own, surface, (0.5, 0.2), lean, 0.02, (0.0, 0.1, rate))
-    return RideStart(own, surface, q, qd, INPUTS[inputs])
+    return RideStart(own, surface, q, qd, INPUTS[inputs], until_fall)
 
 
 def ride_alone(start: RideStart, times: np.ndarray = TIMES) -> PreciseMotion:
-    return simulate(start.bicycle, start.surface, start.q, start.qd, times, inputs=start.inputs)
+    return simulate(
+        start.bicycle, start.surface, start.q, start.qd, times, inputs=start.inputs, until_fall=start.until_fall
+    )
 
 
 def assert_same_bits(found: PreciseMotion | ValueError, alone: PreciseMotion) -> None:
     assert isinstance(found, PreciseMotion)
     for field in fields(PreciseMotion):
         here, there = getattr(found, field.name), getattr(alone, field.name)
-        assert here.tobytes() == there.tobytes() if isinstance(here, np.ndarray) else here == there, field.name
+        if isinstance(here, Fall):
+            assert isinstance(there, Fall)
+            assert all(getattr(here, name).tobytes() == getattr(there, name).tobytes() for name in ("time", "q", "qd"))
+        else:
+            assert here.tobytes() == there.tobytes() if isinstance(here, np.ndarray) else here == there, field.name
 
 
 STARTS = st.builds(
@@ -45,6 +54,7 @@ STARTS = st.builds(
     st.integers(0, len(GROUNDS) - 1),
     st.integers(0, len(INPUTS) - 1),
     st.integers(0, len(BICYCLES) - 1),
+    st.booleans(),
 )
 
 
@@ -99,3 +109,13 @@ def test_a_ride_that_ends_early_ends_alone() -> None:
     assert whole.ended is None
     assert len(whole.time) == len(times)
     assert_same_bits(ended, ride_alone(flat, times))
+
+
+def test_a_ride_ends_at_its_fall_alone_and_among_others() -> None:
+    falling, good = make_start(0.4, 5.0, until_fall=True), make_start(0.0, 20.0, until_fall=True)
+    times = np.arange(41) / 10
+    fallen, whole = simulate_many([falling, good], times)
+    assert isinstance(fallen, PreciseMotion)
+    assert fallen.fall is not None
+    assert_same_bits(fallen, ride_alone(falling, times))
+    assert_same_bits(whole, ride_alone(good, times))

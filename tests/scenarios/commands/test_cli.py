@@ -484,7 +484,14 @@ def test_families_refuses_a_shape_that_is_none(velodrome, tmp_path: Path) -> Non
     ("arguments", "unwanted"),
     [
         (["--help"], ("numpy", "numba", "scipy", "pyarrow", "matplotlib", "mujoco", "exudyn", "rerun")),
-        (["circular", *Q2, "--family", "2"], ("pyarrow", "matplotlib", "mujoco", "exudyn", "rerun")),
+        (
+            ["circular", *Q2, "--family", "2", "--json"],
+            (
+                *("pyarrow", "matplotlib", "mujoco", "exudyn", "rerun", "scipy.optimize", "scipy.integrate"),
+                *("velodrome.reference.atlas", "velodrome.reference.critical", "velodrome.scenarios.motions.families"),
+                "velodrome.scenarios.commands.present_motions",
+            ),
+        ),
     ],
 )
 def test_a_command_imports_only_what_it_needs(arguments: list[str], unwanted: tuple[str, ...]) -> None:

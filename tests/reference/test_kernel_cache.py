@@ -1,0 +1,187 @@
+"""Compiled kernels on disk are found again, renewed when anything that they call changes, and compiled once."""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from numba.core import config, event
+from numba.core.errors import TypingError
+
+from velodrome.reference.kernels import cache
+from velodrome.reference.kernels.compilation import compile_callback, jit
+
+KERNELS = Path(cache.__file__).parent
+# Compiles a kernel and the one that it calls for two types, and prints how many compilations it took.
+PROCESS = """\
+import sys
+from numba.core import event
+from velodrome.reference.kernels.vector import dot, scale
+
+with event.install_recorder("numba:compile") as recorder:
+    sys.stdin.readline()
+    for number in (1.5, 1.5 + 0.5j) if sys.argv[1] == "real first" else (1.5 + 0.5j, 1.5):
+        vector = (number, number, number)
+        assert dot(scale(2.0, vector), vector) == 6 * number**2
+print(sum(kept.is_start for _, kept in recorder.buffer))
+"""
+
+
+@pytest.fixture
+def folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
+    """Choose an empty folder for compiled code, as NUMBA_CACHE_DIR does."""
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "chosen"))
+    yield tmp_path / "chosen" / "kernels"
+    cache.find_folders.cache_clear()
+
+
+def double(x: Any) -> Any:
+    return 2 * x
+
+
+def count_compilations(work: Callable[[], object]) -> int:
+    with event.install_recorder("numba:compile") as recorder:
+        work()
+    return sum(kept.is_start for _, kept in recorder.buffer)
+
+
+def test_every_import_of_a_kernel_is_found() -> None:
+    """Against Python's own parser, which takes too long for every start."""
+    for path in KERNELS.glob("*.py"):
+        imports: set[Path] = set()
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.level == 1:
+                imports |= {
+                    path.parent / f"{name}.py"
+                    for name in ([node.module] if node.module else [n.name for n in node.names])
+                }
+            assert not isinstance(node, ast.ImportFrom) or node.level < 2, f"{path.name} imports from outside"
+        direct = {source for source in imports if source.is_file()}
+        indirect = {source for one in direct for source in cache._find_imports(one)}
+        assert cache._find_imports(path) == direct | indirect, path.name
+
+
+def test_fingerprint_follows_what_a_kernel_calls(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A file counts where it is imported, however far away, or stands beside an engine's kernel; no other does."""
+    inner, outer, users = (tmp_path / name for name in ("package/reference/kernels", "package/engines/one", "users"))
+    for place in (inner, outer, users):
+        place.mkdir(parents=True)
+        (place / "kernel.py").write_text("from .middle import x\n")
+        (place / "middle.py").write_text("from . import (\n    helper,\n)\n")
+        (place / "helper.py").write_text("x = 1\n")
+        (place / "other.py").write_text("x = 1\n")
+    monkeypatch.setattr(cache, "_HERE", inner)
+    monkeypatch.setattr(cache, "_PACKAGE", tmp_path / "package")
+
+    def fingerprints() -> list[str]:
+        cache.fingerprint.cache_clear()
+        cache._find_imports.cache_clear()
+        return [cache.fingerprint(place / "kernel.py") for place in (inner, outer, users)]
+
+    before = fingerprints()
+    for place, name, differs in (
+        (inner, "helper.py", [True, True, True]),
+        (inner, "other.py", [False, True, True]),
+        (outer, "helper.py", [False, True, False]),
+        (users, "helper.py", [False, False, False]),
+        (users, "kernel.py", [False, False, True]),
+    ):
+        (place / name).write_text("x = 2\n")
+        after = fingerprints()
+        assert [old != new for old, new in zip(before, after, strict=True)] == differs, (place, name)
+        before = after
+
+
+def test_compiled_code_is_found_again(folder: Path) -> None:
+    assert count_compilations(lambda: [jit(double)(1.5), jit(double)(2)]) == 2
+    assert len(list(folder.glob("*.nbc"))) == 2
+    assert count_compilations(lambda: [jit(double)(1.5), jit(double)(2)]) == 0
+    assert count_compilations(lambda: jit(double)(1.5j)) == 1
+
+
+def test_damaged_file_is_compiled_anew(folder: Path) -> None:
+    jit(double)(1.5)
+    (path,) = folder.glob("*.nbc")
+    whole = path.read_bytes()
+    for kept in (0, len(whole) // 2):
+        path.write_bytes(whole[:kept])
+        assert count_compilations(lambda: jit(double)(1.5)) == 1
+        assert len(path.read_bytes()) == len(whole)
+
+
+@pytest.mark.parametrize("home_is_writable", [True, False])
+def test_package_that_cannot_be_written_to_keeps_its_code(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, home_is_writable: bool
+) -> None:
+    """What was compiled ahead is read where it is; anything else goes to the user's folder, or is not kept."""
+    package, home = tmp_path / "package", tmp_path / "home"
+    allowed = [package, home] if home_is_writable else [package]
+    monkeypatch.setattr(config, "CACHE_DIR", "")
+    monkeypatch.setattr(cache, "_HERE", package)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(home))
+    is_writable = cache._is_writable
+    # The rights of a folder do not hold for an administrator, who runs the tests in containers.
+    monkeypatch.setattr(
+        cache, "_is_writable", lambda path: is_writable(path) and set(allowed) & set(path.parents) != set()
+    )
+    cache.find_folders.cache_clear()
+    jit(double)(1.5)
+    warm = sorted(package.rglob("*.nbc"))
+    assert len(warm) == 1
+    allowed.remove(package)
+    cache.find_folders.cache_clear()
+    try:
+        assert count_compilations(lambda: jit(double)(1.5)) == 0
+        assert count_compilations(lambda: jit(double)(2)) == 1
+        assert count_compilations(lambda: jit(double)(2)) == (0 if home_is_writable else 1)
+        assert sorted(package.rglob("*.nbc")) == warm
+        assert len(list(home.rglob("*.nbc"))) == home_is_writable
+    finally:
+        cache.find_folders.cache_clear()
+
+
+def test_error_leaves_nothing_locked(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    locked: list[str] = []
+    monkeypatch.setattr(cache, "wait_for_lock", lambda _, name: locked.append(name))
+    monkeypatch.setattr(cache, "unlock", lambda _, name: locked.remove(name))
+    for _ in range(2):
+        with pytest.raises(TypingError):
+            jit(double)(None)
+        with pytest.raises(TypingError):
+            compile_callback("float64(none)")(double)
+        assert locked == []
+
+
+def test_function_without_a_file_is_compiled(folder: Path) -> None:
+    names: dict[str, Any] = {}
+    exec("def shift(x):\n    return x + 1.0\n", names)
+    assert compile_callback("float64(float64)")(names["shift"]).ctypes(1.5) == 2.5
+    assert not folder.exists()
+
+
+def test_processes_that_start_at_once_share_the_work(tmp_path: Path) -> None:
+    """Each kernel is compiled for each type in one of them, and both compute with the right one."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    both = [
+        subprocess.Popen(
+            [sys.executable, "-c", PROCESS, order],
+            env=environment,
+            text=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+        for order in ("real first", "complex first")
+    ]
+    for process in both:
+        assert process.stdin is not None
+        process.stdin.write("go\n")
+        process.stdin.flush()
+    counts = [int(process.communicate(timeout=120)[0]) for process in both]
+    assert sum(counts) == 4, counts
+    assert len(list(tmp_path.rglob("*.nbc"))) == 4
