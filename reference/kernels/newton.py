@@ -25,7 +25,7 @@ LARGEST_RESIDUAL = 1e-12
 # same inverse 1e-15, and then round-off.
 _UNIT = 2.0**-16
 _CHORD_STEPS = 4
-# Bound of a solution's error, in units. The error is about `LARGEST_RESIDUAL` times the equations' condition, below 100.
+# Bound of a solution's error, in units. The error is about `LARGEST_RESIDUAL` times the condition, which is below 100.
 _BAND = 1e-10 / _UNIT
 _SETTLED = 1e-12  # of the last step
 CANONICAL, AMBIGUOUS, UNSETTLED = 0, 1, 2
