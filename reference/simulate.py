@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -230,11 +230,29 @@ def _share(ride: Callable[[range], None], count: int, threads: int) -> None:
         list(pool.map(ride, parts))
 
 
-def _set_rides_up(starts: Sequence[RideStart], samples: int) -> tuple[kernel.RideSetups, kernel.RideStates]:
-    """Return what the kernel needs of starts on one kind of ground, with their contacts found."""
-    n = len(starts)
+class OnGround(Protocol):
+    """Anything with a bicycle on its ground, under inputs."""
+
+    @property
+    def bicycle(self) -> Bicycle:
+        """The bicycle."""
+        ...
+
+    @property
+    def surface(self) -> Surface:
+        """The ground."""
+        ...
+
+    @property
+    def inputs(self) -> Inputs:
+        """The inputs."""
+        ...
+
+
+def ride_setups(starts: Sequence[OnGround], falls: np.ndarray) -> kernel.RideSetups:
+    """Return what compiled code needs of n starts on one kind of ground; ``falls`` (n, 4) are the fall criteria."""
     searches = [bicycle_rim_search(start.bicycle, start.surface) for start in starts]
-    setups = kernel.RideSetups(
+    return kernel.RideSetups(
         constants=np.array([constants(start.bicycle, start.inputs) for start in starts]),
         parameters=np.array([start.surface.parameters for start in starts]),
         curved=np.array([search.curved for search in searches]),
@@ -243,8 +261,15 @@ def _set_rides_up(starts: Sequence[RideStart], samples: int) -> tuple[kernel.Rid
         widths=np.array([search.width for search in searches]),
         details=np.array([search.detail for search in searches]),
         samples=np.array([search.samples for search in searches]),
-        falls=np.array([fall_criterion(start.bicycle, start.until_fall) for start in starts], float),
+        falls=falls,
     )
+
+
+def _set_rides_up(starts: Sequence[RideStart], samples: int) -> tuple[kernel.RideSetups, kernel.RideStates]:
+    """Return what the kernel needs of starts on one kind of ground, with their contacts found."""
+    n = len(starts)
+    falls = np.array([fall_criterion(start.bicycle, start.until_fall) for start in starts], float)
+    setups = ride_setups(starts, falls)
     states = kernel.RideStates(
         y=np.zeros((n, integrate.SIZE)),
         clock=np.empty((n, 2)),
