@@ -183,5 +183,6 @@ def test_processes_that_start_at_once_share_the_work(tmp_path: Path) -> None:
         process.stdin.write("go\n")
         process.stdin.flush()
     counts = [int(process.communicate(timeout=120)[0]) for process in both]
-    assert sum(counts) == 4, counts
-    assert len(list(tmp_path.rglob("*.nbc"))) == 4
+    # Both kernels, and those that they call, for both types.
+    files = len(list(tmp_path.rglob("*.nbc")))
+    assert sum(counts) == files >= 4, counts
