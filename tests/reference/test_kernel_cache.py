@@ -29,7 +29,8 @@ with event.install_recorder("numba:compile") as recorder:
     for number in (1.5, 1.5 + 0.5j) if sys.argv[1] == "real first" else (1.5 + 0.5j, 1.5):
         vector = (number, number, number)
         assert dot(scale(2.0, vector), vector) == 6 * number**2
-print(sum(kept.is_start for _, kept in recorder.buffer))
+# numba also compiles the parts that it puts into them.
+print(sum(kept.is_start and kept.data["dispatcher"] in (dot, scale) for _, kept in recorder.buffer))
 """
 
 
@@ -183,6 +184,5 @@ def test_processes_that_start_at_once_share_the_work(tmp_path: Path) -> None:
         process.stdin.write("go\n")
         process.stdin.flush()
     counts = [int(process.communicate(timeout=120)[0]) for process in both]
-    # Both kernels, and those that they call, for both types.
-    files = len(list(tmp_path.rglob("*.nbc")))
-    assert sum(counts) == files >= 4, counts
+    assert sum(counts) == 4, counts
+    assert len(list(tmp_path.rglob("*.nbc"))) == 4
