@@ -81,7 +81,7 @@ def check_plots(plots: Iterable[SweepPlot], plan: SweepPlan) -> None:
         With one line.
     """
     facts = {**ROW_FACTS, **METRICS}
-    known = {*facts, *_TIMES, *(key for task in plan.tasks for key in task.changes)}
+    known = {*facts, *_TIMES, *plan.parameters}
     for plot in plots:
         for column in (plot.y, plot.x):
             _check_column(column, known)
