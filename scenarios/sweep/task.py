@@ -22,9 +22,10 @@ from ...reports.measure import flatten_metrics
 from ..error import ScenarioError
 from ..run import claimed_noise, configure_engine, measure_one
 from ..scenario import Scenario, ScenarioTemplate, Start, make_start
-from .plan import canonical_text, prune_settings
+from .check import canonical_text, prune_settings
 from .rows import METRICS, REFUSED, reason_line
 
+_SOURCE = "task"  # what errors of a scenario begin with
 _KEPT_STARTS = 64  # starts that are kept for the other engines at the same points
 
 
@@ -164,9 +165,12 @@ class Tasks:
     def _prepare(self, name: str, changes: Mapping[str, Any]) -> _Prepared | dict[str, Any]:
         """Return a task ready to ride, or its row where there is nothing to ride."""
         if name not in self._templates:
-            self._templates[name] = ScenarioTemplate(self._base, "task", lambda data: prune_settings(data, name))
-        scenario = self._templates[name].apply(changes)
-        engine, version, settings = _load_configured_engine(name, canonical_text(scenario.engines.get(name, {})))
+            self._templates[name] = ScenarioTemplate(self._base, _SOURCE, lambda data: prune_settings(data, name))
+        try:
+            scenario = self._templates[name].apply(changes)
+            engine, version, settings = _load_configured_engine(name, canonical_text(scenario.engines.get(name, {})))
+        except ScenarioError as error:  # values that contradict one another, or a drawn one out of range
+            return {"status": REFUSED, "reason": reason_line(str(error).removeprefix(f"{_SOURCE}: "))}
         facts: dict[str, Any] = {"version": version}
         start = self._find_start(scenario, changes)
         if isinstance(start, str):
