@@ -63,6 +63,18 @@ def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progr
     Exception
         Any exception that the engine raises.
     """
+    require_sound_start(engine, problem)
+    return admit_trajectory(engine, problem, settings, simulate_guarded(engine, problem, settings, progress))
+
+
+def require_sound_start(engine: Engine, problem: Problem) -> None:
+    """Refuse inputs that an engine does not apply, rims inside the ground, and wheels that overlap.
+
+    Raises
+    ------
+    EngineError
+        With the reason.
+    """
     ignored = find_ignored_inputs(engine, problem)
     if ignored is not None:
         raise EngineError(ignored)
@@ -71,7 +83,16 @@ def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progr
         require_separate_wheels(problem.bicycle, problem.q)
     except ValueError as error:
         raise EngineError(str(error)) from error
-    trajectory = simulate_guarded(engine, problem, settings, progress)
+
+
+def admit_trajectory(engine: Engine, problem: Problem, settings: Any, trajectory: Any) -> Trajectory:
+    """Validate what an engine returns for a problem, and cut it, as `ride_engine` does.
+
+    Raises
+    ------
+    EngineError
+        If it is no trajectory, or one that does not fit the problem.
+    """
     if not isinstance(trajectory, Trajectory):
         raise EngineError(f"it gave a {type(trajectory).__name__}, not a Trajectory")
     for wrong in _list_faults(engine, problem, settings, trajectory):
