@@ -7,6 +7,7 @@ the target. The error is the distance of the rear contact from that of the refer
 
     reference         the reference as users call it, `velodrome.reference.simulate.simulate`
     same in scipy     the same right-hand side, compiled, in scipy's DOP853: the same method in Python
+    C                 the formulas of the right-hand side in C, compiled here with -O3 -march=native (and -ffast-math)
     symbrim in scipy  the equations that symbrim derives, compiled to C, in scipy's DOP853
 
 The first table compares the equations alone; the rest of the difference comes from the integrators.
@@ -24,6 +25,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+import c_right_hand_side
 import numba as nb
 import numpy as np
 import symbrim_equations
@@ -127,6 +129,23 @@ def symbrim_method(equations: symbrim_equations.Equations, x: np.ndarray) -> Met
     return run
 
 
+def c_work(y: np.ndarray, count: int) -> dict[str, Callable[[], object]]:
+    """Return the right-hand side in C, without and with fast arithmetic; nothing where there is no compiler."""
+    compiler = symbrim_equations.compiler()
+    if compiler is None:
+        return {}
+    bicycle, out = aligned(constants(BICYCLE)), np.empty(24)
+    derivative(y, Plane().function.real, Plane().parameters, bicycle, out)
+    work: dict[str, Callable[[], object]] = {}
+    with tempfile.TemporaryDirectory() as folder:  # the libraries stay loaded
+        for name, flags in (("C", c_right_hand_side.FLAGS), ("C, fast arithmetic", c_right_hand_side.FAST_FLAGS)):
+            same = c_right_hand_side.RightHandSide(bicycle, Path(folder), compiler, flags)
+            # A few hundred roundings of terms of order 100 or less, the accelerations' own size.
+            np.testing.assert_allclose(same.repeat(y, 1), out, rtol=1e-12, atol=1e-12)
+            work[name] = partial(same.repeat, y, count)
+    return work
+
+
 def symbrim_obstacle() -> str | None:
     """Return why symbrim's equations cannot be compiled here, None if they can."""
     if importlib.util.find_spec("symbrim") is None:
@@ -175,7 +194,7 @@ def evaluation_table(y: np.ndarray, extra: Mapping[str, Callable[[], object]], c
     seconds = interleaved(work, rounds)
     for name, values in seconds.items():
         ratio = np.median(values / seconds[REFERENCE])
-        table.add_row(name, *spread(values / count, 1e-9), f"{ratio:.1f}")
+        table.add_row(name, *spread(values / count, 1e-9), f"{ratio:.2f}")
     return table
 
 
@@ -219,7 +238,7 @@ def main() -> None:
     state = upright()
     y, count = riding(Plane(), state), 10_000
     methods = {REFERENCE: reference_method(state), "same in scipy": scipy_method(y)}
-    alone: dict[str, Callable[[], object]] = {}
+    alone = c_work(y, count)
     obstacle = symbrim_obstacle()
     if obstacle is None:
         with console.status("deriving symbrim's equations"), tempfile.TemporaryDirectory() as folder:

@@ -25,6 +25,7 @@ from .circular import (
     CircularMotion,
     Steady,
     as_solved,
+    make_canonical,
     mirror_motion,
     newton,
     plane_condition,
@@ -426,8 +427,9 @@ def _append_new_motions(
     found: list[CircularMotion], equations: Steady, points: Iterable[Point], rear_rate: float
 ) -> Iterator[CircularMotion]:
     """Yield motions of a rear rate along a curve that are not in ``found``, and append them to it."""
-    for u in crossings(equations, points, rear_rate_condition(rear_rate)):
-        motion = equations.motion(u)
+    condition = rear_rate_condition(rear_rate)
+    for u in crossings(equations, points, condition):
+        motion = equations.motion(make_canonical(equations, u, condition)[0])
         if not any(_same_angles(motion, other) for other in found):
             found.append(motion)
             yield motion

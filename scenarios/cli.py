@@ -34,6 +34,7 @@ from .commands import (
     show_command,
     sweep_command,
     view_command,
+    warm_up_command,
 )
 from .error import MissingMotionError, ScenarioError
 
@@ -87,9 +88,10 @@ _COMMANDS: dict[Callable[..., None], str] = {
     view_command: "View a run's recording or report",
     sweep_command: "Run a grid or a sample of scenarios",
     check_command: "Hold the gated scenarios to baselines",
+    warm_up_command: "Compile ahead what commands need",
 }
 for _command, _short_help in _COMMANDS.items():
-    app.command(_command.__name__.removesuffix("_command"), short_help=_short_help)(_command)
+    app.command(_command.__name__.removesuffix("_command").replace("_", "-"), short_help=_short_help)(_command)
 
 
 def supervised_main() -> NoReturn:

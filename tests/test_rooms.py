@@ -66,9 +66,11 @@ def sources(*folders: str) -> list[Path]:
 
 @cache
 def face(room: tuple[str, ...]) -> tuple[set[str], set[str]]:
-    """What the face of a room imports, and what it lists."""
+    """What the face of a room imports, at once or when it is first used, and what it lists."""
     tree = ast.parse(ROOT.joinpath(*room, "__init__.py").read_text(encoding="utf-8"))
-    had = {alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+    typing = [node for one in tree.body if isinstance(one, ast.If) for node in one.body]
+    own = [node for node in [*tree.body, *typing] if isinstance(node, ast.ImportFrom) and node.level]
+    had = {alias.name for node in own for alias in node.names}
     (listed,) = [
         ast.literal_eval(node.value)
         for node in tree.body

@@ -620,6 +620,20 @@ def judge(board):
 
 
 @jit
+def _multiply_by_transpose(rows, spread):
+    """Return A B^T (m, m) of A and B (m, n); BLAS takes longer to be called than this for the few rows of wheels."""
+    size, n = rows.shape
+    product = np.empty((size, size))
+    for i in range(size):
+        for j in range(size):
+            total = 0.0
+            for k in range(n):
+                total += rows[i, k] * spread[j, k]
+            product[i, j] = total
+    return product
+
+
+@jit
 def _start_sticking(board, model, data, rows, softness, target):
     """Start MuJoCo's solver from the solution with all these rows (k, n) active: no wheel slides or lifts off.
 
@@ -635,7 +649,7 @@ def _start_sticking(board, model, data, rows, softness, target):
     kept, board.smooth_kept = _real_array(board.kept_smooth, n), 1
     spread, force = np.empty((size, n)), target.copy()
     _solve_mass(model, data, spread.ctypes, rows.ctypes, types.int32(size))
-    schur = rows @ spread.T
+    schur = _multiply_by_transpose(rows, spread)
     for i in range(size):
         schur[i, i] += softness[i]
         for j in range(n):
@@ -691,10 +705,15 @@ def _correct_reference(board, model, data):
         softness = _real_array(_read_pointer(base + types.uintp(board.efc_R_at)), first + each)
         centre, here = _evaluate_contact(board, k)
         _, gamma = _contact_motion(board, k, model, data, centre, here, velocities, turning)
-        axes = _row_axes(board, contact_at, pyramidal)
-        _correct_rows(board, base, contact_at, pyramidal, first, aref, kbip, axes @ np.array(gamma))
-        rows[used : used + each] = axes @ velocities
-        numbers[0, used : used + each], numbers[1, used : used + each] = softness[first:], aref[first:]
+        axes, along = _row_axes(board, contact_at, pyramidal), np.empty(each)
+        for row in range(each):
+            axis = axes[row, 0], axes[row, 1], axes[row, 2]
+            along[row] = dot(axis, gamma)
+            for j in range(n):
+                rows[used + row, j] = dot(axis, (velocities[0, j], velocities[1, j], velocities[2, j]))
+        _correct_rows(board, base, contact_at, pyramidal, first, aref, kbip, along)
+        for row in range(each):
+            numbers[0, used + row], numbers[1, used + row] = softness[first + row], aref[first + row]
         used += each
     _count_skipped(board, seen)
     if used > 0:
@@ -989,7 +1008,7 @@ def _press(board, model, data):
         board.found += 1
         size = _fill_rows(board, k, model, data, centre, here, rows, turning, free, force, size)
     _solve_mass(model, data, spread.ctypes, rows.ctypes, types.int32(size))
-    schur = rows[:size] @ spread[:size].T
+    schur = _multiply_by_transpose(rows[:size], spread[:size])
     if not solve_independent_rows(schur, force, size):
         _press_dependent(board, model, data, rows[:size], schur, force, free)
     for i in range(size):

@@ -72,6 +72,17 @@ def find_folders(chosen: str) -> Folders:
     return Folders(tuple(folders), None)
 
 
+def find_kernel_folder() -> Path | None:
+    """Return the folder that compiled code is written to; None if nothing can be written."""
+    return find_folders(config.CACHE_DIR).write  # type: ignore[attr-defined]
+
+
+def find_kernel_files() -> set[str]:
+    """Return the names of all files of compiled code, of these and of earlier sources."""
+    folders = find_folders(config.CACHE_DIR).read  # type: ignore[attr-defined]
+    return {path.name for folder in folders for path in folder.glob("*.nbc")}
+
+
 def _is_writable(folder: Path) -> bool:
     """Return whether files can be written to a folder, which is made if it is not there."""
     try:

@@ -70,6 +70,11 @@ def jit(function: Callable[..., Any]) -> Any:
     return _declare(nb.njit(error_model="numpy")(function))
 
 
+def jit_released(function: Callable[..., Any]) -> Any:
+    """Compile a kernel as `jit` does; it releases the interpreter's lock, so that threads can share its work."""
+    return _declare(nb.njit(error_model="numpy", nogil=True)(function))
+
+
 def jit_inline(function: Callable[..., Any]) -> Any:
     """Compile a kernel as `jit` does, and always inline it.
 

@@ -16,6 +16,7 @@ import numpy as np
 from .compilation import jit
 from .kinematics import rim
 from .linear import solve_three
+from .surface_call import evaluate_surface
 from .vector import cross, dot
 
 
@@ -38,7 +39,7 @@ class Contact(NamedTuple):
 @jit
 def equations(centre, x, z, radius, xi, eta, angle, function, parameters):
     """Evaluate the contact equations of a wheel at its contact parameters; return a `Contact`."""
-    f, fx, fy, fxx, fxy, fyy = function(xi, eta, parameters)
+    f, fx, fy, fxx, fxy, fyy = evaluate_surface(function, xi, eta, parameters)
     e, t = rim(angle, x, z)
     d = (radius * e[0], radius * e[1], radius * e[2])
     w = (centre[0] + d[0] - xi, centre[1] + d[1] - eta, centre[2] + d[2] - f)
@@ -76,7 +77,7 @@ def search(centre, x, z, radius, xi, eta, angle, function, parameters):
 @jit
 def first_guess(centre, x, z, radius, function, parameters):
     """Guess (xi, eta, angle): the rim point that lies deepest along the normal below the centre."""
-    _, fx, fy, _, _, _ = function(centre[0], centre[1], parameters)
+    _, fx, fy, _, _, _ = evaluate_surface(function, centre[0], centre[1], parameters)
     n = (-fx, -fy, 1 + 0 * fx)
     # e = -sin(a) x - cos(a) z is deepest where it is opposite to the normal's part in the wheel's plane.
     angle = np.arctan2(dot(n, x).real, dot(n, z).real) + 0 * fx

@@ -31,13 +31,14 @@ from typing import Any, NamedTuple
 from .compilation import jit, jit_inline
 from .pose import angle_rates, angular_velocity, pose, times, to_aligned, to_inertial
 from .reduction import build, front_force, solve
+from .surface_call import evaluate_surface
 from .vector import add, combine, cross, dot, scale, subtract
 
 
 @jit_inline
 def _contact_rates(here, wheel, velocity, w, xi, eta, function, parameters):
     """Return the rates of (xi, eta, rim angle); ``velocity`` is that of the rim point fixed in its frame."""
-    _, fx, fy, fxx, fxy, fyy = function(xi, eta, parameters)
+    _, fx, fy, fxx, fxy, fyy = evaluate_surface(function, xi, eta, parameters)
     t, r = wheel.t, wheel.radius
     normal = subtract(here.z, combine(fx, here.x, fy, here.y))
     tx, ty, vx, vy = dot(here.x, t), dot(here.y, t), dot(here.x, velocity), dot(here.y, velocity)

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from .compilation import jit, jit_inline
+from .fused import multiply_add
+from .trigonometry import sine_and_cosine
 from .vector import add, combine, dot, scale
 
 
@@ -113,7 +113,7 @@ class Pose(NamedTuple):
 
 @jit_inline
 def _place_wheel(hub, radius, angle, forward, a):
-    sine, cosine = np.sin(angle), np.cos(angle)
+    sine, cosine = sine_and_cosine(angle)
     s, c = sine * a.cos_tilt + cosine * a.sin_tilt, cosine * a.cos_tilt - sine * a.sin_tilt
     e = (-s * forward[0], -s * forward[1], -c)
     t = (-c * forward[0], -c * forward[1], s)
@@ -124,8 +124,8 @@ def _place_wheel(hub, radius, angle, forward, a):
 @jit_inline
 def pose(yaw, lean, pitch, steer, rear_angle, front_angle, a):
     """Return the `Pose` at yaw, lean, pitch, steer and the two rim angles; ``a`` the `Aligned` constants."""
-    cy, sy, cl, sl, cd, sd = np.cos(yaw), np.sin(yaw), np.cos(lean), np.sin(lean), np.cos(steer), np.sin(steer)
-    sine, cosine = np.sin(pitch), np.cos(pitch)
+    (sy, cy), (sl, cl), (sd, cd) = sine_and_cosine(yaw), sine_and_cosine(lean), sine_and_cosine(steer)
+    sine, cosine = sine_and_cosine(pitch)
     cp, sp = cosine * a.cos_tilt + sine * a.sin_tilt, sine * a.cos_tilt - cosine * a.sin_tilt
     zero = 0 * cy
     one = 1 + zero
@@ -155,9 +155,9 @@ def pose(yaw, lean, pitch, steer, rear_angle, front_angle, a):
 def times(k, v):
     """Multiply a symmetric matrix (xx, yy, zz, xy, xz, yz) by a vector."""
     return (
-        k[0] * v[0] + k[3] * v[1] + k[4] * v[2],
-        k[3] * v[0] + k[1] * v[1] + k[5] * v[2],
-        k[4] * v[0] + k[5] * v[1] + k[2] * v[2],
+        multiply_add(k[4], v[2], multiply_add(k[3], v[1], k[0] * v[0])),
+        multiply_add(k[5], v[2], multiply_add(k[1], v[1], k[3] * v[0])),
+        multiply_add(k[2], v[2], multiply_add(k[5], v[1], k[4] * v[0])),
     )
 
 

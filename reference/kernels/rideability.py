@@ -20,6 +20,7 @@ import numpy as np
 from . import rim
 from .compilation import jit
 from .dynamics import wheels
+from .surface_call import evaluate_surface
 from .wheel_overlap import TOUCHING, find_overlap, measure_overlaps
 
 MARGINS = 5
@@ -36,7 +37,7 @@ _VERSINE, _OPERATIONS = 0.5e-10, 4
 @jit
 def _forces(u, k, function, parameters):
     """Return the normal and the tangential force on wheel ``k``, in weights."""
-    _, fx, fy, _, _, _ = function(u[10 + 3 * k], u[11 + 3 * k], parameters)
+    _, fx, fy, _, _, _ = evaluate_surface(function, u[10 + 3 * k], u[11 + 3 * k], parameters)
     length = np.sqrt(1 + fx * fx + fy * fy)
     x, y, z = u[16 + 3 * k], u[17 + 3 * k], u[18 + 3 * k]
     normal = (z - fx * x - fy * y) / length

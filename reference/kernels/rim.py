@@ -35,6 +35,7 @@ import numpy as np
 from . import contact
 from .compilation import jit
 from .kinematics import rim
+from .surface_call import evaluate_surface
 from .vector import combine, cross, dot, scale
 
 _GOLDEN = (math.sqrt(5) - 1) / 2
@@ -94,7 +95,9 @@ def level_axes(axle):
 def _make_edge(centre, x, z, radius, angle, held, samples, function, parameters):
     """Return the `Edge` of a rim whose contact is at ``angle``; ``held`` is False for a wheel in the air."""
     e, t = rim(angle, x, z)
-    f, fx, fy, fxx, fxy, fyy = function(centre[0] + radius * e[0], centre[1] + radius * e[1], parameters)
+    f, fx, fy, fxx, fxy, fyy = evaluate_surface(
+        function, centre[0] + radius * e[0], centre[1] + radius * e[1], parameters
+    )
     n = (-fx, -fy, 1.0)
     height = centre[2] + radius * e[2] - f
     bend = fxx * t[0] * t[0] + 2 * fxy * t[0] * t[1] + fyy * t[1] * t[1]
@@ -110,7 +113,7 @@ def _clearance(edge, c, s, function, parameters):
     if versine < 0.5 * _NEAR * _NEAR:
         return edge.here
     arm = combine(edge.radius * c, edge.radial, edge.radius * s, edge.tangent)
-    f, _, _, _, _, _ = function(edge.centre[0] + arm[0], edge.centre[1] + arm[1], parameters)
+    f, _, _, _, _, _ = evaluate_surface(function, edge.centre[0] + arm[0], edge.centre[1] + arm[1], parameters)
     height = edge.centre[2] + arm[2] - f
     clearance = (height - edge.base - edge.radius * edge.slope * s) / (edge.radius * versine)
     return clearance if clearance == clearance else math.inf
@@ -139,7 +142,7 @@ def bound(centre, x, z, radius, angle, ground, function, parameters):
     """Return a lower bound of the least clearance, -e . N - K r; -inf if K is unknown, nan if there is no ground."""
     e, _ = rim(angle, x, z)
     wx, wy = centre[0] + radius * e[0], centre[1] + radius * e[1]
-    _, fx, fy, _, _, _ = function(wx, wy, parameters)
+    _, fx, fy, _, _, _ = evaluate_surface(function, wx, wy, parameters)
     distance = np.sqrt(wx * wx + wy * wy)
     if not distance < ground.bends.size * ground.width:
         return -math.inf
@@ -204,7 +207,7 @@ def deepest(centre, x, z, radius, samples, function, parameters):
 @jit
 def _ground_distance(centre, x, z, radius, angle, function, parameters):
     e, _ = rim(angle, x, z)
-    f, fx, fy, _, _, _ = function(centre[0] + radius * e[0], centre[1] + radius * e[1], parameters)
+    f, fx, fy, _, _, _ = evaluate_surface(function, centre[0] + radius * e[0], centre[1] + radius * e[1], parameters)
     distance = (centre[2] + radius * e[2] - f) / np.sqrt(1 + fx * fx + fy * fy)
     return distance if distance == distance else math.inf
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .compilation import jit
+from .fused import multiply_add
 
 
 @jit
@@ -26,16 +27,20 @@ def scale(s, a):
 @jit
 def combine(s, a, t, b):
     """Return the linear combination s a + t b."""
-    return s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2]
+    return multiply_add(t, b[0], s * a[0]), multiply_add(t, b[1], s * a[1]), multiply_add(t, b[2], s * a[2])
 
 
 @jit
 def dot(a, b):
     """Return the scalar product a . b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return multiply_add(a[2], b[2], multiply_add(a[1], b[1], a[0] * b[0]))
 
 
 @jit
 def cross(a, b):
     """Return the vector product a x b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    return (
+        multiply_add(a[1], b[2], -a[2] * b[1]),
+        multiply_add(a[2], b[0], -a[0] * b[2]),
+        multiply_add(a[0], b[1], -a[1] * b[0]),
+    )

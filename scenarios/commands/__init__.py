@@ -13,6 +13,7 @@ from .studies import paper_command, precision_command
 from .supervision import run_supervised
 from .sweep import sweep_command
 from .version import print_versions
+from .warm_up import warm_up_command
 
 __all__ = [
     "atlas_command",
@@ -34,4 +35,5 @@ __all__ = [
     "show_command",
     "sweep_command",
     "view_command",
+    "warm_up_command",
 ]

@@ -37,6 +37,7 @@ from .table import (
     set_keys,
     show_value,
 )
+from .template import ScenarioTemplate
 from .units import find_unit
 
 __all__ = [
@@ -49,6 +50,7 @@ __all__ = [
     "EngineChoice",
     "Gate",
     "Scenario",
+    "ScenarioTemplate",
     "Simulation",
     "Start",
     "Table",

@@ -129,6 +129,7 @@ DOCUMENTS = {
     "families": ["families --alpha 0.005 --json"],
     "manifest": [f"{RUN} runs"],
     "bicycle": ["bicycle --json"],
+    "warm-up": ["warm-up --json"],
     "show": ["show exudyn --json"],
     "diff": [f"{RUN} before", f"{RUN} after", "diff before/* after/* --json"],
     "check": ["check plane-circle --engine mujoco-multipliers --json"],

@@ -63,9 +63,9 @@ def bits(ride: Trajectory | Exception) -> Any:
     return found
 
 
-def alone(engine: Any, problem: Problem) -> Trajectory | Exception:
+def alone(engine: Any, problem: Problem, settings: Any = None) -> Trajectory | Exception:
     try:
-        return ride_engine(engine, problem, engine.settings(), lambda _: None)
+        return ride_engine(engine, problem, settings or engine.settings(), lambda _: None)
     except Exception as error:
         return error
 
@@ -81,6 +81,16 @@ def test_rides_in_threads_are_the_same_to_the_bit(name: str) -> None:
         found = ride_engine_many(engine, asked, engine.settings(), threads)
         assert [bits(ride) for ride in found] == [bits(ride) for ride in expected]
     assert mujoco.get_mju_user_warning() is before
+
+
+@pytest.mark.parametrize("settings", [{}, {"integrator": "modified-euler"}])
+def test_the_reference_rides_many_to_the_bit(settings: dict[str, Any]) -> None:
+    engine, asked = LagrangeEngine(), problems()
+    chosen = engine.settings(**settings)
+    expected = [alone(engine, problem, chosen) for problem in asked]
+    found = ride_engine_many(engine, asked, chosen, 2)
+    assert [bits(ride) for ride in found] == [bits(ride) for ride in expected]
+    assert sum(isinstance(ride, EngineError) for ride in found) == 1
 
 
 @dataclass

@@ -14,7 +14,17 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from velodrome.engines.engine import Trajectory
-from velodrome.engines.storage import METADATA_KEY, read_trajectory, trajectory_columns, write_trajectory
+from velodrome.engines.storage import (
+    DIGEST_KEY,
+    METADATA_KEY,
+    ROWS_PER_GROUP,
+    digest,
+    read_trajectory,
+    trajectory_columns,
+    trajectory_table,
+    write_trajectory,
+)
+from velodrome.reference.fall import Fall
 
 OPTIONAL = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
 SHAPES = {
@@ -61,6 +71,26 @@ def test_everything_comes_back_to_the_bit(tmp_path: Path) -> None:
     assert_same(written, read_trajectory(tmp_path / "a.parquet"))
 
 
+def test_a_long_ride_is_written_in_groups_with_the_digest_of_the_whole(tmp_path: Path) -> None:
+    path = tmp_path / "a.parquet"
+    written = trajectory(ROWS_PER_GROUP + 1, time=np.arange(ROWS_PER_GROUP + 1.0))
+    write_trajectory(written, path)
+    found = pq.ParquetFile(path)
+    assert [found.metadata.row_group(k).num_rows for k in range(found.num_row_groups)] == [ROWS_PER_GROUP, 1]
+    assert found.schema_arrow.metadata[DIGEST_KEY] == digest(trajectory_table(written))
+    assert_same(written, read_trajectory(path))
+
+
+def test_neighbouring_samples_take_less_than_their_bytes(tmp_path: Path) -> None:
+    time = np.linspace(0.0, 10.0, 10_001)
+    smooth = {name: np.sin(time.reshape(-1, *[1] * len(shape)) + np.ones(shape)) for name, shape in SHAPES.items()}
+    write_trajectory(trajectory(len(time), **{**smooth, "time": time}), tmp_path / "a.parquet")
+    raw = len(time) * sum(len(names) for _, names in trajectory_columns()) * 8
+    # A double has 8 bytes. Where neighbours differ by 1e-3 or less, its sign, exponent and first digits repeat: of
+    # 8 bytes 2 compress to little.
+    assert (tmp_path / "a.parquet").stat().st_size < 0.85 * raw
+
+
 def test_what_iterations_left_comes_back_and_older_files_say_nothing_of_it(tmp_path: Path) -> None:
     path = tmp_path / "a.parquet"
     write_trajectory(trajectory(unconverged_steps=3, largest_residual=0.1 + 0.2), path)
@@ -72,6 +102,27 @@ def test_what_iterations_left_comes_back_and_older_files_say_nothing_of_it(tmp_p
     pq.write_table(table.replace_schema_metadata({METADATA_KEY: json.dumps(older).encode()}), path)
     read = read_trajectory(path)
     assert (read.unconverged_steps, read.largest_residual) == (None, None)
+
+
+def test_the_states_around_a_fall_come_back_to_the_bit(tmp_path: Path) -> None:
+    path, rng = tmp_path / "a.parquet", np.random.default_rng(2)
+    fall = Fall(np.array([0.1 + 0.2, 0.4]), rng.standard_normal((2, 9)), rng.standard_normal((2, 9)))
+    write_trajectory(trajectory(fall=fall), path)
+    read = read_trajectory(path).fall
+    assert read is not None
+    for name in ("time", "q", "qd"):
+        assert getattr(read, name).tobytes() == getattr(fall, name).tobytes(), name
+    # A state of another length is damage.
+    table = pq.read_table(path)
+    facts = json.loads(table.schema.metadata[METADATA_KEY])
+    facts["fall"]["q"][0].pop()
+    pq.write_table(table.replace_schema_metadata({METADATA_KEY: json.dumps(facts).encode()}), path)
+    with pytest.raises(ValueError, match=r"its schema has no whole velodrome metadata \(fall\.q\.0: "):
+        read_trajectory(path)
+    # Files of earlier versions say nothing of a fall.
+    del facts["fall"]
+    pq.write_table(table.replace_schema_metadata({METADATA_KEY: json.dumps(facts).encode()}), path)
+    assert read_trajectory(path).fall is None
 
 
 @pytest.mark.parametrize("absent", [(name,) for name in OPTIONAL] + [OPTIONAL])
@@ -125,11 +176,13 @@ def test_a_write_that_breaks_off_keeps_the_old_file(tmp_path: Path, monkeypatch:
     write_trajectory(trajectory(), path)
     whole = path.read_bytes()
 
-    def half(_: Any, where: Path) -> None:
-        where.write_bytes(whole[: len(whole) // 2])
+    write_group = pq.ParquetWriter.write_table
+
+    def write_one_group(writer: Any, group: Any) -> None:
+        write_group(writer, group)
         raise OSError("disk full")
 
-    monkeypatch.setattr(pq, "write_table", half)
+    monkeypatch.setattr(pq.ParquetWriter, "write_table", write_one_group)
     with pytest.raises(OSError, match="disk full"):
         write_trajectory(replace(trajectory(), steps=8), path)
     assert path.read_bytes() == whole
