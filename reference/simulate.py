@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from .kernels import rides as kernel
 from .kinematics import WHEELS, constants
 from .rim import bicycle_rim_search, require_clear_rims, second_touch
 from .surface import Surface, evaluate
-from .tableau import TABLEAU
 
 _TOUCHING_WHEEL = {integrate.REAR_TOUCHED: WHEELS[0], integrate.FRONT_TOUCHED: WHEELS[1]}
 _ALL_CALLS = 1 << 40  # more calls than any ride takes
@@ -149,7 +148,7 @@ def simulate(
     riding = True
     while riding:
         calls = _ALL_CALLS if progress is None else 1
-        kernel.continue_rides(0, 1, calls, times, tolerance, TABLEAU, setups, surface.function.real, states)
+        kernel.continue_rides(0, 1, calls, times, tolerance, setups, surface.function.real, states)
         riding = states.counts[0, 0] == integrate.MORE
         _require_start(start, states, 0)
         if progress is not None:
@@ -192,9 +191,7 @@ def simulate_many(
         function = own[0].surface.function.real
 
         def ride(part: range, setups=setups, states=states, function=function) -> None:
-            kernel.continue_rides(
-                part.start, part.stop, _ALL_CALLS, times, tolerance, TABLEAU, setups, function, states
-            )
+            kernel.continue_rides(part.start, part.stop, _ALL_CALLS, times, tolerance, setups, function, states)
 
         _share(ride, len(own), threads)
         for k, (i, start) in enumerate(zip(kind, own, strict=True)):
@@ -230,11 +227,29 @@ def _share(ride: Callable[[range], None], count: int, threads: int) -> None:
         list(pool.map(ride, parts))
 
 
-def _set_rides_up(starts: Sequence[RideStart], samples: int) -> tuple[kernel.RideSetups, kernel.RideStates]:
-    """Return what the kernel needs of starts on one kind of ground, with their contacts found."""
-    n = len(starts)
+class OnGround(Protocol):
+    """Anything with a bicycle on its ground, under inputs."""
+
+    @property
+    def bicycle(self) -> Bicycle:
+        """The bicycle."""
+        ...
+
+    @property
+    def surface(self) -> Surface:
+        """The ground."""
+        ...
+
+    @property
+    def inputs(self) -> Inputs:
+        """The inputs."""
+        ...
+
+
+def ride_setups(starts: Sequence[OnGround], falls: np.ndarray) -> kernel.RideSetups:
+    """Return what compiled code needs of n starts on one kind of ground; ``falls`` (n, 4) are the fall criteria."""
     searches = [bicycle_rim_search(start.bicycle, start.surface) for start in starts]
-    setups = kernel.RideSetups(
+    return kernel.RideSetups(
         constants=np.array([constants(start.bicycle, start.inputs) for start in starts]),
         parameters=np.array([start.surface.parameters for start in starts]),
         curved=np.array([search.curved for search in searches]),
@@ -243,8 +258,15 @@ def _set_rides_up(starts: Sequence[RideStart], samples: int) -> tuple[kernel.Rid
         widths=np.array([search.width for search in searches]),
         details=np.array([search.detail for search in searches]),
         samples=np.array([search.samples for search in searches]),
-        falls=np.array([fall_criterion(start.bicycle, start.until_fall) for start in starts], float),
+        falls=falls,
     )
+
+
+def _set_rides_up(starts: Sequence[RideStart], samples: int) -> tuple[kernel.RideSetups, kernel.RideStates]:
+    """Return what the kernel needs of starts on one kind of ground, with their contacts found."""
+    n = len(starts)
+    falls = np.array([fall_criterion(start.bicycle, start.until_fall) for start in starts], float)
+    setups = ride_setups(starts, falls)
     states = kernel.RideStates(
         y=np.zeros((n, integrate.SIZE)),
         clock=np.empty((n, 2)),

@@ -255,6 +255,7 @@ def _record_ride(
         if fall is not None:
             heights = heights_above_fallen(problem.bicycle, problem.surface, fall.q, fall.qd)
             samples, ended = standing, describe_fall(solve_fall(fall.time, *heights))
+            steps = round(fall.time[1] / settings.step)  # the call has gone on to the end of its block
         if ended is not None:
             break
         progress(steps * settings.step)

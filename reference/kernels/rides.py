@@ -104,7 +104,7 @@ def unpack_rim_search(setups, i):
 
 
 @jit
-def _are_rims_clear(y, ground, function, parameters, c):
+def are_rims_clear(y, ground, function, parameters, c):
     """Return whether no rim lies inside the ground or touches it twice, with contacts ``y[18:]``."""
     both = wheels(y, c)
     for k in range(2):
@@ -136,14 +136,14 @@ def begin_rides(first, last, setups, function, states):
         guess_contacts(q, p, function, parameters, c)
         if not find_contacts(q, p, function, parameters, c):
             states.counts[i, 0] = NO_CONTACT
-        elif ground.curved and not _are_rims_clear(y, ground, function, parameters, c):
+        elif ground.curved and not are_rims_clear(y, ground, function, parameters, c):
             states.counts[i, 0] = NOT_CLEAR
         else:
             states.counts[i, 0] = integrate.MORE
 
 
 @jit_released
-def continue_rides(first, last, most_calls, times, tolerance, tableau, setups, function, states):
+def continue_rides(first, last, most_calls, times, tolerance, setups, function, states):
     """Continue the rides ``first`` to ``last`` by up to ``most_calls`` times `STEPS_A_CALL` steps each.
 
     Fills the forces of rides that have ended. See `integrate.dop853`.
@@ -163,7 +163,6 @@ def continue_rides(first, last, most_calls, times, tolerance, tableau, setups, f
                 clock[1],
                 tolerance,
                 STEPS_A_CALL,
-                tableau,
                 ground,
                 fall,
                 function,
