@@ -72,6 +72,18 @@ def ride_engine(
     Exception
         Any exception that the engine raises.
     """
+    require_sound_start(engine, problem)
+    return admit_trajectory(engine, problem, settings, simulate_guarded(engine, problem, settings, progress), folder)
+
+
+def require_sound_start(engine: Engine, problem: Problem) -> None:
+    """Refuse inputs that an engine does not apply, rims inside the ground, and wheels that overlap.
+
+    Raises
+    ------
+    EngineError
+        With the reason.
+    """
     ignored = find_ignored_inputs(engine, problem)
     if ignored is not None:
         raise EngineError(ignored)
@@ -80,7 +92,6 @@ def ride_engine(
         require_separate_wheels(problem.bicycle, problem.q)
     except ValueError as error:
         raise EngineError(str(error)) from error
-    return admit_trajectory(engine, problem, settings, simulate_guarded(engine, problem, settings, progress), folder)
 
 
 def admit_trajectory(

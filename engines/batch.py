@@ -7,6 +7,7 @@ from typing import Any
 
 from .admission import admit_trajectory, ride_engine
 from .engine import Engine, Problem, Trajectory
+from .groups import group_by_times
 from .guard import GuardedEngine
 from .lagrange import LagrangeEngine
 
@@ -44,10 +45,7 @@ def ride_many(
         CPU time: that of a batch is divided in proportion to the steps. A batch is not larger than some megabytes.
     """
     inner: Any = engine.inner if isinstance(engine, GuardedEngine) else engine
-    groups: dict[bytes, list[int]] = {}
-    for i, problem in enumerate(problems):
-        groups.setdefault(problem.times.tobytes(), []).append(i)
-    for group in groups.values():
+    for group in group_by_times(problems):
         size = max(1, min(_RIDES_A_CALL, _SAMPLES_A_CALL // len(problems[group[0]].times)))
         for first in range(0, len(group), size):
             part = group[first : first + size]

@@ -341,6 +341,10 @@ class Engine(Protocol):
     place in a batch. An engine that computes in float32 tells `velodrome float32` so by ``single_precision``, a
     `velodrome.engines.single_precision.SinglePrecision`.
 
+    An engine may ride many problems in one call, by a method ``simulate_many(problems, settings, threads)``. It returns
+    a list with a trajectory for each problem, or the exception that ``simulate`` would raise: the same to the bit but
+    for the CPU time. `velodrome.engines.many.ride_engine_many` calls it.
+
     The tuple ``packages`` serves `velodrome history`: it names the packages of the library behind the engine, whose
     releases can be compared, where they are neither the engine's own package nor those of its extra.
     """

@@ -6,13 +6,13 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, replace
 from pathlib import Path
 from traceback import walk_tb
 from types import FrameType
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 
 if TYPE_CHECKING:
     from .engine import Engine, Problem, Progress, Settings, Trajectory
@@ -176,6 +176,25 @@ def simulate_guarded(engine: Engine, problem: Problem, settings: Any, progress: 
             return trajectory
     # Outside the handler, so that the exception keeps its own cause and context.
     raise raised[0]
+
+
+def find_simulate_many(engine: Engine) -> Callable[[Sequence[Problem], Any, int], list[Any]] | None:
+    """Return a function that rides many problems in an engine by its ``simulate_many``; None if it has none.
+
+    The function raises as `call_engine` does, and `EngineError` if there is not one ride for each problem.
+    """
+    own = engine.inner if isinstance(engine, GuardedEngine) else engine
+    inner: Any = getattr(own, "simulate_many", None)
+    if inner is None:
+        return None
+
+    def simulate_many(problems: Sequence[Problem], settings: Any, threads: int) -> list[Any]:
+        rides = call_engine(inner, [_copy_problem(problem) for problem in problems], settings, threads)
+        if not isinstance(rides, list) or len(cast("list[Any]", rides)) != len(problems):
+            raise EngineError(f"its simulate_many gave no list of {len(problems)} rides")
+        return cast("list[Any]", rides)
+
+    return simulate_many
 
 
 def _copy_problem(problem: Problem) -> Problem:

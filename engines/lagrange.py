@@ -21,6 +21,8 @@ from ..reference.simulate import (
     steps_per_output,
 )
 from .engine import REFERENCE, EngineError, Problem, Progress, Settings, Trajectory, package_version
+from .groups import group_by_times
+from .threads import ride_in_threads
 
 ORDER = 8  # order of dop853: the tolerance is scaled by this power of the factor on the step
 
@@ -91,13 +93,12 @@ class LagrangeEngine:
     def simulate_many(
         self, problems: Sequence[Problem], settings: LagrangeSettings, threads: int = 1
     ) -> list[Trajectory | Exception]:
-        """Run problems with the same output times; see `velodrome.reference.simulate.simulate_many`.
+        """Run problems; with dop853 those with the same output times in one call of compiled code.
 
         Parameters
         ----------
         problems : sequence of Problem
         settings : LagrangeSettings
-            With the integrator dop853.
         threads : int
             Number of threads that share the problems.
 
@@ -107,6 +108,17 @@ class LagrangeEngine:
             What `simulate` returns or raises for each problem, to the bit, except for the CPU time: that of all
             problems is divided in proportion to their steps.
         """
+        if settings.integrator != "dop853":
+            return ride_in_threads(lambda each, report: self.simulate(each, settings, report), problems, 1)
+        found: dict[int, Trajectory | Exception] = {}
+        for group in group_by_times(problems):
+            rides = self._simulate_group([problems[i] for i in group], settings, threads)
+            found |= zip(group, rides, strict=True)
+        return [found[i] for i in range(len(problems))]
+
+    def _simulate_group(
+        self, problems: Sequence[Problem], settings: LagrangeSettings, threads: int
+    ) -> list[Trajectory | Exception]:
         starts = [
             RideStart(each.bicycle, each.surface, each.q, each.qd, each.inputs, not each.beyond_fall)
             for each in problems

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from functools import lru_cache
 from importlib.metadata import PackageNotFoundError
 from typing import TYPE_CHECKING, Any, Literal, cast
 
@@ -119,7 +120,7 @@ class LibraryReach:
         if self.installed is None:
             return True
         try:
-            return Version(Version(self.installed).base_version) >= Version(since)
+            return _read_release(self.installed) >= _read_release(since)
         except InvalidVersion:
             return True
 
@@ -147,6 +148,11 @@ class LibraryReach:
     def name_need(self, subject: str, since: str, needs: str) -> str:
         """Return one line that says which release something needs and for what, and which one is installed."""
         return f"{subject} needs {self.library} {since} or newer ({needs}), this is {self.version}"
+
+
+@lru_cache(maxsize=256)
+def _read_release(version: str) -> Version:
+    return Version(Version(version).base_version)
 
 
 def refuse_releases(engine: str, settings: Settings, *reaches: LibraryReach) -> None:

@@ -88,7 +88,8 @@ def read_energy(data: mujoco.MjData) -> np.ndarray:
 
     Before MuJoCo 3.1.4 its view of them has a stride of zero, and shows the potential energy twice.
     """
-    return as_strided(data.energy, (2,), (data.energy.itemsize,))
+    energy = data.energy
+    return energy if energy.strides[0] else as_strided(energy, (2,), (energy.itemsize,))
 
 
 @contextmanager

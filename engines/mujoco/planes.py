@@ -8,12 +8,12 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numba import typeof
 
 from ...reference.kernels.dynamics import guess_contacts
 from ...reference.kinematics import constants
 from ...reference.surface import is_level
 from ..engine import EngineError, Problem
+from .bound import bind_kernel
 from .convergence import leave_unwatched, watch_solver
 from .releases import RESIDUAL, is_present
 from .ride import Rig, bodies, look_stride, make_look, read_contact_forces, rim_stride, set_start, wheel_geoms
@@ -37,9 +37,7 @@ def build_planes(problem: Problem, settings: ContactSettings) -> Rig:
     c, contact = constants(problem.bicycle), np.empty(6)
     function, parameters = problem.surface.function.real, problem.surface.parameters
     guess_contacts(problem.q, contact, function, parameters, c)
-    arguments = (data.qpos, c, function, parameters, contact, position, quaternion)
-    # The types never change, and inferring them in every call takes numba longer than MuJoCo takes for a step.
-    follow = partial(place_planes.compile(tuple(typeof(argument) for argument in arguments)), *arguments)
+    follow = bind_kernel(place_planes, data.qpos, c, function, parameters, contact, position, quaternion)
     if not follow():
         raise EngineError("a wheel has no contact point with the surface at the start")
     wheels, watched = wheel_geoms(model), is_present(RESIDUAL)

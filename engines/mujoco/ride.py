@@ -8,24 +8,26 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from copy import copy
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache
 from itertools import count
-from time import process_time
+from math import isfinite
+from time import thread_time
 
 import mujoco
 import numpy as np
-from numba import typeof
 
-from ...reference.bicycle import BODIES
+from ...reference.bicycle import BODIES, Bicycle
 from ...reference.fall import LOOK_INTERVAL, Ending, Fall, FallWatch, fall_criterion
 from ...reference.kinematics import WHEELS, constants
 from ...reference.rim import RimWatch, bicycle_rim_search
 from ..engine import EngineError, Problem, Progress
+from .bound import bind_kernel
 from .convergence import SolverConvergence, UnknownConvergence, share
 from .library import read_energy
 from .model import Touching, mjcf
-from .releases import ENERGY, is_present
+from .releases import ENERGY, PLANES, is_present
 from .settings import StepSettings
 from .state import from_mujoco, to_mujoco
 from .tangent import find_height, wheel_poses
@@ -90,9 +92,7 @@ class HeightLook:
         self._data, self._start = data, problem.q
         self.watch = FallWatch(problem.bicycle, problem.surface, self._convert)
         function, parameters = problem.surface.function.real, problem.surface.parameters
-        arguments = (data.qpos, fall_criterion(problem.bicycle), function, parameters)
-        # Inferring the types in every call would take numba longer than MuJoCo takes for a step.
-        self._height = partial(find_height.compile(tuple(typeof(argument) for argument in arguments)), *arguments)
+        self._height = bind_kernel(find_height, data.qpos, fall_criterion(problem.bicycle), function, parameters)
 
     def __call__(self, time: float) -> Ending | None:
         """Return when and why the ride ends, None if it does not."""
@@ -178,7 +178,7 @@ class RideState:
         The samples that were reached.
     steps : int
     cpu_time : float
-        Process CPU time of the steps [s].
+        CPU time of the steps, in their thread [s].
     ended : str or None
         Why the ride ended early.
     unconverged_steps : int or None
@@ -206,17 +206,42 @@ def set_start(problem: Problem, settings: StepSettings, touching: Touching) -> t
     EngineError
         If MuJoCo refuses the model.
     """
-    try:
-        model = mujoco.MjModel.from_xml_string(mjcf(problem.bicycle, settings, touching, problem.inputs.steer_damping))
-    except ValueError as error:
-        raise EngineError(f"MuJoCo refuses the bicycle: {error}") from error
+    # Callers may change their model.
+    model = copy(_compile_model(_ModelKey(problem.bicycle, settings, touching, problem.inputs.steer_damping)))
     if not is_present(ENERGY):
         model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = to_mujoco(problem.q, problem.qd)
     for joint, torque in (("steer", problem.inputs.steer_torque), ("rear_angle", problem.inputs.rear_wheel_torque)):
-        data.qfrc_applied[model.joint(joint).dofadr[0]] = torque
+        data.qfrc_applied[model.jnt_dofadr[_find_id(model, "JOINT", joint)]] = torque
     return model, data
+
+
+class _ModelKey:
+    """Arguments of `mjcf`, equal only if they are to the bit: parameters such as 0.0 and -0.0 compare as equal."""
+
+    def __init__(self, bicycle: Bicycle, settings: StepSettings, touching: Touching, steer_damping: float) -> None:
+        self.arguments = bicycle, settings, touching, steer_damping
+        self._text = f"{self.arguments!r} {PLANES.installed}"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _ModelKey) and self._text == other._text
+
+    def __hash__(self) -> int:
+        return hash(self._text)
+
+
+@lru_cache(maxsize=16)
+def _compile_model(key: _ModelKey) -> mujoco.MjModel:
+    try:
+        return mujoco.MjModel.from_xml_string(mjcf(*key.arguments))
+    except ValueError as error:
+        raise EngineError(f"MuJoCo refuses the bicycle: {error}") from error
+
+
+def _find_id(model: mujoco.MjModel, kind: str, name: str) -> int:
+    """Return MuJoCo's id of a body, joint or geom; MuJoCo's views by name take ten times as long in a new model."""
+    return mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), name)
 
 
 def make_look(data: mujoco.MjData, problem: Problem, every: int = 1) -> RideLook:
@@ -240,9 +265,7 @@ def _look_at_rims(data: mujoco.MjData, problem: Problem, every: int) -> Callable
         raise EngineError(str(error)) from error
     if not watch.needed:
         return lambda _: None
-    calls, arguments = count(), (data.qpos, constants(problem.bicycle), watch.centre, watch.axle)
-    # Inferring the types in every call would take numba longer than MuJoCo takes for a step.
-    pose = partial(wheel_poses.compile(tuple(typeof(argument) for argument in arguments)), *arguments)
+    calls, pose = count(), bind_kernel(wheel_poses, data.qpos, constants(problem.bicycle), watch.centre, watch.axle)
 
     def look(time: float) -> Ending | None:
         if next(calls) % every:
@@ -270,12 +293,12 @@ def rim_stride(problem: Problem, step: float) -> int:
 
 def bodies(model: mujoco.MjModel) -> list[int]:
     """Return MuJoCo's ids of the four bodies, in the order of `BODIES`."""
-    return [model.body(name).id for name in BODIES]
+    return [_find_id(model, "BODY", name) for name in BODIES]
 
 
 def wheel_geoms(model: mujoco.MjModel) -> dict[int, int]:
     """Return the wheel, 0 rear and 1 front, by MuJoCo's id of its geom."""
-    return {model.geom(name).id: k for k, name in enumerate(WHEELS)}
+    return {_find_id(model, "GEOM", name): k for k, name in enumerate(WHEELS)}
 
 
 def read_contact_forces(model: mujoco.MjModel, data: mujoco.MjData, wheels: dict[int, int], out: np.ndarray) -> None:
@@ -308,7 +331,8 @@ def record_sample(rig: Rig, recording: Recording, k: int) -> None:
 def find_trouble(data: mujoco.MjData, standing: bool) -> str | None:
     """Return why the ride cannot continue; None if it can."""
     # MuJoCo checks a state only before it steps from it: the last state has not been checked yet.
-    if any(data.warning[kind].number for kind in UNSTABLE) or not np.all(np.isfinite([*data.qpos, *data.qvel])):
+    finite = all(map(isfinite, data.qpos.tolist())) and all(map(isfinite, data.qvel.tolist()))
+    if not finite or any(data.warning[kind].number for kind in UNSTABLE):
         return "MuJoCo's state became infinite or huge"
     return None if standing else "a wheel lies flat or has no contact point with the surface"
 
@@ -399,9 +423,9 @@ def _continue_ride(
     for k in range(1, len(counts)):
         while steps < counts[k]:
             convergence.begin(steps)
-            begun = process_time()
+            begun = thread_time()
             steps, standing, touch = advance(rig, step, steps, min(steps + steps_per_report, counts[k]))
-            cpu_time += process_time() - begun
+            cpu_time += thread_time() - begun
             ended = find_trouble(rig.data, standing)
             # An unconverged solver may be the cause of other trouble, so it is reported first.
             if (stopped := find_unconverged(convergence, step)) is not None:
