@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import Literal, Self
 
 import numpy as np
@@ -10,7 +11,15 @@ from pydantic import Field
 
 from ..reference.contact import observe
 from ..reference.kinematics import body_positions, body_quaternions
-from ..reference.simulate import simulate, simulate_modified_euler, steps_per_output
+from ..reference.simulate import (
+    PreciseMotion,
+    RideStart,
+    kernels_are_loaded,
+    simulate,
+    simulate_many,
+    simulate_modified_euler,
+    steps_per_output,
+)
 from .engine import REFERENCE, EngineError, Problem, Progress, Settings, Trajectory, package_version
 
 ORDER = 8  # order of dop853: the tolerance is scaled by this power of the factor on the step
@@ -68,8 +77,7 @@ class LagrangeEngine:
         """Run a problem; see `velodrome.engines.engine.Engine`."""
         where = (problem.bicycle, problem.surface)
         state = (problem.q, problem.qd, problem.times)
-        # Compile the kernels, or load them from the cache, before the clock starts.
-        simulate(*where, problem.q, problem.qd, problem.times[:1])
+        _load_kernels(problem)
         begin = time.process_time()
         if settings.integrator == "dop853":
             motion = simulate(*where, *state, settings.tolerance, progress, problem.inputs, not problem.beyond_fall)
@@ -78,10 +86,59 @@ class LagrangeEngine:
             motion = simulate_modified_euler(*where, *state, settings.step, problem.inputs, not problem.beyond_fall)
             stride = steps_per_output(problem.times, settings.step)
             clock = settings.step * (stride * np.arange(len(motion.time)))
-        cpu_time = time.process_time() - begin
+        return self._make_trajectory(problem, settings, motion, clock, time.process_time() - begin)
+
+    def simulate_many(
+        self, problems: Sequence[Problem], settings: LagrangeSettings, threads: int = 1
+    ) -> list[Trajectory | Exception]:
+        """Run problems with the same output times; see `velodrome.reference.simulate.simulate_many`.
+
+        Parameters
+        ----------
+        problems : sequence of Problem
+        settings : LagrangeSettings
+            With the integrator dop853.
+        threads : int
+            Number of threads that share the problems.
+
+        Returns
+        -------
+        list of Trajectory or Exception
+            What `simulate` returns or raises for each problem, to the bit, except for the CPU time: that of all
+            problems is divided in proportion to their steps.
+        """
+        starts = [
+            RideStart(each.bicycle, each.surface, each.q, each.qd, each.inputs, not each.beyond_fall)
+            for each in problems
+        ]
+        _load_kernels(problems[0])
+        begin = time.process_time()
+        motions = simulate_many(starts, problems[0].times, settings.tolerance, threads)
+        elapsed = time.process_time() - begin
+        steps = sum(motion.steps for motion in motions if isinstance(motion, PreciseMotion))
+        found: list[Trajectory | Exception] = []
+        for problem, motion in zip(problems, motions, strict=True):
+            if isinstance(motion, Exception):
+                found.append(motion)
+                continue
+            cpu_time = elapsed * motion.steps / max(steps, 1)
+            try:
+                found.append(self._make_trajectory(problem, settings, motion, motion.time, cpu_time))
+            except EngineError as error:
+                found.append(error)
+        return found
+
+    def _make_trajectory(
+        self,
+        problem: Problem,
+        settings: LagrangeSettings,
+        motion: PreciseMotion,
+        clock: np.ndarray,
+        cpu_time: float,
+    ) -> Trajectory:
         if len(motion.time) == 0:
             raise EngineError(motion.ended)
-        contact = observe(*where, motion.q, motion.qd, motion.contact)
+        contact = observe(problem.bicycle, problem.surface, motion.q, motion.qd, motion.contact)
         return Trajectory(
             engine=self.name,
             version=self.version,
@@ -104,6 +161,13 @@ class LagrangeEngine:
             # A step that cannot be projected back onto the contact constraints ends the ride.
             unconverged_steps=0,
         )
+
+
+def _load_kernels(problem: Problem) -> None:
+    """Compile the kernels of a ride, or load them from the cache, before the clock starts."""
+    if not kernels_are_loaded():
+        simulate(problem.bicycle, problem.surface, problem.q, problem.qd, problem.times[:1])
+    _ = problem.surface.function.real  # compiled when first used
 
 
 ENGINE = LagrangeEngine()

@@ -15,6 +15,7 @@ import numpy as np
 from .bicycle import Bicycle
 from .inputs import NO_INPUTS, Inputs
 from .kernels import curve
+from .kernels import newton as newton_kernel
 from .kernels import steady as kernel
 from .kernels.pose import aligned
 from .kinematics import constants
@@ -23,9 +24,6 @@ from .surface import SurfaceOfRevolution
 
 LEAN, PITCH, STEER, YAW_SPEED, REAR_SPEED, FRONT_SPEED, SIGMA = range(3, 10)
 CONTACT, FORCE = slice(10, 16), slice(16, 22)
-
-# Rows are of order one: the round-off of a solution is about 1e-14, times the heights on large circles.
-LARGEST_RESIDUAL = 1e-12
 
 
 @dataclass(frozen=True)
@@ -149,6 +147,11 @@ class Steady:
         function = self.surface.function
         return function.real, function.complex, self.surface.parameters, aligned(constants(self.bicycle, self.inputs))
 
+    @property
+    def all_arguments(self) -> tuple[Any, Any, np.ndarray, Any, Any]:
+        """Arguments of `velodrome.reference.kernels.newton`: those of `where`, and the constants before alignment."""
+        return *self.where, constants(self.bicycle, self.inputs)
+
     def expand(self, chosen: np.ndarray) -> Expansion:
         """Evaluate the eight equations and all 22 unknowns at the nine, shape (9,), with their Jacobians.
 
@@ -222,28 +225,40 @@ class Condition:
     gradient: np.ndarray
 
 
-def rear_rate_condition(rear_rate: float):
+@dataclass(frozen=True)
+class PickedPoint:
+    """A condition that compiled code knows; called with unknowns (22,), it returns their `Condition`.
+
+    Attributes
+    ----------
+    terms : PointCondition
+        See `velodrome.reference.kernels.newton`.
+    """
+
+    terms: newton_kernel.PointCondition
+
+    def __call__(self, u: np.ndarray) -> Condition:
+        """Evaluate the condition at unknowns (22,)."""
+        index, _, scale = self.terms
+        gradient = np.zeros(kernel.UNKNOWNS)
+        if index == newton_kernel.REAR_RATE:
+            gradient[SIGMA] = scale * u[REAR_SPEED] ** 2
+            gradient[REAR_SPEED] = 2 * scale * u[SIGMA] * u[REAR_SPEED]
+        else:
+            gradient[index] = scale
+        return Condition(float(newton_kernel.condition_value(self.terms, u)), gradient)
+
+
+def rear_rate_condition(rear_rate: float) -> PickedPoint:
     """Make the condition of a given rear-wheel rate: sigma b^2 = rate^2, in units of the rate's square or of 1."""
     scale = kernel.SIGMA_UNIT / max(rear_rate**2, 1.0)
-
-    def condition(u: np.ndarray) -> Condition:
-        gradient = np.zeros(kernel.UNKNOWNS)
-        gradient[SIGMA] = scale * u[REAR_SPEED] ** 2
-        gradient[REAR_SPEED] = 2 * scale * u[SIGMA] * u[REAR_SPEED]
-        return Condition(scale * (u[SIGMA] * u[REAR_SPEED] ** 2 - rear_rate**2 / kernel.SIGMA_UNIT), gradient)
-
-    return condition
+    terms = newton_kernel.PointCondition(newton_kernel.REAR_RATE, rear_rate**2 / kernel.SIGMA_UNIT, scale)
+    return PickedPoint(terms)
 
 
-def unknown_condition(index: int, value: float):
+def unknown_condition(index: int, value: float) -> PickedPoint:
     """Make the condition that one unknown has a given value."""
-
-    def condition(u: np.ndarray) -> Condition:
-        gradient = np.zeros(kernel.UNKNOWNS)
-        gradient[index] = 1.0
-        return Condition(float(u[index]) - value, gradient)
-
-    return condition
+    return PickedPoint(newton_kernel.PointCondition(index, float(value), 1.0))
 
 
 def nearest_condition():
@@ -284,6 +299,15 @@ def newton(equations: Steady, unknowns: np.ndarray, condition, most: int = 12) -
         If it does not converge.
     """
     u = unknowns[curve.CHOSEN]
+    if isinstance(condition, PickedPoint):
+        full = np.empty(kernel.UNKNOWNS)
+        try:
+            iterations, _ = newton_kernel.solve_motion(u, condition.terms, most, *equations.all_arguments, full)
+        except ZeroDivisionError:  # see `Steady.expand`
+            iterations = 0
+        if iterations:
+            return full, iterations
+        raise ValueError("Newton's method finds no circular motion there")
     for iteration in range(1, most + 1):
         here = equations.expand(u)
         extra = condition(here.full)
@@ -298,7 +322,36 @@ def newton(equations: Steady, unknowns: np.ndarray, condition, most: int = 12) -
         if size < 1e-9:  # convergence is quadratic: what remains is round-off
             full = equations.expand(u).full
             # Least squares may also settle where the equations have no solution.
-            if np.abs(equations.residual(full)).max() > LARGEST_RESIDUAL * (1 + np.abs(full).max()):
+            where, parameters = equations.surface.function.real, equations.surface.parameters
+            if not newton_kernel.is_solution(full, where, parameters, constants(equations.bicycle, equations.inputs)):
                 break
             return full, iteration
     raise ValueError("Newton's method finds no circular motion there")
+
+
+def make_canonical(equations: Steady, unknowns: np.ndarray, condition: PickedPoint) -> tuple[np.ndarray, bool]:
+    """Compute a solution anew, so that its bits do not depend on the guess that led to it.
+
+    The unknowns are rounded, and a fixed number of Newton's steps is taken from there.
+
+    Parameters
+    ----------
+    equations : Steady
+    unknowns : ndarray, shape (22,)
+        A solution of the equations and the condition, to 1e-10.
+    condition : PickedPoint
+
+    Returns
+    -------
+    unknowns : ndarray, shape (22,)
+        The solution as given where the steps do not settle, next to a fold.
+    certain : bool
+        Whether no other guess would have led to other bits. False where the steps do not settle, and where an unknown
+        lies within 1e-10 of the middle between two roundings: about once in 1e4 solutions.
+    """
+    u, full = unknowns[curve.CHOSEN], np.empty(kernel.UNKNOWNS)
+    try:
+        outcome = newton_kernel.canonical(u, condition.terms, *equations.all_arguments, full)
+    except ZeroDivisionError:  # see `Steady.expand`
+        outcome = newton_kernel.UNSETTLED
+    return unknowns if outcome == newton_kernel.UNSETTLED else full, outcome == newton_kernel.CANONICAL

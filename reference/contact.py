@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .bicycle import Bicycle
-from .kernels import dynamics as kernel
+from .kernels.observation import observe_states
 from .kinematics import constants
 from .rim import bicycle_rim_search
 from .surface import Surface
@@ -27,8 +27,8 @@ class Observation:
         Lateral and forward material velocity of that point [m/s].
     kinetic_energy, potential_energy : ndarray, shape (n,)
         Energies [J]; the potential energy is zero at z = 0.
-    found : bool
-        False where a closest approach could not be computed.
+    lost : ndarray, shape (n,), bool
+        Samples in which a closest approach could not be computed.
     """
 
     point: np.ndarray
@@ -37,7 +37,12 @@ class Observation:
     slip: np.ndarray
     kinetic_energy: np.ndarray
     potential_energy: np.ndarray
-    found: bool
+    lost: np.ndarray
+
+    @property
+    def found(self) -> bool:
+        """False where a closest approach could not be computed in some sample."""
+        return not self.lost.any()
 
 
 def observe(
@@ -58,8 +63,8 @@ def observe(
     n = len(q)
     contacts = np.empty((n, 6)) if contact is None else np.array(contact, float).reshape(n, 6)
     point, normal, gap = np.empty((n, 2, 3)), np.empty((n, 2, 3)), np.empty((n, 2))
-    slip, energy = np.empty((n, 2, 2)), np.empty((n, 2))
-    found = kernel.observe(
+    slip, energy, found = np.empty((n, 2, 2)), np.empty((n, 2)), np.empty(n, np.bool_)
+    observe_states(
         np.ascontiguousarray(q, float),
         np.ascontiguousarray(qd, float),
         contacts,
@@ -73,5 +78,6 @@ def observe(
         gap,
         slip,
         energy,
+        found,
     )
-    return Observation(point, normal, gap, slip, energy[:, 0].copy(), energy[:, 1].copy(), bool(found))
+    return Observation(point, normal, gap, slip, energy[:, 0].copy(), energy[:, 1].copy(), ~found)

@@ -117,6 +117,11 @@ class FallWatch(Generic[_State]):
     convert : callable
         Returns the coordinates and rates, shapes (2, 9), of two of the engine's own states, from their times (2,) and
         the states.
+
+    Attributes
+    ----------
+    near : bool
+        Whether the bicycle was so low at the last look that every step is to be looked at.
     """
 
     def __init__(
@@ -128,8 +133,9 @@ class FallWatch(Generic[_State]):
         self._where = bicycle, surface
         self._convert = convert
         self._before: tuple[float, _State] | None = None
-        self._near = _NEAR * fall_criterion(bicycle).limit
+        self._near_height = _NEAR * fall_criterion(bicycle).limit
         self._due = 0.0
+        self.near = False
 
     def is_due(self, time: float) -> bool:
         """Return whether the bicycle is to be looked at: every 10 ms, and at every step once it is near its fall."""
@@ -147,8 +153,9 @@ class FallWatch(Generic[_State]):
             The engine's own state at that time, which it does not change later.
         """
         before, self._before = self._before, (time, state)
+        self.near = not height > self._near_height
         # A multiple of the interval counts as reached despite round-off.
-        self._due = time + LOOK_INTERVAL * (1 - 1e-6) if height > self._near else time
+        self._due = time if self.near else time + LOOK_INTERVAL * (1 - 1e-6)
         if before is None or not height <= 0:  # a height that is not a number is no fall
             return None
         times = np.array([before[0], time])

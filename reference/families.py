@@ -25,6 +25,7 @@ from .circular import (
     CircularMotion,
     Steady,
     as_solved,
+    make_canonical,
     mirror_motion,
     newton,
     plane_condition,
@@ -56,7 +57,7 @@ FAMILIES = (1, 2, 3, 4)
 
 _MEANT = 1e-3  # rad: so near to what was asked for, no other motion is searched for
 _SAME_ANGLES = 1e-7  # rad
-_NEAR_ENOUGH = 0.2  # rad: a motion further from the requested angles is another one
+NEAR_ENOUGH = 0.2  # rad: a motion further from the requested angles is another one
 
 
 def rear_rate_slope(point: Point) -> float:
@@ -159,7 +160,7 @@ def trace_from(start: Anchor, longest: float = LONGEST_STEP) -> Family:
     """Follow a curve from an anchor to both ends; see `velodrome.reference.anchors.anchor` and `trace`."""
     halves = []
     for towards in start.directions:
-        points = list(_up_to_end(follow_curve(start.equations, start.unknowns, towards, longest)))
+        points = list(up_to_end(follow_curve(start.equations, start.unknowns, towards, longest)))
         halves.append(_replace_last_by_end(start.equations, points))
     forward, *backward = halves
     before = [Point(point.unknowns, -point.tangent) for half in backward for point in reversed(half[1:])]
@@ -336,7 +337,7 @@ def _clear_end(end: Point, neighbour: Point) -> Point:
     return Point(u, along)
 
 
-def _up_to_end(points: Iterable[Point]) -> Iterator[Point]:
+def up_to_end(points: Iterable[Point]) -> Iterator[Point]:
     """Yield the points up to and including the first beyond the pivoting motion, or to the end of the curve."""
     start = 0.0
     for point in points:
@@ -412,22 +413,30 @@ def _yield_motions(
             continue
         anchors.append(start)
         for towards in start.directions:
-            points = _up_to_end(follow_curve(start.equations, start.unknowns, towards))
+            points = up_to_end(follow_curve(start.equations, start.unknowns, towards))
             yield from _append_new_motions(found, start.equations, points, rear_rate)
-    every = _follow_families(bicycle, surface)  # type: ignore[arg-type]
-    others = [c for c in every if family in c.numbers and not any(_passes_through(c, start) for start in anchors)]
+    others = follow_other_parts(bicycle, surface, family, anchors)
     for curve in others:
         yield from _append_new_motions(found, curve.equations, curve.points, rear_rate)
     if not anchors and not others:
         raise failures[-1]
 
 
+def follow_other_parts(
+    bicycle: Bicycle, surface: SurfaceOfRevolution, family: int, anchors: Sequence[Anchor]
+) -> list[Family]:
+    """Return the curves with parts of a family that pass through none of its anchors."""
+    every = _follow_families(bicycle, surface)  # type: ignore[arg-type]
+    return [c for c in every if family in c.numbers and not any(_passes_through(c, start) for start in anchors)]
+
+
 def _append_new_motions(
     found: list[CircularMotion], equations: Steady, points: Iterable[Point], rear_rate: float
 ) -> Iterator[CircularMotion]:
     """Yield motions of a rear rate along a curve that are not in ``found``, and append them to it."""
-    for u in crossings(equations, points, rear_rate_condition(rear_rate)):
-        motion = equations.motion(u)
+    condition = rear_rate_condition(rear_rate)
+    for u in crossings(equations, points, condition):
+        motion = equations.motion(make_canonical(equations, u, condition)[0])
         if not any(_same_angles(motion, other) for other in found):
             found.append(motion)
             yield motion
@@ -490,7 +499,7 @@ def find_motion(
         raise _not_found(f"{wanted} in family {family}", [reason, *unsearched], failures, not unsearched)
 
     def distance(item: tuple[int | None, CircularMotion]) -> float:
-        return float(np.hypot(_turn(item[1].lean - near[0]), _turn(item[1].steer - near[1])))
+        return float(np.hypot(wrap_angle(item[1].lean - near[0]), wrap_angle(item[1].steer - near[1])))
 
     if family is None:
         equations = Steady(bicycle, surface, held)
@@ -502,7 +511,7 @@ def find_motion(
     least = min(map(distance, found), default=np.inf)
     # A motion may be on the curves of several families: then it is of the first.
     nearest = next((item for item in found if distance(item) < least + _SAME_ANGLES), None)
-    if nearest is not None and distance(nearest) <= _NEAR_ENOUGH:
+    if nearest is not None and distance(nearest) <= NEAR_ENOUGH:
         return nearest
     curves = "the curves of the families, and " if numbers else "and "
     searched = f"Newton's method from there, {curves}{describe_search(held)}"
@@ -515,7 +524,7 @@ def find_motion(
         reasons.insert(0, "no motion is straight on ground that is not level")
     if failures:
         reasons.append(_join_failures(failures))
-    wanted += f" within {_NEAR_ENOUGH} rad of near = {near[0]:g}, {near[1]:g}"
+    wanted += f" within {NEAR_ENOUGH} rad of near = {near[0]:g}, {near[1]:g}"
     raise _not_found(wanted, reasons, failures, not unsearched)
 
 
@@ -575,10 +584,10 @@ def _list_unsearched(
 
 def _is_near_straight(near: tuple[float, float]) -> bool:
     """Return whether angles are near those of upright straight motion, the handlebar forward or reversed."""
-    return min(np.hypot(_turn(near[0]), _turn(near[1] - steer)) for steer in (0.0, np.pi)) <= _NEAR_ENOUGH
+    return min(np.hypot(wrap_angle(near[0]), wrap_angle(near[1] - steer)) for steer in (0.0, np.pi)) <= NEAR_ENOUGH
 
 
-def _turn(angle: float) -> float:
+def wrap_angle(angle: float) -> float:
     """Return an angle without whole turns, from -pi to pi."""
     return float(np.arctan2(np.sin(angle), np.cos(angle)))
 
@@ -635,4 +644,4 @@ def _motions_without_number(equations: Steady, rear_rate: float) -> Iterator[tup
 
 
 def _same_angles(one: CircularMotion, other: CircularMotion) -> bool:
-    return bool(np.hypot(_turn(one.lean - other.lean), _turn(one.steer - other.steer)) < _SAME_ANGLES)
+    return bool(np.hypot(wrap_angle(one.lean - other.lean), wrap_angle(one.steer - other.steer)) < _SAME_ANGLES)

@@ -10,6 +10,7 @@ import numpy as np
 
 from .bicycle import BODIES, Bicycle
 from .inputs import NO_INPUTS, Inputs
+from .kernels import bodies
 from .kernels import kinematics as kernel
 
 COORDINATES = ("x", "y", "z", "yaw", "lean", "pitch", "steer", "rear_angle", "front_angle")
@@ -125,10 +126,10 @@ def _frame_rotations(bicycle: Bicycle, q: np.ndarray) -> tuple[np.ndarray, np.nd
 @_of_one_or_many
 def body_positions(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
     """Compute the centres of mass of the four bodies, shape (n, 4, 3) [m], from coordinates (n, 9)."""
-    # A wheel's centre lies on its axle, so the wheel's own rotation does not move it.
-    carriers = 2 * _frame_rotations(bicycle, q)
-    offsets = (bicycle.centre(body) - bicycle.reference_point for body in BODIES)
-    return q[:, None, :3] + np.stack([turned @ offset for turned, offset in zip(carriers, offsets, strict=True)], 1)
+    offsets = np.array([bicycle.centre(body) - bicycle.reference_point for body in BODIES])
+    positions = np.empty((len(q), 4, 3))
+    bodies.fill_positions(np.ascontiguousarray(q, float), offsets, constants(bicycle), positions)
+    return positions
 
 
 @_of_one_or_many
@@ -146,35 +147,9 @@ def body_quaternions(bicycle: Bicycle, q: np.ndarray) -> np.ndarray:
     ndarray, shape (n, 4, 4)
         (w, x, y, z), body to inertial axes, bodies in the order of `BODIES`; as continuous as the coordinates.
     """
-    x, y, z = np.eye(3)
-    rear = _axis_quaternion(z, q[:, YAW])
-    for axis, angle in ((x, q[:, LEAN]), (y, q[:, PITCH])):
-        rear = _multiply(rear, _axis_quaternion(axis, angle))
-    front = _multiply(rear, _axis_quaternion(bicycle.steer_axis, q[:, STEER]))
-    wheels = (
-        _multiply(rear, _axis_quaternion(y, q[:, REAR_ANGLE])),
-        _multiply(front, _axis_quaternion(y, q[:, FRONT_ANGLE])),
-    )
-    return np.stack([np.stack(quaternion, axis=-1) for quaternion in (rear, front, *wheels)], axis=1)
-
-
-_Quaternion = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # w, x, y, z, each of shape (n,)
-
-
-def _axis_quaternion(axis: np.ndarray, angle: np.ndarray) -> _Quaternion:
-    """Quaternions of rotations about a fixed unit axis."""
-    sine = np.sin(angle / 2)
-    return np.cos(angle / 2), axis[0] * sine, axis[1] * sine, axis[2] * sine
-
-
-def _multiply(a: _Quaternion, b: _Quaternion) -> _Quaternion:
-    """Hamilton product of two quaternions."""
-    return (
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-    )
+    orientations = np.empty((len(q), 4, 4))
+    bodies.fill_quaternions(np.ascontiguousarray(q, float), constants(bicycle), orientations)
+    return orientations
 
 
 @_of_one_or_many

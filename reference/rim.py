@@ -18,13 +18,13 @@ from .fall import Ending
 from .kernels import rim as kernel
 from .kernels import touch
 from .kernels.dynamics import wheels
+from .kernels.rides import TOUCHING
 from .kinematics import WHEELS, constants
 from .surface import Surface, SurfaceOfRevolution, evaluate
 
 _SAMPLES_A_DETAIL = 4
 # Samples of a rim: as many as smooth ground needs, and as many as resolve a detail of 2 mm along a bicycle's wheel.
 _FEWEST, _MOST = 32, 4096
-_TOUCHING = 1e-9  # [m] smallest depth that is reported
 # Bounds of a bowl's curvature: rings an eighth of a wheel wide, out to where most rides end, each sampled.
 _RINGS_A_WHEEL, _SAMPLES_A_RING, _FARTHEST = 8, 16, 200.0
 
@@ -130,11 +130,11 @@ def require_clear_rims(
     deepest = [_find_deepest(bicycle, surface, q, k) for k in (0, 1)]
     distance, k, point = min(deepest)
     # A contact computed anew may itself lie inside the ground if the start has settled on another place of the rim.
-    if not may_sink and distance < -_TOUCHING:
+    if not may_sink and distance < -TOUCHING:
         place = _format_xy(point)
         raise ValueError(f"the {WHEELS[k]} rim lies {-1e3 * distance:.3g} mm inside the ground at {place}")
     for (depth, k, point), clear in zip(deepest, rim_clearances(bicycle, surface, q, contact) > 0, strict=True):
-        if not clear and depth < -_TOUCHING:
+        if not clear and depth < -TOUCHING:
             raise ValueError(f"the {WHEELS[k]} rim lies {-1e3 * depth:.3g} mm inside the ground at {_format_xy(point)}")
         if not clear:
             raise ValueError(
@@ -145,7 +145,7 @@ def require_clear_rims(
 def describe_rim_depth(bicycle: Bicycle, surface: Surface, q: np.ndarray, k: int) -> str:
     """Describe how far the rim of wheel ``k`` lies inside the ground at coordinates (9,); empty if it only touches."""
     distance, *_ = _find_deepest(bicycle, surface, q, k)
-    return f": {-1e3 * distance:.3g} mm inside" if distance < -_TOUCHING else ""
+    return f": {-1e3 * distance:.3g} mm inside" if distance < -TOUCHING else ""
 
 
 def _format_xy(point: tuple[float, float]) -> str:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -11,15 +13,16 @@ from .bicycle import Bicycle
 from .dae import contact_parameters
 from .fall import Fall, describe_fall, fall_criterion
 from .inputs import NO_INPUTS, Inputs
-from .kernels import integrate as kernel
+from .kernels import integrate
+from .kernels import rides as kernel
 from .kinematics import WHEELS, constants
 from .rim import bicycle_rim_search, require_clear_rims, second_touch
 from .surface import Surface, evaluate
-from .tableau import TABLEAU
 
-_TOUCHING_WHEEL = {kernel.REAR_TOUCHED: WHEELS[0], kernel.FRONT_TOUCHED: WHEELS[1]}
-_STEPS_A_CALL = 200  # between two reports of progress; a step takes about 6 us
-# Steps shrink to `kernel.SMALLEST_STEP` before the edge of the ground: at 100 m/s a wheel is then within 1 um of it.
+_TOUCHING_WHEEL = {integrate.REAR_TOUCHED: WHEELS[0], integrate.FRONT_TOUCHED: WHEELS[1]}
+_ALL_CALLS = 1 << 40  # more calls than any ride takes
+_PARTS_A_THREAD = 8  # so that a thread with short rides takes over some of the others'
+# Steps shrink to `integrate.SMALLEST_STEP` before the edge of the ground: at 100 m/s a wheel is then within 1 um of it.
 # Where the ground becomes vertical, as on a sphere, they shrink earlier.
 _EDGE_DISTANCE = 1e-3  # [m]
 
@@ -58,11 +61,9 @@ class PreciseMotion:
 
 
 def _make_motion(
-    bicycle: Bicycle,
-    surface: Surface,
-    inputs: Inputs,
     times: np.ndarray,
     rows: np.ndarray,
+    force: np.ndarray,
     steps: int,
     evaluations: int,
     ended: str | None,
@@ -70,10 +71,34 @@ def _make_motion(
 ) -> PreciseMotion:
     n = len(rows)
     q, qd, p = (np.ascontiguousarray(part) for part in (rows[:, :9], rows[:, 9:18], rows[:, 18:]))
-    force = np.empty((n, 6))
-    kernel.contact_forces(rows, surface.function.real, surface.parameters, constants(bicycle, inputs), force)
-    shaped = (q, qd, p.reshape(n, 2, 3), force.reshape(n, 2, 3))
-    return PreciseMotion(times[:n].copy(), *shaped, steps, evaluations, ended, fall)
+    shape = (n, 2, 3)
+    return PreciseMotion(
+        times[:n].copy(), q, qd, p.reshape(shape), force.reshape(shape), steps, evaluations, ended, fall
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class RideStart:
+    """A bicycle on its ground in a state from which it rides.
+
+    Attributes
+    ----------
+    bicycle : Bicycle
+    surface : Surface
+    q, qd : ndarray, shape (9,)
+        Generalised coordinates and rates, on the constraints.
+    inputs : Inputs
+        Held constant.
+    until_fall : bool
+        Whether the ride ends where the bicycle falls.
+    """
+
+    bicycle: Bicycle
+    surface: Surface
+    q: np.ndarray
+    qd: np.ndarray
+    inputs: Inputs = NO_INPUTS
+    until_fall: bool = False
 
 
 def simulate(
@@ -118,49 +143,173 @@ def simulate(
     ValueError
         If a wheel has no contact at the start, or a rim lies inside the ground or touches it twice.
     """
-    times = np.ascontiguousarray(times, float)
-    y = np.concatenate([q, qd, contact_parameters(bicycle, surface, np.asarray(q, float))])
-    require_clear_rims(bicycle, surface, y[:9], y[18:])
-    rims = bicycle_rim_search(bicycle, surface)
-    out, fallen, at = np.empty((len(times), kernel.SIZE)), np.empty((2, kernel.SIZE)), np.empty(2)
-    index, t, h, steps, evaluations = 0, 0.0, 1e-3, 0, 0
-    status = kernel.MORE
-    while status == kernel.MORE:
-        status, index, t, h, more, count = kernel.dop853(
-            y,
-            times,
-            index,
-            t,
-            h,
-            tolerance,
-            _STEPS_A_CALL,
-            TABLEAU,
-            rims,
-            fall_criterion(bicycle, until_fall),
-            surface.function.real,
-            surface.parameters,
-            constants(bicycle, inputs),
-            out,
-            fallen,
-            at,
-        )
-        steps, evaluations = steps + more, evaluations + count
+    start, times = RideStart(bicycle, surface, q, qd, inputs, until_fall), np.ascontiguousarray(times, float)
+    setups, states = _set_rides_up([start], len(times))
+    riding = True
+    while riding:
+        calls = _ALL_CALLS if progress is None else 1
+        kernel.continue_rides(0, 1, calls, times, tolerance, setups, surface.function.real, states)
+        riding = states.counts[0, 0] == integrate.MORE
+        _require_start(start, states, 0)
         if progress is not None:
-            progress(min(t, float(times[-1])))
-    ended = None
+            progress(min(float(states.clock[0, 0]), float(times[-1])))
+    return _finish_ride(start, times, states, 0)
+
+
+def simulate_many(
+    starts: Sequence[RideStart], times: np.ndarray, tolerance: float = 1e-13, threads: int = 1
+) -> list[PreciseMotion | ValueError]:
+    """Integrate the rides of many starts as `simulate` does, in compiled code.
+
+    Parameters
+    ----------
+    starts : sequence of RideStart
+        They may differ in everything; those on ground of one kind share a call of compiled code.
+    times : ndarray, shape (n,)
+        Output times of all rides, not decreasing, the first >= 0 [s].
+    tolerance : float
+        Tolerance of a step's error, relative to 1 + |state|.
+    threads : int
+        Number of threads that share the starts.
+
+    Returns
+    -------
+    list of PreciseMotion or ValueError
+        In the order of the starts. Each motion has the bits that `simulate` gives for its start, whatever the other
+        starts, their order and the number of threads are. A start that `simulate` refuses has its error in place of a
+        motion; the others ride nevertheless.
+
+    Notes
+    -----
+    All samples are held at once, 30 numbers each: divide very many starts into calls of some hundred.
+    """
+    times = np.ascontiguousarray(times, float)
+    found: dict[int, PreciseMotion | ValueError] = {}
+    for kind in _group_by_ground(starts):
+        own = [starts[i] for i in kind]
+        setups, states = _set_rides_up(own, len(times))
+        function = own[0].surface.function.real
+
+        def ride(part: range, setups=setups, states=states, function=function) -> None:
+            kernel.continue_rides(part.start, part.stop, _ALL_CALLS, times, tolerance, setups, function, states)
+
+        _share(ride, len(own), threads)
+        for k, (i, start) in enumerate(zip(kind, own, strict=True)):
+            try:
+                _require_start(start, states, k)
+                found[i] = _finish_ride(start, times, states, k)
+            except ValueError as error:
+                found[i] = error
+    return [found[i] for i in range(len(starts))]
+
+
+def kernels_are_loaded() -> bool:
+    """Return whether the kernels of a ride have been compiled, or loaded from the cache, in this process."""
+    return bool(kernel.continue_rides.signatures)
+
+
+def _group_by_ground(starts: Sequence[RideStart]) -> list[list[int]]:
+    """Return the indices of starts whose grounds have the same height function, with any parameters, group by group."""
+    groups: dict[Any, list[int]] = {}
+    for i, start in enumerate(starts):
+        groups.setdefault((start.surface.function.real, start.surface.parameters.size), []).append(i)
+    return list(groups.values())
+
+
+def _share(ride: Callable[[range], None], count: int, threads: int) -> None:
+    """Call a function for all ranges of starts, in threads if there are more than one."""
+    if threads == 1 or count < 2:
+        ride(range(count))
+        return
+    size = max(1, count // (threads * _PARTS_A_THREAD))
+    parts = [range(first, min(first + size, count)) for first in range(0, count, size)]
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(ride, parts))
+
+
+class OnGround(Protocol):
+    """Anything with a bicycle on its ground, under inputs."""
+
+    @property
+    def bicycle(self) -> Bicycle:
+        """The bicycle."""
+        ...
+
+    @property
+    def surface(self) -> Surface:
+        """The ground."""
+        ...
+
+    @property
+    def inputs(self) -> Inputs:
+        """The inputs."""
+        ...
+
+
+def ride_setups(starts: Sequence[OnGround], falls: np.ndarray) -> kernel.RideSetups:
+    """Return what compiled code needs of n starts on one kind of ground; ``falls`` (n, 4) are the fall criteria."""
+    searches = [bicycle_rim_search(start.bicycle, start.surface) for start in starts]
+    return kernel.RideSetups(
+        constants=np.array([constants(start.bicycle, start.inputs) for start in starts]),
+        parameters=np.array([start.surface.parameters for start in starts]),
+        curved=np.array([search.curved for search in searches]),
+        bends=np.concatenate([search.bends for search in searches]),
+        offsets=np.cumsum([0, *(len(search.bends) for search in searches)]),
+        widths=np.array([search.width for search in searches]),
+        details=np.array([search.detail for search in searches]),
+        samples=np.array([search.samples for search in searches]),
+        falls=falls,
+    )
+
+
+def _set_rides_up(starts: Sequence[RideStart], samples: int) -> tuple[kernel.RideSetups, kernel.RideStates]:
+    """Return what the kernel needs of starts on one kind of ground, with their contacts found."""
+    n = len(starts)
+    falls = np.array([fall_criterion(start.bicycle, start.until_fall) for start in starts], float)
+    setups = ride_setups(starts, falls)
+    states = kernel.RideStates(
+        y=np.zeros((n, integrate.SIZE)),
+        clock=np.empty((n, 2)),
+        counts=np.empty((n, 4), np.int64),
+        rows=np.empty((n, samples, integrate.SIZE)),
+        force=np.empty((n, samples, 6)),
+        fallen=np.empty((n, 2, integrate.SIZE)),
+        at=np.empty((n, 2)),
+    )
+    for i, start in enumerate(starts):
+        states.y[i, :9], states.y[i, 9:18] = start.q, start.qd
+    kernel.begin_rides(0, n, setups, starts[0].surface.function.real, states)
+    return setups, states
+
+
+def _require_start(start: RideStart, states: kernel.RideStates, i: int) -> None:
+    """Raise the error of a start that the kernel has refused."""
+    status = states.counts[i, 0]
+    if status == kernel.NO_CONTACT:
+        raise ValueError(f"no contact point found at q = {states.y[i, :9].tolist()}")
+    if status == kernel.NOT_CLEAR:
+        require_clear_rims(start.bicycle, start.surface, states.y[i, :9], states.y[i, 18:])
+        raise ValueError("a rim touches the ground at a second place")
+
+
+def _finish_ride(start: RideStart, times: np.ndarray, states: kernel.RideStates, i: int) -> PreciseMotion:
+    """Return the motion of start i, whose ride has ended."""
+    status, index, steps, evaluations = (int(count) for count in states.counts[i])
+    t, ended = float(states.clock[i, 0]), None
     if status in _TOUCHING_WHEEL:
         ended = second_touch(_TOUCHING_WHEEL[status], t)
-    elif status == kernel.FELL:
+    elif status == integrate.FELL:
         ended = describe_fall(t)
-    elif status != kernel.DONE:
-        why = _describe_edge_of_ground(surface, y[18:]) or "the equations of motion become singular"
+    elif status != integrate.DONE:
+        why = _describe_edge_of_ground(start.surface, states.y[i, 18:]) or "the equations of motion become singular"
         ended = f"no solution beyond t = {t:.6g} s: {why}"
-    fall = _make_fall(fallen, at) if status == kernel.FELL else None
-    return _make_motion(bicycle, surface, inputs, times, out[:index], steps, evaluations, ended, fall)
+    fall = _make_fall(states.fallen[i], states.at[i]) if status == integrate.FELL else None
+    # Copies, so that no motion keeps the samples of all others in memory.
+    return _make_motion(times, states.rows[i, :index], states.force[i, :index].copy(), steps, evaluations, ended, fall)
 
 
 def _make_fall(fallen: np.ndarray, at: np.ndarray) -> Fall:
-    return Fall(at, *(np.ascontiguousarray(part) for part in (fallen[:, :9], fallen[:, 9:18])))
+    return Fall(at.copy(), *(np.ascontiguousarray(part) for part in (fallen[:, :9], fallen[:, 9:18])))
 
 
 def _describe_edge_of_ground(surface: Surface, contact: np.ndarray) -> str | None:
@@ -215,10 +364,10 @@ def simulate_modified_euler(
     stride = steps_per_output(times, step)
     y = np.concatenate([q, qd, contact_parameters(bicycle, surface, np.asarray(q, float))])
     require_clear_rims(bicycle, surface, y[:9], y[18:])
-    out, fallen, at = np.empty((len(times), kernel.SIZE)), np.empty((2, kernel.SIZE)), np.empty(2)
+    out, fallen, at = np.empty((len(times), integrate.SIZE)), np.empty((2, integrate.SIZE)), np.empty(2)
     out[0] = y
     count = stride * (len(times) - 1)
-    status, rows, reached = kernel.modified_euler(
+    status, rows, reached = integrate.modified_euler(
         y,
         step,
         count,
@@ -236,12 +385,14 @@ def simulate_modified_euler(
     ended, fall = None, None
     if status in _TOUCHING_WHEEL:
         ended = second_touch(_TOUCHING_WHEEL[status], reached)
-    elif status == kernel.FELL:
+    elif status == integrate.FELL:
         ended, fall = describe_fall(reached), _make_fall(fallen, at)
-    elif status != kernel.DONE:
+    elif status != integrate.DONE:
         ended = f"the state is no longer finite after t = {times[rows - 1]:.6g} s"
     steps = (rows - 1) * stride
-    return _make_motion(bicycle, surface, inputs, times, out[:rows], steps, 2 * steps, ended, fall)
+    force = np.empty((rows, 6))
+    integrate.contact_forces(out[:rows], surface.function.real, surface.parameters, constants(bicycle, inputs), force)
+    return _make_motion(times, out[:rows], force, steps, 2 * steps, ended, fall)
 
 
 def steps_per_output(times: np.ndarray, step: float) -> int:

@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 from numba import types
@@ -243,6 +243,20 @@ class Paraboloid:
     def flattened(self, fraction: float) -> Paraboloid:
         """Return the paraboloid with a fraction of alpha."""
         return Paraboloid(fraction * self.alpha)
+
+
+_revolving: dict[type, bool] = {}
+
+
+def is_of_revolution(surface: object) -> TypeGuard[SurfaceOfRevolution]:
+    """Return whether a surface is one of revolution, as all surfaces of its class are, or none.
+
+    The same as ``isinstance`` with the protocol, which takes a tenth of a millisecond.
+    """
+    kind = type(surface)
+    if kind not in _revolving:
+        _revolving[kind] = isinstance(surface, SurfaceOfRevolution)
+    return _revolving[kind]
 
 
 def is_number(value: object) -> bool:

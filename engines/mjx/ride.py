@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from time import process_time
 from typing import Any, NamedTuple
 
@@ -13,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from mujoco import mjx
 
-from ...reference.fall import Fall, heights_above_fallen
+from ...reference.fall import Fall, describe_fall, heights_above_fallen, solve_fall
 from ...reference.kinematics import WHEELS
 from ..engine import EngineError, Problem, Progress
 from ..mujoco.convergence import share
@@ -218,19 +220,24 @@ def _record_ride(
     advance, given, state = _compile_ride(setup, (model, inputs), data)
     recording = Recording.empty(len(counts))
     steps, samples, unconverged, worst, cpu_time, ended = 0, 0, 0, 0.0, 0.0, None
-    fall: Fall | None = None
-    for first in range(0, len(counts), _BLOCK):
-        block = np.array(counts[first : first + _BLOCK])
+    fall, standing = None, 0
+
+    def ride_on(state: list[Any], steps: int, block: np.ndarray) -> tuple[list[Any], dict[str, np.ndarray]]:
+        """Ride from a state after ``steps`` to each number of steps in a block, and sample there."""
         # Behind the last output the ride stays there.
         ahead = np.pad(block - steps, (0, _BLOCK - len(block)), mode="edge")
-        begun = process_time()
         state, found = jax.block_until_ready(advance(given, state, jnp.asarray(ahead, jnp.int32)))
-        cpu_time += process_time() - begun
         found = {name: np.asarray(value) for name, value in jax.device_get(found).items()}
         if setup.batch_size > 1:
             found = {name: value[settings.batch_place] for name, value in found.items()}
-        endings = (_find_ending(found, i, (steps + found["steps"][i]) * settings.step) for i in range(len(block)))
-        reached, ended = next(((i, why) for i, why in enumerate(endings) if why is not None), (len(block), None))
+        return state, found
+
+    for first in range(0, len(counts), _BLOCK):
+        block = np.array(counts[first : first + _BLOCK])
+        before, begun = (state, steps), process_time()
+        state, found = ride_on(state, steps, block)
+        cpu_time += process_time() - begun
+        reached, ended = _find_first_ending(found, steps, len(block), settings.step)
         last = min(reached, len(block) - 1)
         for name in _RECORDED:
             getattr(recording, name)[first : first + reached] = found[name][:reached]
@@ -239,9 +246,16 @@ def _record_ride(
         steps += int(found["steps"][last])
         unconverged, worst = unconverged + int(found["unconverged"][last]), max(worst, float(found["worst"][last]))
         if not problem.beyond_fall:
-            standing, fall = _find_fall(problem, recording, max(first - 1, 0), samples)
-            if fall is not None:
-                samples, ended = standing, "the bicycle fell"
+            begun = process_time()
+            standing = _count_standing(problem, recording, max(first - 1, 0), samples)
+            if standing > 0 and (standing < samples or ended is not None):
+                around = counts[standing - 1], counts[standing] if standing < samples else steps
+                fall = _narrow_fall(problem, settings.step, partial(ride_on, *before), before[1], around)
+            cpu_time += process_time() - begun
+        if fall is not None:
+            heights = heights_above_fallen(problem.bicycle, problem.surface, fall.q, fall.qd)
+            samples, ended = standing, describe_fall(solve_fall(fall.time, *heights))
+            steps = round(fall.time[1] / settings.step)  # the call has gone on to the end of its block
         if ended is not None:
             break
         progress(steps * settings.step)
@@ -259,19 +273,61 @@ def _record_ride(
     )
 
 
-def _find_fall(problem: Problem, recording: Recording, first: int, samples: int) -> tuple[int, Fall | None]:
-    """Look for a fall in samples from ``first`` on; return the number of samples before it, and those around it.
-
-    MJX rides many outputs in one compiled call, so the states around a fall are samples.
-    """
+def _count_standing(problem: Problem, recording: Recording, first: int, samples: int) -> int:
+    """Return the number of samples before the first, from ``first`` on, in which the bicycle has fallen."""
     part = slice(first, samples)
     q, qd = from_mujoco(recording.time[part], recording.qpos[part], recording.qvel[part], problem.q)
-    low = np.flatnonzero(heights_above_fallen(problem.bicycle, problem.surface, q, qd)[0] < 0)
-    if len(low) == 0 or low[0] == 0:
-        return samples, None
-    k = int(low[0])
-    around = slice(k - 1, k + 1)
-    return first + k, Fall(recording.time[part][around].copy(), q[around], qd[around])
+    return first + _find_lying(problem, q, qd)
+
+
+def _find_lying(problem: Problem, q: np.ndarray, qd: np.ndarray) -> int:
+    """Return the index of the first state in which the bicycle has fallen; the number of states if there is none."""
+    low = np.flatnonzero(heights_above_fallen(problem.bicycle, problem.surface, q, qd)[0] <= 0)
+    return int(low[0]) if len(low) else len(q)
+
+
+def _narrow_fall(
+    problem: Problem,
+    step: float,
+    ride_again: Callable[[np.ndarray], tuple[list[Any], dict[str, np.ndarray]]],
+    begun: int,
+    around: tuple[int, int],
+) -> Fall | None:
+    """Return the states around a fall, one step apart; None if the bicycle stands as long as it can ride.
+
+    MJX rides many outputs in one compiled call. The same call rides the block again, with outputs that are closer to
+    each other.
+
+    Parameters
+    ----------
+    problem : Problem
+    step : float
+        [s].
+    ride_again : callable
+        Rides the block again, and returns its end and samples after the given numbers of steps.
+    begun : int
+        Number of steps before the block.
+    around : tuple of int
+        Numbers of steps after which the bicycle stands, and has fallen or cannot ride on.
+    """
+    while True:
+        counts = np.unique(np.linspace(*around, _BLOCK).astype(int))
+        _, found = ride_again(counts)
+        going, _ = _find_first_ending(found, begun, len(counts), step)
+        q, qd = from_mujoco(counts[:going] * step, found["qpos"][:going], found["qvel"][:going], problem.q)
+        k = _find_lying(problem, q, qd)
+        if k in (0, len(counts)):
+            return None
+        if counts[k] - counts[k - 1] == 1:
+            pair = slice(k - 1, k + 1)
+            return Fall(counts[pair] * step, q[pair], qd[pair]) if k < going else None
+        around = int(counts[k - 1]), int(counts[k])
+
+
+def _find_first_ending(found: dict[str, np.ndarray], steps: int, outputs: int, step: float) -> tuple[int, str | None]:
+    """Return the number of outputs of a block, begun after ``steps``, that the ride reaches, and why it then ends."""
+    endings = (_find_ending(found, i, (steps + found["steps"][i]) * step) for i in range(outputs))
+    return next(((i, why) for i, why in enumerate(endings) if why is not None), (outputs, None))
 
 
 def _find_ending(found: dict[str, np.ndarray], i: int, time: float) -> str | None:

@@ -77,6 +77,54 @@ class Recording:
         return Recording(*(getattr(self, name)[:n] for name in self.__dataclass_fields__))
 
 
+class HeightLook:
+    """Look for the fall of the bicycle in MuJoCo's state.
+
+    Parameters
+    ----------
+    data : mujoco.MjData
+    problem : Problem
+    """
+
+    def __init__(self, data: mujoco.MjData, problem: Problem) -> None:
+        self._data, self._start = data, problem.q
+        self.watch = FallWatch(problem.bicycle, problem.surface, self._convert)
+        function, parameters = problem.surface.function.real, problem.surface.parameters
+        arguments = (data.qpos, fall_criterion(problem.bicycle), function, parameters)
+        # Inferring the types in every call would take numba longer than MuJoCo takes for a step.
+        self._height = partial(find_height.compile(tuple(typeof(argument) for argument in arguments)), *arguments)
+
+    def __call__(self, time: float) -> Ending | None:
+        """Return when and why the ride ends, None if it does not."""
+        if not self.watch.is_due(time):
+            return None
+        return self.watch.look(time, self._height(), (self._data.qpos.copy(), self._data.qvel.copy()))
+
+    def _convert(
+        self, times: np.ndarray, states: tuple[tuple[np.ndarray, np.ndarray], ...]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        qpos, qvel = (np.array(part) for part in zip(*states, strict=True))
+        return from_mujoco(times, qpos, qvel, self._start)
+
+
+@dataclass(frozen=True)
+class RideLook:
+    """Look at the rims of both wheels, and for the fall of the bicycle unless ``height`` is None."""
+
+    rims: Callable[[float], Ending | None]
+    height: HeightLook | None
+
+    def __call__(self, time: float) -> Ending | None:
+        """Return when and why the ride ends at a time [s], None if it goes on."""
+        found = [self.rims(time), None if self.height is None else self.height(time)]
+        return min((one for one in found if one is not None), key=lambda ending: ending.time, default=None)
+
+    @property
+    def near(self) -> bool:
+        """Whether the bicycle is so near its fall that every step is to be looked at."""
+        return self.height is not None and self.height.watch.near
+
+
 @dataclass(frozen=True)
 class Rig:
     """A model with its state and its contact with the ground.
@@ -90,13 +138,12 @@ class Rig:
     wheels : dict of int
         Wheel, 0 rear and 1 front, by MuJoCo's id of its geom.
     follow : callable
-        Updates the contacts. To be called every ``stride`` steps and before the first; returns False if a wheel has no
-        contact point.
+        Updates the contacts. To be called before the first step and after each for which `is_due` says so; returns
+        False if a wheel has no contact point.
     stride : int
         Counted from the start, so that the end of a ride does not depend on the output times.
-    look : callable
-        Checks the rims, and whether the bicycle has fallen. To be called after ``follow``, with the time [s]; returns
-        why the ride ends there, or None.
+    look : RideLook
+        Checks the rims, and whether the bicycle has fallen. To be called after ``follow``, with the time [s].
     forces : callable
         Fills an array (2, 3) with the contact forces of the last evaluation, inertial axes [N].
     callbacks : callable
@@ -111,10 +158,14 @@ class Rig:
     wheels: dict[int, int]
     follow: Callable[[], bool]
     stride: int
-    look: Callable[[float], Ending | None]
+    look: RideLook
     forces: Callable[[np.ndarray], None]
     callbacks: Callable[[], AbstractContextManager[Convergence]]
     judged: bool = True
+
+    def is_due(self, steps: int) -> bool:
+        """Return whether to follow the ground and to look after a number of steps: at all of them near a fall."""
+        return steps % self.stride == 0 or self.look.near
 
 
 @dataclass(frozen=True)
@@ -168,25 +219,18 @@ def set_start(problem: Problem, settings: StepSettings, touching: Touching) -> t
     return model, data
 
 
-def make_look(data: mujoco.MjData, problem: Problem, every: int = 1) -> Callable[[float], Ending | None]:
-    """Return the function that checks both rims for a `Rig`, and whether the bicycle has fallen.
+def make_look(data: mujoco.MjData, problem: Problem, every: int = 1) -> RideLook:
+    """Return the look at both rims and at the height of the bicycle for a `Rig`.
 
-    It checks the rims in one of ``every`` calls, and the fall about every `LOOK_INTERVAL`.
+    It looks at the rims in one of ``every`` calls, and at the height about every `LOOK_INTERVAL`.
 
     Raises
     ------
     EngineError
         If a rim lies inside the ground at the start.
     """
-    looks = [_look_at_rims(data, problem, every)]
-    if not problem.beyond_fall:
-        looks.append(_look_at_fall(data, problem))
-
-    def look(time: float) -> Ending | None:
-        found = [ending for watch in looks if (ending := watch(time)) is not None]
-        return min(found, key=lambda ending: ending.time, default=None)
-
-    return look
+    rims = _look_at_rims(data, problem, every)
+    return RideLook(rims, None if problem.beyond_fall else HeightLook(data, problem))
 
 
 def _look_at_rims(data: mujoco.MjData, problem: Problem, every: int) -> Callable[[float], Ending | None]:
@@ -205,24 +249,6 @@ def _look_at_rims(data: mujoco.MjData, problem: Problem, every: int) -> Callable
             return None
         pose()
         return watch.look(time)
-
-    return look
-
-
-def _look_at_fall(data: mujoco.MjData, problem: Problem) -> Callable[[float], Ending | None]:
-    def convert(times: np.ndarray, states: tuple[tuple[np.ndarray, np.ndarray], ...]) -> tuple[np.ndarray, np.ndarray]:
-        qpos, qvel = (np.array(part) for part in zip(*states, strict=True))
-        return from_mujoco(times, qpos, qvel, problem.q)
-
-    watch = FallWatch(problem.bicycle, problem.surface, convert)
-    function, parameters = problem.surface.function.real, problem.surface.parameters
-    arguments = (data.qpos, fall_criterion(problem.bicycle), function, parameters)
-    height = partial(find_height.compile(tuple(typeof(argument) for argument in arguments)), *arguments)
-
-    def look(time: float) -> Ending | None:
-        if not watch.is_due(time):
-            return None
-        return watch.look(time, height(), (data.qpos.copy(), data.qvel.copy()))
 
     return look
 
@@ -303,10 +329,10 @@ def advance(rig: Rig, step: float, steps: int, until: int) -> tuple[int, bool, E
     bicycle falls.
     """
     while steps < until:
-        more = min(until - steps, rig.stride - steps % rig.stride)
+        more = 1 if rig.look.near else min(until - steps, rig.stride - steps % rig.stride)
         mujoco.mj_step(rig.model, rig.data, more)
         steps += more
-        if steps % rig.stride == 0:
+        if rig.is_due(steps):
             standing, ending = rig.follow(), rig.look(steps * step)
             if ending is not None or not standing:
                 return steps, standing, ending

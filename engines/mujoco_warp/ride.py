@@ -96,7 +96,7 @@ class WarpRide:
         """Take a step from an evaluated state, and evaluate the new one."""
         _INTEGRATE[self.settings.integrator](self.model, self.data)
         self.steps += 1
-        if self.steps % self.rig.stride == 0:
+        if self.rig.is_due(self.steps):
             for name in ("qpos", "qvel"):
                 getattr(self.rig.data, name)[:] = getattr(self.data, name).numpy()[self.settings.batch_place]
             if self.standing and np.all(np.abs(self.rig.data.qpos) < _HUGE):

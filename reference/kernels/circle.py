@@ -114,15 +114,19 @@ def _build_turn(u, function, parameters, a):
     return Turn(here, rear, front, size, force, system)
 
 
-@jit
-def circle_residual(u, function, parameters, a, out):
-    """Fill ``out`` (8,) from the unknowns ``u`` (9,); ``a`` the `Aligned` constants."""
-    turn = _build_turn(u, function, parameters, a)
+@jit_inline
+def _fill_rows(turn, out):
     alpha, steer, _, _ = solve(turn.system)
     out[0], out[1] = turn.rear.point.height, turn.rear.point.dip
     out[2], out[3] = turn.front.point.height, turn.front.point.dip
     out[4], out[5] = turn.rear.slip, turn.front.slip
     out[6], out[7] = dot(turn.here.ahead, alpha), steer
+
+
+@jit
+def circle_residual(u, function, parameters, a, out):
+    """Fill ``out`` (8,) from the unknowns ``u`` (9,); ``a`` the `Aligned` constants."""
+    _fill_rows(_build_turn(u, function, parameters, a), out)
 
 
 @jit
@@ -137,10 +141,8 @@ def circle_jacobian(u, function, parameters, a, out):
             out[i, j] = r[i].imag / STEP
 
 
-@jit
-def unfold(u, function, parameters, a, out):
-    """Fill ``out`` (22,), all unknowns of `steady`, from a solution ``u`` (9,); the yaw rate is taken positive."""
-    turn = _build_turn(u, function, parameters, a)
+@jit_inline
+def _fill_unknowns(u, turn, a, out):
     zero = 0 * u[0]
     rest = (zero, zero, zero)
     on_front = front_force(turn.system, rest, zero, zero, zero)
@@ -154,3 +156,17 @@ def unfold(u, function, parameters, a, out):
     out[13], out[14], out[15] = turn.front.point.xi, turn.front.point.eta, u[8]
     out[16], out[17], out[18] = to_inertial(turn.here, scale(1 / weight, on_rear))
     out[19], out[20], out[21] = to_inertial(turn.here, scale(1 / weight, on_front))
+
+
+@jit
+def unfold(u, function, parameters, a, out):
+    """Fill ``out`` (22,), all unknowns of `steady`, from a solution ``u`` (9,); the yaw rate is taken positive."""
+    _fill_unknowns(u, _build_turn(u, function, parameters, a), a, out)
+
+
+@jit
+def circle_and_unknowns(u, function, parameters, a, rows, full):
+    """Fill what `circle_residual` does, rows (8,), and what `unfold` does, full (22,)."""
+    turn = _build_turn(u, function, parameters, a)
+    _fill_rows(turn, rows)
+    _fill_unknowns(u, turn, a, full)

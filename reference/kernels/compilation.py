@@ -6,13 +6,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 from weakref import WeakSet
 
 import numba as nb
-from numba.core import event, sigutils
+from numba.core import event, sigutils, types
 from numba.core.ccallback import CFunc
 from numba.core.dispatcher import Dispatcher
+from numba.extending import typeof_impl
 
 from .cache import KernelCache, is_cacheable
 
@@ -70,6 +72,11 @@ def jit(function: Callable[..., Any]) -> Any:
     return _declare(nb.njit(error_model="numpy")(function))
 
 
+def jit_released(function: Callable[..., Any]) -> Any:
+    """Compile a kernel as `jit` does; it releases the interpreter's lock, so that threads can share its work."""
+    return _declare(nb.njit(error_model="numpy", nogil=True)(function))
+
+
 def jit_inline(function: Callable[..., Any]) -> Any:
     """Compile a kernel as `jit` does, and always inline it.
 
@@ -87,6 +94,20 @@ def _declare(kernel: Any) -> Any:
     return kernel
 
 
+class _Callback(CFunc):
+    """A C callback that keeps its type as an argument of kernels, which numba would make anew for every call."""
+
+    @cached_property
+    def numba_type(self) -> types.FunctionType:
+        """Type of the callback as a first-class function."""
+        return types.FunctionType(self._sig)
+
+
+@typeof_impl.register(_Callback)
+def _typeof_callback(callback: _Callback, context: Any) -> types.FunctionType:
+    return callback.numba_type
+
+
 def compile_callback(signature: Any, cache: bool = True, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Make a decorator that compiles a function to a C callback.
 
@@ -102,7 +123,7 @@ def compile_callback(signature: Any, cache: bool = True, **options: Any) -> Call
     """
 
     def compile_function(function: Callable[..., Any]) -> Any:
-        callback = CFunc(function, sigutils.normalize_signature(signature), locals={}, options=options)
+        callback = _Callback(function, sigutils.normalize_signature(signature), locals={}, options=options)
         if cache and is_cacheable(function):
             callback._cache = KernelCache(function)
         try:

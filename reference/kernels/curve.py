@@ -18,8 +18,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .circle import COORDINATES, FULL, ROWS, STEP, circle_jacobian, circle_residual, unfold
+from .circle import COORDINATES, FULL, ROWS, STEP, circle_and_unknowns, circle_jacobian, circle_residual, unfold
 from .compilation import jit
+from .linear import invert
 from .reduced import FRONT, REAR, VARIABLES, reduced_jacobian, telling_spin
 from .steady import running_rates, steady_energy
 
@@ -65,8 +66,7 @@ def expanded(u, function, parameters, a, rows, jacobian, full, basis):
     z, r, out = u.astype(np.complex128), np.empty(ROWS, np.complex128), np.empty(FULL, np.complex128)
     for j in range(COORDINATES):
         z[j] = complex(u[j], STEP)
-        circle_residual(z, function, parameters, a, r)
-        unfold(z, function, parameters, a, out)
+        circle_and_unknowns(z, function, parameters, a, r, out)
         z[j] = u[j]
         for i in range(ROWS):
             rows[i], jacobian[i, j] = r[i].real, r[i].imag / STEP
@@ -75,44 +75,11 @@ def expanded(u, function, parameters, a, rows, jacobian, full, basis):
 
 
 @jit
-def _invert(a, n):
-    """Overwrite ``a`` (n, n) with its inverse by Gauss-Jordan elimination; return its determinant's sign."""
-    order, sign = np.arange(n), 1.0
-    for k in range(n):
-        p = k
-        for i in range(k + 1, n):
-            if abs(a[i, k]) > abs(a[p, k]):
-                p = i
-        if p != k:
-            sign = -sign
-        order[k], order[p] = order[p], order[k]
-        for j in range(n):
-            a[k, j], a[p, j] = a[p, j], a[k, j]
-        sign *= np.sign(a[k, k])
-        inverse = 1.0 / a[k, k]
-        a[k, k] = 1.0
-        for j in range(n):
-            a[k, j] *= inverse
-        for i in range(n):
-            if i != k:
-                factor = a[i, k]
-                a[i, k] = 0.0
-                for j in range(n):
-                    a[i, j] -= factor * a[k, j]
-    row = np.empty(n)
-    for i in range(n):
-        for k in range(n):
-            row[order[k]] = a[i, k]
-        a[i] = row
-    return sign
-
-
-@jit
 def _invert_bordered(u, covector, function, parameters, a, inverse):
     """Fill the inverse (9, 9) of the Jacobian bordered by a covector; return the determinant's sign."""
     circle_jacobian(u, function, parameters, a, inverse[:ROWS])
     inverse[ROWS] = covector
-    return _invert(inverse, COORDINATES)
+    return invert(inverse, COORDINATES)
 
 
 @jit

@@ -6,6 +6,8 @@ complex *symmetric* matrix and solve square systems with pivots chosen by their 
 
 from __future__ import annotations
 
+import numpy as np
+
 from .compilation import jit
 
 
@@ -70,3 +72,36 @@ def solve_three(a, b):
     x1 = a00 * (b[1] * a22 - a12 * b[2]) + b[0] * c1 + a02 * (a10 * b[2] - b[1] * a20)
     x2 = a00 * (a11 * b[2] - b[1] * a21) + a01 * (b[1] * a20 - a10 * b[2]) + b[0] * c2
     return x0 * inverse, x1 * inverse, x2 * inverse
+
+
+@jit
+def invert(a, n):
+    """Overwrite ``a`` (n, n) with its inverse by Gauss-Jordan elimination; return its determinant's sign."""
+    order, sign = np.arange(n), 1.0
+    for k in range(n):
+        p = k
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > abs(a[p, k]):
+                p = i
+        if p != k:
+            sign = -sign
+        order[k], order[p] = order[p], order[k]
+        for j in range(n):
+            a[k, j], a[p, j] = a[p, j], a[k, j]
+        sign *= np.sign(a[k, k])
+        inverse = 1.0 / a[k, k]
+        a[k, k] = 1.0
+        for j in range(n):
+            a[k, j] *= inverse
+        for i in range(n):
+            if i != k:
+                factor = a[i, k]
+                a[i, k] = 0.0
+                for j in range(n):
+                    a[i, j] -= factor * a[k, j]
+    row = np.empty(n)
+    for i in range(n):
+        for k in range(n):
+            row[order[k]] = a[i, k]
+        a[i] = row
+    return sign

@@ -31,6 +31,8 @@ from ...reference.bicycle import BODIES, Bicycle
 from ...reference.contact import observe
 from ...reference.kinematics import COORDINATES, FRONT_ANGLE, REAR_ANGLE, WHEELS, YAW, body_positions, body_quaternions
 from ...reference.surface import Surface
+from .kernels.quadrature import integrate_samples
+from .kernels.worst import find_worst
 from .limits import START_ERROR
 
 # Largest ratio of two errors of one computation. A method of order 1 leaves in its first steps as much between rates
@@ -39,7 +41,6 @@ ROOM = 4.0
 # Largest step noise that an engine may claim.
 LARGEST_NOISE = 1e-6
 _SAMPLES = 6  # samples per polynomial; the quadrature's error is of seventh order in the output interval
-_ROWS = 1 << 14  # output intervals that are integrated at once: a long ride's stencils would take six times its rates
 _FEWEST = 4  # least number of samples of a ride that shows the quadrature's error
 
 _WHEELS = tuple(f"{wheel}_wheel" for wheel in WHEELS)
@@ -53,10 +54,9 @@ def evaluate_ride(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) ->
     Where a wheel has no closest approach, its contact point, gap and slip are NaN. Forces stay the engine's.
     """
     observed = observe(bicycle, surface, trajectory.q, trajectory.qd)
-    lost = (
-        np.zeros(len(trajectory.q), bool) if observed.found else _samples_without_contact(trajectory, bicycle, surface)
+    point, gap, slip = (
+        _replace_by_nan(values, observed.lost) for values in (observed.point, observed.gap, observed.slip)
     )
-    point, gap, slip = (_replace_by_nan(values, lost) for values in (observed.point, observed.gap, observed.slip))
     return replace(
         trajectory,
         body_position=body_positions(bicycle, trajectory.q),
@@ -67,12 +67,6 @@ def evaluate_ride(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) ->
         kinetic_energy=observed.kinetic_energy,
         potential_energy=observed.potential_energy,
     )
-
-
-def _samples_without_contact(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> np.ndarray:
-    """Return the samples in which a closest approach could not be computed, boolean of shape (n,)."""
-    states = zip(trajectory.q, trajectory.qd, strict=True)
-    return np.array([not observe(bicycle, surface, q[None], qd[None]).found for q, qd in states])
 
 
 def _replace_by_nan(values: np.ndarray, lost: np.ndarray) -> np.ndarray:
@@ -249,16 +243,13 @@ def _find_worst(report: Report, time: np.ndarray) -> Mismatch:
 
     Values that are not finite are reported elsewhere: NaN counts as no difference here.
     """
-    difference = np.minimum(np.where(np.isnan(report.difference), 0.0, report.difference), np.finfo(float).max)
-    limit = np.broadcast_to(report.limit, difference.shape)
-    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        share = np.where(difference > 0, difference / limit, 0.0)
-    sample, part = np.unravel_index(np.argmax(share), difference.shape)
+    limits = np.ascontiguousarray(np.broadcast_to(report.limit, report.difference.shape))
+    sample, part, difference, limit = find_worst(np.ascontiguousarray(report.difference), limits)
     return Mismatch(
         quantity=report.quantity,
         part=report.parts[part],
-        difference=float(difference[sample, part]),
-        limit=float(limit[sample, part]),
+        difference=difference,
+        limit=limit,
         unit=report.unit,
         time=float(time[sample]),
     )
@@ -287,18 +278,6 @@ def _compare_rates(reported: Trajectory, exact: Trajectory, room: np.ndarray) ->
 
 def _integrate_samples(time: np.ndarray, values: np.ndarray, samples: int) -> np.ndarray:
     """Return the integrals (n - 1, k) between samples of the polynomials through the nearest ``samples`` samples."""
-    n, interval = len(time), np.diff(time)
-    samples = min(samples, n)
-    first = np.clip(np.arange(n - 1) - (samples // 2 - 1), 0, n - samples)
-    nearest = first[:, None] + np.arange(samples)
-    nodes = (time[nearest] - time[:-1, None]) / interval[:, None]
-    moments = 1 / np.arange(1, samples + 1)
-    # On an even grid all stencils except those at the ends are the same.
-    _, kinds, kind = np.unique(np.round(nodes, 9), axis=0, return_index=True, return_inverse=True)
-    powers = nodes[kinds, None, :] ** np.arange(samples)[:, None]
-    weights = np.linalg.solve(powers, np.broadcast_to(moments, (len(kinds), samples))[..., None])[..., 0]
-    weights, integral = weights[kind.reshape(-1)], np.empty((n - 1, values.shape[1]))
-    for begin in range(0, n - 1, _ROWS):
-        rows = slice(begin, begin + _ROWS)
-        np.einsum("ks,ksj->kj", weights[rows], values[nearest[rows]], out=integral[rows])
-    return interval[:, None] * integral
+    integrals = np.empty((len(time) - 1, values.shape[1]))
+    integrate_samples(np.ascontiguousarray(time), np.ascontiguousarray(values), samples, integrals)
+    return integrals

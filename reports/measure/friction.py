@@ -5,15 +5,24 @@ from __future__ import annotations
 import numpy as np
 
 from ...engines.engine import Trajectory
-from ...reference.surface import Surface, unit_normals
+from ...reference.surface import Surface
+from .kernels.forces import split_forces
 
 
 def normal_force(trajectory: Trajectory, surface: Surface) -> np.ndarray | None:
     """Return the contact forces along the surface's upward normal, shape (n, 2) [N]; None where they are not given."""
+    parts = _split_forces(trajectory, surface)
+    return None if parts is None else parts[0]
+
+
+def _split_forces(trajectory: Trajectory, surface: Surface) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the contact forces along the surface's upward normal and across it, each of shape (n, 2) [N]."""
     if trajectory.contact_force is None or trajectory.contact_point is None:
         return None
-    point = trajectory.contact_point
-    return np.sum(trajectory.contact_force * unit_normals(surface, point[..., 0], point[..., 1]), axis=-1)
+    point, force = (np.ascontiguousarray(part) for part in (trajectory.contact_point, trajectory.contact_force))
+    pressure, tangential = np.empty(force.shape[:2]), np.empty(force.shape[:2])
+    split_forces(point, force, surface.function.real, surface.parameters, pressure, tangential)
+    return pressure, tangential
 
 
 def required_friction(trajectory: Trajectory, surface: Surface) -> np.ndarray:
@@ -35,12 +44,10 @@ def required_friction(trajectory: Trajectory, surface: Surface) -> np.ndarray:
     ValueError
         If the trajectory has no contact points or forces.
     """
-    if trajectory.contact_point is None or trajectory.contact_force is None:
+    parts = _split_forces(trajectory, surface)
+    if parts is None:
         raise ValueError(f"{trajectory.engine} gives no contact forces")
-    point, force = trajectory.contact_point, trajectory.contact_force
-    normal = unit_normals(surface, point[..., 0], point[..., 1])
-    pressure = np.sum(force * normal, axis=-1)
-    tangential = np.linalg.norm(force - pressure[..., None] * normal, axis=-1)
+    pressure, tangential = parts
     # A wheel in the air needs no friction.
     ratio = np.divide(tangential, pressure, out=np.full(pressure.shape, np.inf), where=pressure > 0)
     return np.where((pressure == 0) & (tangential == 0), 0.0, ratio)

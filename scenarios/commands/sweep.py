@@ -42,7 +42,8 @@ def sweep_command(
         typer.Option(
             metavar="Y:X",
             help="Figure of a quantity over a field with all runs, e.g. position_error_max:motion.rear_rate, or "
-            "energy_drift:engines.*.step for each engine's own setting; may be given several times.",
+            "energy_drift:engines.*.step for each engine's own setting; Z:X,Y is a map of a quantity, or of the share "
+            "of a status, e.g. fell:surface.alpha,motion.rear_rate. May be given several times.",
         ),
     ] = None,
     formats: FormatOption = None,

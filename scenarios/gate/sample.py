@@ -154,8 +154,9 @@ def take_sample(
     scale = replace(scale_of(start), duration=float(standing.time[-1]))
     if engine.name != REFERENCE and exact.is_copied_by(standing):
         raise EngineError("it returned the reference's own trajectory")
-    # Number of steps in the measured part of the ride.
-    steps = trajectory.steps * scale.duration / float(trajectory.time[-1])
+    # Number of steps in the measured part of the ride, which a fall ends after the last sample.
+    end = trajectory.time[-1] if trajectory.fall is None else trajectory.fall.time[1]
+    steps = trajectory.steps * scale.duration / float(end)
     reports = find_mismatches(reported, standing, exact.trajectory, start.size, step_noise)
     values = _measure_ride(start, reported, standing, exact.trajectory, scale) | {
         "report_mismatch": max(report.share for report in reports),

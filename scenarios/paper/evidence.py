@@ -9,10 +9,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ...reference.bicycle import Bicycle
-from ...reference.circular import LARGEST_RESIDUAL, SIGMA, CircularMotion, Steady
+from ...reference.circular import SIGMA, CircularMotion, Steady
 from ...reference.critical import CriticalPoint, reconnections
 from ...reference.curve import Samples
 from ...reference.families import FAMILIES, Family, find_motions, trace
+from ...reference.kernels.newton import LARGEST_RESIDUAL
 from ...reference.sections import SectionEnd, sample_family, stable_sections
 from ...reference.special import SpecialPoint, special_points
 from ...reference.surface import Paraboloid

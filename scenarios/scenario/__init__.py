@@ -24,7 +24,7 @@ from .schema import (
     read_scenario_file,
     validate_scenario,
 )
-from .start import Start, describe_missing_motion, make_start, output_times
+from .start import Start, describe_missing_motion, make_start, make_starts, output_times
 from .surfaces import make_bowl, name_surface, parse_surface
 from .table import (
     Table,
@@ -37,6 +37,7 @@ from .table import (
     set_keys,
     show_value,
 )
+from .template import ScenarioTemplate
 from .units import find_unit
 
 __all__ = [
@@ -49,6 +50,7 @@ __all__ = [
     "EngineChoice",
     "Gate",
     "Scenario",
+    "ScenarioTemplate",
     "Simulation",
     "Start",
     "Table",
@@ -70,6 +72,7 @@ __all__ = [
     "load_scenario",
     "make_bowl",
     "make_start",
+    "make_starts",
     "name_bicycle",
     "name_surface",
     "output_times",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -208,11 +209,16 @@ class Scenario(Table):
 
     def make_bicycle(self) -> Bicycle:
         """Build the benchmark bicycle with this scenario's overrides."""
-        return Bicycle(**self.bicycle)
+        return _make_bicycle(tuple(self.bicycle.items()))
 
     def make_inputs(self) -> Inputs:
         """Make the inputs of this scenario's rides."""
         return Inputs(**self.inputs.model_dump())
+
+
+@lru_cache(maxsize=64)
+def _make_bicycle(changed: tuple[tuple[str, float], ...]) -> Bicycle:
+    return Bicycle(**dict(changed))
 
 
 def _list_bicycle_faults(values: Mapping[str, float]) -> list[str]:

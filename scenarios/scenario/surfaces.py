@@ -10,7 +10,7 @@ from pydantic import Field, TypeAdapter, ValidationError, field_validator, model
 from ...reference.bowls import Cone, Sphere, Torus
 from ...reference.height_field import HeightField
 from ...reference.profile import PolynomialProfile, SplineProfile
-from ...reference.surface import InclinedPlane, Paraboloid, Plane, Surface, SurfaceOfRevolution
+from ...reference.surface import InclinedPlane, Paraboloid, Plane, Surface, SurfaceOfRevolution, is_of_revolution
 from ..error import ScenarioError
 from .table import Table, format_validation_error, read_toml, show_value
 
@@ -235,7 +235,7 @@ def make_bowl(ground: Surface | float) -> SurfaceOfRevolution:
     except ValueError as error:
         where = "" if str(error).startswith("alpha") else f"alpha is {ground!r}; it "
         raise ScenarioError(f"{where}{error}") from error
-    if not isinstance(surface, SurfaceOfRevolution):
+    if not is_of_revolution(surface):
         raise ScenarioError(
             f"circular motions ride on a surface of revolution; {describe_surface(surface)['kind']} is none"
         )

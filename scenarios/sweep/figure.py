@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -19,12 +19,15 @@ from ..error import ScenarioError
 from ..files import FigureOutput, make_folder
 from ..run import read_json
 from ..scenario import find_unit, show_value
+from .map_figure import MapPlot, select_map_runs
 from .plan import SweepPlan
 from .rows import METRICS, ROW_FACTS, TIMING
 from .store import MANIFEST, SWEEP_VERSION, TIMINGS, part_of
 
 if TYPE_CHECKING:
-    from ...reports.figures import SweepAxis, SweepRuns
+    from matplotlib.figure import Figure
+
+    from ...reports.figures import SweepAxis, SweepMap, SweepRuns
 
 FIGURES = "figures"
 _ANY_ENGINE = "engines.*."  # begins a key that names a setting of each engine's own
@@ -47,32 +50,38 @@ class SweepPlot:
     x: str
 
     @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the data set that the figure shows."""
+        return self.y, self.x
+
+    @property
     def name(self) -> str:
         """Name of its files, without ending."""
         return f"{self.y}-over-{self.x}".replace("*", "any").replace("/", "-")
 
 
-def parse_plots(texts: Iterable[str]) -> list[SweepPlot]:
+def parse_plots(texts: Iterable[str]) -> list[SweepPlot | MapPlot]:
     """Parse values of ``--plot``.
 
     Raises
     ------
     ScenarioError
-        If one of them is not ``Y:X``.
+        If one of them is neither ``Y:X`` nor ``Z:X,Y``.
     """
-    plots = []
+    plots: list[SweepPlot | MapPlot] = []
     for text in texts:
         y, colon, x = text.partition(":")
-        if not (y and colon and x) or ":" in x:
+        fields = x.split(",")
+        if not (y and colon and all(fields)) or ":" in x or len(fields) > 2:
             raise ScenarioError(
                 f"--plot {show_value(text)}: must be Y:X, e.g. position_error_max:motion.rear_rate or "
-                "position_error_max:engines.*.step"
+                "position_error_max:engines.*.step, or Z:X,Y, e.g. fell:surface.alpha,motion.rear_rate"
             )
-        plots.append(SweepPlot(y, x))
+        plots.append(SweepPlot(y, x) if len(fields) == 1 else MapPlot(y, *fields))
     return plots
 
 
-def check_plots(plots: Iterable[SweepPlot], plan: SweepPlan) -> None:
+def check_plots(plots: Iterable[SweepPlot | MapPlot], plan: SweepPlan) -> None:
     """Refuse plots of columns that the data set of a sweep will not have, before anything runs.
 
     Raises
@@ -83,10 +92,11 @@ def check_plots(plots: Iterable[SweepPlot], plan: SweepPlan) -> None:
     facts = {**ROW_FACTS, **METRICS}
     known = {*facts, *_TIMES, *(key for task in plan.tasks for key in task.changes)}
     for plot in plots:
-        for column in (plot.y, plot.x):
+        for column in plot.columns:
             _check_column(column, known)
-        if facts.get(plot.y) == pa.string():
-            raise _refuse_texts(plot.y)
+        for column in plot.columns if isinstance(plot, MapPlot) else (plot.y,):
+            if facts.get(column) == pa.string():
+                raise _refuse_texts(column)
 
 
 def _check_column(column: str, known: Collection[str]) -> None:
@@ -117,14 +127,15 @@ def read_sweep_folder(folder: Path) -> dict[str, Any]:
     return manifest
 
 
-def write_sweep_figures(folder: Path, plots: Sequence[SweepPlot], output: FigureOutput) -> list[Path]:
+def write_sweep_figures(folder: Path, plots: Sequence[SweepPlot | MapPlot], output: FigureOutput) -> list[Path]:
     """Draw figures of a finished sweep from its Parquet files.
 
     Parameters
     ----------
     folder : Path
         The sweep's folder; the figures are written into its subfolder `FIGURES`.
-    plots : sequence of SweepPlot
+    plots : sequence of SweepPlot or MapPlot
+        Of a map each engine has a figure of its own.
     output : FigureOutput
 
     Returns
@@ -137,7 +148,7 @@ def write_sweep_figures(folder: Path, plots: Sequence[SweepPlot], output: Figure
     ScenarioError
         If the folder is not that of a finished sweep, has no such column, or a column has no numbers.
     """
-    from ...reports.figures import sweep_figure, write_formats
+    from ...reports.figures import write_formats
 
     manifest = read_sweep_folder(folder)
     title = str(manifest.get("title") or folder.resolve().name)
@@ -145,13 +156,48 @@ def write_sweep_figures(folder: Path, plots: Sequence[SweepPlot], output: Figure
     known = {column for table in tables.values() for column in table.column_names}
     written: list[Path] = []
     for plot in plots:
-        for column in (plot.y, plot.x):
+        for column in plot.columns:
             _check_column(column, known)
-        x_axis, y_axis, runs, joined = _select_runs(tables, plot)
+        drawings = _prepare_maps(tables, plot) if isinstance(plot, MapPlot) else {plot.name: _prepare(tables, plot)}
         make_folder(folder / FIGURES)
-        draw = partial(sweep_figure, title, x_axis, y_axis, runs, joined)
-        written += write_formats(folder / FIGURES / plot.name, draw, output.formats, output.columns)
+        for name, draw in drawings.items():
+            written += write_formats(folder / FIGURES / name, partial(draw, title), output.formats, output.columns)
     return written
+
+
+def _prepare(tables: Mapping[str, pa.Table], plot: SweepPlot) -> Callable[..., Figure]:
+    """Return the function that draws a figure from its title and number of columns."""
+    from ...reports.figures import sweep_figure
+
+    x_axis, y_axis, runs, joined = _select_runs(tables, plot)
+    return lambda title, columns: sweep_figure(title, x_axis, y_axis, runs, joined, columns)
+
+
+def _prepare_maps(tables: Mapping[str, pa.Table], plot: MapPlot) -> dict[str, Callable[..., Figure]]:
+    """Return the functions that draw the maps of all engines with values, by the name of their files."""
+    from ...reports.figures import sweep_map_figure
+
+    shown, found = _describe_map(plot, tables), dict[str, Callable[..., Figure]]()
+    for engine, table in tables.items():
+        runs = select_map_runs(table, plot)
+        if runs is not None:
+            name = plot.name if len(tables) == 1 else f"{plot.name}-{engine}"
+            found[name] = lambda title, columns, of=(engine, runs): sweep_map_figure(title, shown, *of, columns)
+    if not found:
+        names = ", ".join(show_value(column) for column in plot.columns)
+        raise ScenarioError(f"--plot: no row of the sweep has a value of all of {names}")
+    return found
+
+
+def _describe_map(plot: MapPlot, tables: Mapping[str, pa.Table]) -> SweepMap:
+    from ...reports.figures import SweepMap
+
+    value = {"fell": "share of rides that fell", "done": "share of rides that lasted"}.get(
+        plot.value, f"share of rows of status {plot.value}"
+    )
+    if not plot.share:
+        value = f"median {_make_axis(plot.value, tables, ()).title}"
+    return SweepMap(_make_axis(plot.x, tables, ()), _make_axis(plot.y, tables, ()), value, plot.share)
 
 
 def _read_tables(folder: Path, engines: Iterable[str]) -> dict[str, pa.Table]:

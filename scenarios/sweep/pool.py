@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ...engines.engine import REFERENCE
 from .plan import Task
 from .worker import RETIRED, Setup
 
@@ -23,8 +24,9 @@ ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
 ATTEMPTS = 3  # a worker may be killed for other reasons; the third time its task is taken to be the cause
-_AHEAD = 2  # tasks sent to a worker, so that the next one is there before the last one's row is read
-_CHUNK = 16  # largest number of neighbouring tasks, which share a start, that go to one worker
+_AHEAD = 2  # groups sent to a worker, so that the next one is there before the last one's rows are read
+_GROUP = 32  # largest number of the reference's tasks in a group, which ride in one call of compiled code
+_CHUNK = 64  # largest number of neighbouring tasks, which share a start, that go to one worker
 _STARTING = 600.0  # [s] for a worker to load and compile everything; half a minute on an idle machine
 _PATIENCE = 30.0  # [s] for a keeper to report that its child is dead, or to fork another, which takes milliseconds
 _LOOK = 0.2  # [s] between checks of the time limits and of silent workers
@@ -52,7 +54,7 @@ class WorkersBroken(RuntimeError):
 
 @dataclass(eq=False)
 class _Worker:
-    """One worker process and its tasks.
+    """One worker process and its tasks, which are sent in groups of one engine.
 
     The keeper must report when it has started, when it has forked the next child, and when its child is dead. A keeper
     that is silent until ``overdue``, because it was stopped or hangs, is replaced.
@@ -62,10 +64,10 @@ class _Worker:
     overdue: float | None
     child: int | None = None
     rest: bytes = b""
-    sent: deque[Task] = field(default_factory=deque)
+    sent: deque[deque[Task]] = field(default_factory=deque)
     mine: deque[Task] = field(default_factory=deque)
     due: float = 0.0
-    hung: int | None = None  # index of the task that it was killed for
+    hung: int | None = None  # index of the task, the first of its group, that it was killed for
 
     def say(self, line: str) -> None:
         """Send a line; a lost worker is noticed elsewhere."""
@@ -88,6 +90,7 @@ class Pool:
         self._setup = setup
         self._selector = selectors.DefaultSelector()
         self._deaths: Counter[int] = Counter()
+        self._alone: set[int] = set()  # tasks of groups that ended their process: one of them may do so again
         self._failed_starts = 0
         self._queue: deque[Task] = deque()
         self._workers = [self._start_worker() for _ in range(workers)]
@@ -115,6 +118,7 @@ class Pool:
         """
         self._queue.extend(tasks)
         self._deaths.clear()
+        self._alone.clear()
         left = len(self._queue)
         for worker in self._workers:
             self._feed(worker)
@@ -143,9 +147,11 @@ class Pool:
 
     def _handle_message(self, worker: _Worker, message: dict[str, Any]) -> Iterator[Done]:
         if "row" in message:
-            if worker.sent and worker.sent[0].index == message["index"]:
-                worker.sent.popleft()
-                worker.due = time.monotonic() + self._setup.time_limit
+            if worker.sent and worker.sent[0][0].index == message["index"]:
+                worker.sent[0].popleft()
+                if not worker.sent[0]:
+                    worker.sent.popleft()
+                    self._set_deadline(worker)
                 self._failed_starts = 0
                 yield Done(message["index"], message["row"], message["timing"])
             self._feed(worker)
@@ -164,11 +170,27 @@ class Pool:
         if worker.child is None:
             return
         while len(worker.sent) < _AHEAD and (worker.mine or self._give_share(worker)):
-            task = worker.mine.popleft()
-            if not worker.sent:
-                worker.due = time.monotonic() + self._setup.time_limit
-            worker.sent.append(task)
-            worker.say(json.dumps({"index": task.index, "engine": task.engine, "changes": task.changes}))
+            group = self._take_group(worker.mine)
+            worker.sent.append(group)
+            if len(worker.sent) == 1:
+                self._set_deadline(worker)
+            points = [{"index": task.index, "changes": task.changes} for task in group]
+            worker.say(json.dumps({"engine": group[0].engine, "points": points}))
+
+    def _take_group(self, tasks: deque[Task]) -> deque[Task]:
+        """Take the next task, and those after it that ride with it in one call."""
+        group = deque([tasks.popleft()])
+        while tasks and len(group) < _GROUP and all(self._may_share(task) for task in (group[0], tasks[0])):
+            group.append(tasks.popleft())
+        return group
+
+    def _may_share(self, task: Task) -> bool:
+        return task.engine == REFERENCE and task.index not in self._alone
+
+    def _set_deadline(self, worker: _Worker) -> None:
+        """Give a worker the time of its next group, which has to do with all of its tasks."""
+        if worker.sent:
+            worker.due = time.monotonic() + self._setup.time_limit * len(worker.sent[0])
 
     def _give_share(self, worker: _Worker) -> bool:
         """Give a worker a chunk of the queue, or half of another worker's tasks where the queue is empty."""
@@ -190,21 +212,26 @@ class Pool:
             raise WorkersBroken("no worker starts: each ends before its first task")
         retired = os.WIFEXITED(status) and os.WEXITSTATUS(status) == RETIRED
         given_up: Done | None = None
-        if head is not None and worker.hung == head.index:
-            given_up = _failed_task(head, "timeout", f"no result within {self._setup.time_limit!r} s")
-        elif head is not None and worker.hung is None and not retired:
-            self._deaths[head.index] += 1
-            if self._deaths[head.index] >= ATTEMPTS:
-                given_up = _failed_task(
-                    head, "killed", f"its process ended {ATTEMPTS} times, last by {_describe_status(status)}"
-                )
+        if head is not None and len(head) > 1 and not retired:
+            self._alone.update(task.index for task in head)
+        elif head is not None and not retired:
+            given_up = self._blame_task(head[0], worker.hung == head[0].index, status)
+            if given_up is not None:
+                head.popleft()
         worker.hung = None
-        if given_up is not None:
-            worker.sent.popleft()
         while worker.sent:
-            worker.mine.appendleft(worker.sent.pop())
+            worker.mine.extendleft(reversed(worker.sent.pop()))
         if given_up is not None:
             yield given_up
+
+    def _blame_task(self, task: Task, hung: bool, status: int) -> Done | None:
+        """Return the row of a task that ended its process; None if it may have been another cause."""
+        if hung:
+            return _failed_task(task, "timeout", f"no result within {self._setup.time_limit!r} s")
+        self._deaths[task.index] += 1
+        if self._deaths[task.index] < ATTEMPTS:
+            return None
+        return _failed_task(task, "killed", f"its process ended {ATTEMPTS} times, last by {_describe_status(status)}")
 
     def _check_deadlines(self) -> Iterator[Done]:
         """Kill children that hang; replace workers that died unnoticed or are silent."""
@@ -215,7 +242,7 @@ class Pool:
             if worker.process.poll() is not None or (worker.overdue is not None and now > worker.overdue):
                 yield from self._replace_worker(worker)
             elif worker.sent and worker.child is not None and worker.hung is None and now > worker.due:
-                worker.hung = worker.sent[0].index
+                worker.hung = worker.sent[0][0].index
                 _kill(worker.child)
             elif not worker.sent:
                 self._feed(worker)

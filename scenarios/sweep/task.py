@@ -6,25 +6,51 @@ import errno
 import json
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from ...engines.admission import ride_engine
+from ...engines.batch import ride_many, rides_in_batches
 from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, why_failed
 from ...engines.guard import call_engine
 from ...reports.measure import flatten_metrics
 from ..error import ScenarioError
 from ..run import claimed_noise, configure_engine, measure_one
-from ..scenario import OF_THE_MOTION, Scenario, Start, make_start, set_keys, validate_scenario
+from ..scenario import Scenario, ScenarioTemplate, Start, make_start
 from .plan import canonical_text, prune_settings
 from .rows import METRICS, REFUSED, reason_line
 
+_KEPT_STARTS = 64  # starts that are kept for the other engines at the same points
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    """A task that is ready to ride.
+
+    Attributes
+    ----------
+    engine : Engine
+    settings : Settings
+    scenario : Scenario
+    start : Start
+    facts : dict
+        The part of its row that does not depend on the ride.
+    """
+
+    engine: Engine
+    settings: Settings
+    scenario: Scenario
+    start: Start
+    facts: dict[str, Any]
+
 
 class Tasks:
-    """Do the tasks of one sweep, one after the other; neighbours share their start and the reference's ride.
+    """Do the tasks of one sweep; neighbours share their start and the reference's ride.
 
     Parameters
     ----------
@@ -34,7 +60,8 @@ class Tasks:
 
     def __init__(self, base: Mapping[str, Any]) -> None:
         self._base = base
-        self._starts: Callable[[str], Start | str] = lru_cache(maxsize=64)(_make_start_or_reason)
+        self._templates: dict[str, ScenarioTemplate] = {}
+        self._starts: OrderedDict[str, Start | str] = OrderedDict()
         self._references: dict[str, Trajectory | str] = {}
 
     def do(self, engine: str, changes: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -53,21 +80,95 @@ class Tasks:
         timing : dict
             Values that are not.
         """
+        return self.do_many(engine, [changes])[0]
+
+    def do_many(self, engine: str, points: Sequence[Mapping[str, Any]]) -> list[tuple[dict[str, Any], dict[str, Any]]]:
+        """Run an engine at points.
+
+        Parameters
+        ----------
+        engine : str
+            The reference rides all points in a few calls of compiled code, other engines one after the other.
+        points : sequence of mapping
+            Values by dotted key.
+
+        Returns
+        -------
+        list of (row, timing)
+            As `do` returns them for each point: the rows are equal to the bit.
+        """
+        if engine == REFERENCE:
+            return self._ride_reference_at(points)
+        return [self._do_one(engine, changes) for changes in points]
+
+    def _do_one(self, engine: str, changes: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
         begin = time.process_time()
         timing: dict[str, Any] = {}
         try:
             row = call_engine(self._run_engine, engine, changes, timing)
         except Exception as error:  # an engine may raise anything; the row says what
             row = _failed_row(error)
-        timing["task_time"] = time.process_time() - begin
-        timing["finished"] = time.time()
-        return _to_json_values(row), _to_json_values(timing)
+        return _row_and_timing(row, timing, time.process_time() - begin)
 
-    def _run_engine(self, name: str, changes: Mapping[str, Any], timing: dict[str, Any]) -> dict[str, Any]:
-        scenario = validate_scenario(prune_settings(set_keys(self._base, changes), name), "task")
+    def _ride_reference_at(self, points: Sequence[Mapping[str, Any]]) -> list[tuple[dict[str, Any], dict[str, Any]]]:
+        """Ride the reference at points; those with the same settings share batches."""
+        found: dict[int, tuple[dict[str, Any], dict[str, Any]]] = {}
+        batches: dict[str, dict[int, tuple[_Prepared, float]]] = {}
+        for i, changes in enumerate(points):
+            begin = time.process_time()
+            try:
+                ready = self._prepare(REFERENCE, changes)
+            except Exception as error:
+                ready = _failed_row(error)
+            if not isinstance(ready, _Prepared):
+                found[i] = _row_and_timing(ready, {}, time.process_time() - begin)
+            elif not rides_in_batches(ready.engine, ready.settings):
+                found[i] = self._do_one(REFERENCE, changes)
+            else:
+                text = canonical_text(ready.scenario.engines.get(REFERENCE, {}))
+                batches.setdefault(text, {})[i] = (ready, time.process_time() - begin)
+        for batch in batches.values():
+            try:
+                found |= self._measure_batch(points, batch)
+            except MemoryError:  # too little for a batch; one by one each row says whether it is too little for it
+                found |= {i: self._do_one(REFERENCE, points[i]) for i in batch}
+        return [found[i] for i in range(len(points))]
+
+    def _measure_batch(
+        self, points: Sequence[Mapping[str, Any]], batch: Mapping[int, tuple[_Prepared, float]]
+    ) -> dict[int, tuple[dict[str, Any], dict[str, Any]]]:
+        """Return rows and timings by index of the point; ``batch`` has the tasks with their time so far [s]."""
+        indices, found = list(batch), dict[int, tuple[dict[str, Any], dict[str, Any]]]()
+        first, _ = batch[indices[0]]
+        rides = ride_many(first.engine, [batch[i][0].start.problem for i in indices], first.settings)
+        for k, ride in rides:
+            (ready, spent), begin = batch[indices[k]], time.process_time()
+            timing: dict[str, Any] = {}
+            if isinstance(ride, Trajectory):
+                timing["engine_time"] = ride.cpu_time
+            self._keep_reference(ready, points[indices[k]], ride)
+            try:
+                row = _measured_row(ready, ride, None, timing)
+            except Exception as error:
+                row = _failed_row(error)
+            spent += timing.get("engine_time", 0.0) + time.process_time() - begin
+            found[indices[k]] = _row_and_timing(row, timing, spent)
+        return found
+
+    def _keep_reference(self, ready: _Prepared, changes: Mapping[str, Any], ride: Trajectory | Exception) -> None:
+        """Keep the reference's ride at a point for the other engines."""
+        chosen = canonical_text(ready.scenario.engines.get(REFERENCE, {}))
+        kept = reason_line(why_failed(ride)) if isinstance(ride, Exception) else ride
+        self._references = {f"{_start_text(changes)} {chosen}": kept}
+
+    def _prepare(self, name: str, changes: Mapping[str, Any]) -> _Prepared | dict[str, Any]:
+        """Return a task ready to ride, or its row where there is nothing to ride."""
+        if name not in self._templates:
+            self._templates[name] = ScenarioTemplate(self._base, "task", lambda data: prune_settings(data, name))
+        scenario = self._templates[name].apply(changes)
         engine, version, settings = _load_configured_engine(name, canonical_text(scenario.engines.get(name, {})))
         facts: dict[str, Any] = {"version": version}
-        start = self._starts(_start_parameters(scenario))
+        start = self._find_start(scenario, changes)
         if isinstance(start, str):
             return facts | {"status": "no-motion", "reason": reason_line(start)}
         facts |= {"family": start.family, "growth_rate": start.growth_rate, "size": start.size}
@@ -78,57 +179,86 @@ class Tasks:
             raise
         except ValueError as error:  # a step that does not divide the output interval, and the like
             return facts | {"status": REFUSED, "reason": reason_line(f"engines.{name}: {error}")}
+        return _Prepared(engine, settings, scenario, start, facts)
+
+    def _run_engine(self, name: str, changes: Mapping[str, Any], timing: dict[str, Any]) -> dict[str, Any]:
+        ready = self._prepare(name, changes)
+        if not isinstance(ready, _Prepared):
+            return ready
         begin = time.process_time()
         reference: Trajectory | str | None = None
+        ride: Trajectory | Exception
         try:
-            if name == REFERENCE:
-                trajectory, reference = self._run_reference(scenario, start), None
-                if isinstance(trajectory, str):
-                    return facts | {"status": "failed", "reason": trajectory}
-            else:
-                reference = self._run_reference(scenario, start)
-                trajectory = ride_engine(engine, start.problem, settings, lambda _: None)
+            if name != REFERENCE:
+                reference = self._run_reference(ready, changes)
+            ride = ride_engine(ready.engine, ready.start.problem, ready.settings, lambda _: None)
         except MemoryError:
             raise
         except Exception as error:
-            return facts | _failed_row(error)
+            ride = error
         finally:
             timing["engine_time"] = time.process_time() - begin
-        known = None if isinstance(reference, str) else reference
-        measured = flatten_metrics(measure_one(start, trajectory, known, step_noise=claimed_noise(engine, settings)))
-        timing |= {key: measured.get(key) for key in ("cpu_time", "real_time_factor")}
-        facts |= {key: measured.get(key) for key in METRICS if key not in facts}
-        reason = f"nothing to compare with: the reference: {reference}" if isinstance(reference, str) else None
-        return facts | _describe_outcome(measured, reason)
+        return _measured_row(ready, ride, reference, timing)
 
-    def _run_reference(self, scenario: Scenario, start: Start) -> Trajectory | str:
-        """Return the reference's ride at this point, or why there is none; the last is kept for the other engines."""
-        chosen = canonical_text(scenario.engines.get(REFERENCE, {}))
-        text = f"{_start_parameters(scenario)} {chosen}"
+    def _run_reference(self, ready: _Prepared, changes: Mapping[str, Any]) -> Trajectory | str:
+        """Return the reference's ride at this point, or why there is none."""
+        chosen = canonical_text(ready.scenario.engines.get(REFERENCE, {}))
+        text = f"{_start_text(changes)} {chosen}"
         if text not in self._references:
             engine, _, settings = _load_configured_engine(REFERENCE, chosen)
-            found: Trajectory | str
             try:
-                engine.check(start.problem, settings)
-                found = ride_engine(engine, start.problem, settings, lambda _: None)
+                engine.check(ready.start.problem, settings)
+                ride: Trajectory | Exception = ride_engine(engine, ready.start.problem, settings, lambda _: None)
             except MemoryError:
                 raise
             except Exception as error:
-                found = reason_line(why_failed(error))
-            self._references = {text: found}
+                ride = error
+            self._keep_reference(ready, changes, ride)
         return self._references[text]
 
+    def _find_start(self, scenario: Scenario, changes: Mapping[str, Any]) -> Start | str:
+        """Return the start of a scenario, or why there is none; the last ones are kept for the other engines."""
+        text = _start_text(changes)
+        if text not in self._starts:
+            try:
+                self._starts[text] = make_start(scenario)
+            except ScenarioError as error:
+                self._starts[text] = str(error)
+            if len(self._starts) > _KEPT_STARTS:
+                self._starts.popitem(last=False)
+        return self._starts[text]
 
-def _start_parameters(scenario: Scenario) -> str:
-    """Return the parts of a scenario that determine its start."""
-    return canonical_text(scenario.model_dump(mode="json", exclude_none=True, include={*OF_THE_MOTION, "simulation"}))
+
+def _start_text(changes: Mapping[str, Any]) -> str:
+    """Return the changes that may concern a start: all but the engines' settings."""
+    return canonical_text({key: value for key, value in changes.items() if key.partition(".")[0] != "engines"})
 
 
-def _make_start_or_reason(text: str) -> Start | str:
-    try:
-        return make_start(validate_scenario(json.loads(text) | {"title": "start"}, "task"))
-    except ScenarioError as error:
-        return str(error)
+def _measured_row(
+    ready: _Prepared, ride: Trajectory | Exception, reference: Trajectory | str | None, timing: dict[str, Any]
+) -> dict[str, Any]:
+    """Return the row of a ride; ``reference`` is the trajectory to compare with, or why there is none."""
+    facts = ready.facts
+    if isinstance(ride, Exception):
+        if ready.engine.name == REFERENCE:
+            return facts | {"status": "failed", "reason": reason_line(why_failed(ride))}
+        return facts | _failed_row(ride)
+    known = None if isinstance(reference, str) else reference
+    noise = claimed_noise(ready.engine, ready.settings)
+    measured = flatten_metrics(measure_one(ready.start, ride, known, step_noise=noise))
+    timing |= {key: measured.get(key) for key in ("cpu_time", "real_time_factor")}
+    row = facts | {key: measured.get(key) for key in METRICS if key not in facts}
+    reason = f"nothing to compare with: the reference: {reference}" if isinstance(reference, str) else None
+    return row | _describe_outcome(measured, reason)
+
+
+def _row_and_timing(
+    row: Mapping[str, Any], timing: dict[str, Any], task_time: float
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return a row and its timing as JSON values."""
+    timing["task_time"] = task_time
+    timing["finished"] = time.time()
+    return _to_json_values(row), _to_json_values(timing)
 
 
 @lru_cache(maxsize=1024)

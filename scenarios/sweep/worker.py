@@ -4,9 +4,9 @@ The keeper, the process that is started, loads and compiles everything once and 
 itself that does the tasks. If the child is killed, only one task is lost, and the next child is ready in
 milliseconds.
 
-Standard input: first the sweep (`Setup`), then tasks; ``again`` after the report of a child's death asks for the next
-child. Standard output: ``{"pid": ...}`` when a child is ready, one line per row, and ``{"died": wait status}`` from
-the keeper. The end of the input ends both processes, even in the middle of a task.
+Standard input: first the sweep (`Setup`), then groups of tasks of one engine; ``again`` after the report of a child's
+death asks for the next child. Standard output: ``{"pid": ...}`` when a child is ready, one line per row, and
+``{"died": wait status}`` from the keeper. The end of the input ends both processes, even in the middle of a task.
 """
 
 from __future__ import annotations
@@ -112,14 +112,16 @@ def _do_tasks(setup: Setup, tasks: int, results: int) -> None:
         _limit_memory(setup.memory_limit)
         who = {"host": platform.node(), "process": os.getpid()}
         for line in _read_lines(tasks):
-            task = json.loads(line)
+            group = json.loads(line)
+            points = group["points"]
             # The parent kills a hung run; without a parent, the kernel does.
-            signal.setitimer(signal.ITIMER_REAL, setup.time_limit + _GRACE)
-            row, timing = work.do(task["engine"], task["changes"])
+            signal.setitimer(signal.ITIMER_REAL, setup.time_limit * len(points) + _GRACE)
+            found = work.do_many(group["engine"], [point["changes"] for point in points])
             signal.setitimer(signal.ITIMER_REAL, 0)
-            _send(results, {"index": task["index"], "row": row, "timing": timing | who})
-            if row["status"] == "memory":
-                os._exit(RETIRED)  # the remaining memory may be too little for the next task
+            for point, (row, timing) in zip(points, found, strict=True):
+                _send(results, {"index": point["index"], "row": row, "timing": timing | who})
+            if any(row["status"] == "memory" for row, _ in found):
+                os._exit(RETIRED)  # the remaining memory may be too little for the next tasks
         status = _INPUT_ENDED
     finally:
         os._exit(status)

@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from velodrome.engines.registry import engine_names, load_engine
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.bowls import Cone, Sphere, Torus
-from velodrome.reference.circular import LARGEST_RESIDUAL, CircularMotion
+from velodrome.reference.circular import CircularMotion
 from velodrome.reference.contact import observe
 from velodrome.reference.families import FAMILIES, find_motion, trace_all
+from velodrome.reference.kernels.newton import LARGEST_RESIDUAL
 from velodrome.reference.kernels.steady import STANDING
 from velodrome.reference.kinematics import YAW
 from velodrome.reference.profile import PolynomialProfile, SplineProfile

@@ -24,6 +24,7 @@ from velodrome.engines.storage import (
     trajectory_table,
     write_trajectory,
 )
+from velodrome.reference.fall import Fall
 
 OPTIONAL = ("contact_point", "contact_force", "gap", "slip", "kinetic_energy", "potential_energy")
 SHAPES = {
@@ -101,6 +102,27 @@ def test_what_iterations_left_comes_back_and_older_files_say_nothing_of_it(tmp_p
     pq.write_table(table.replace_schema_metadata({METADATA_KEY: json.dumps(older).encode()}), path)
     read = read_trajectory(path)
     assert (read.unconverged_steps, read.largest_residual) == (None, None)
+
+
+def test_the_states_around_a_fall_come_back_to_the_bit(tmp_path: Path) -> None:
+    path, rng = tmp_path / "a.parquet", np.random.default_rng(2)
+    fall = Fall(np.array([0.1 + 0.2, 0.4]), rng.standard_normal((2, 9)), rng.standard_normal((2, 9)))
+    write_trajectory(trajectory(fall=fall), path)
+    read = read_trajectory(path).fall
+    assert read is not None
+    for name in ("time", "q", "qd"):
+        assert getattr(read, name).tobytes() == getattr(fall, name).tobytes(), name
+    # A state of another length is damage.
+    table = pq.read_table(path)
+    facts = json.loads(table.schema.metadata[METADATA_KEY])
+    facts["fall"]["q"][0].pop()
+    pq.write_table(table.replace_schema_metadata({METADATA_KEY: json.dumps(facts).encode()}), path)
+    with pytest.raises(ValueError, match=r"its schema has no whole velodrome metadata \(fall\.q\.0: "):
+        read_trajectory(path)
+    # Files of earlier versions say nothing of a fall.
+    del facts["fall"]
+    pq.write_table(table.replace_schema_metadata({METADATA_KEY: json.dumps(facts).encode()}), path)
+    assert read_trajectory(path).fall is None
 
 
 @pytest.mark.parametrize("absent", [(name,) for name in OPTIONAL] + [OPTIONAL])

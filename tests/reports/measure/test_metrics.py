@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from velodrome.engines.engine import Trajectory
 from velodrome.reference.bicycle import BODIES, Bicycle
 from velodrome.reference.contact import observe
+from velodrome.reference.fall import heights_above_fallen
 from velodrome.reference.families import find_motion
 from velodrome.reference.kinematics import LEAN, REAR_ANGLE, YAW
 from velodrome.reference.surface import Paraboloid
@@ -231,12 +232,15 @@ def test_a_bicycle_falls_when_its_frame_is_down() -> None:
     sinking = TIMES > 1.5
     # At 1 m/s, through a tenth of 0.9 m between two samples.
     q[sinking, 2] = (rest + ground + 0.09 + 1.9963 - TIMES)[sinking]
-    falling = evaluate_ride(replace(EXACT, q=q), BICYCLE, BOWL)
+    qd = EXACT.qd.copy()
+    _, rate = heights_above_fallen(BICYCLE, BOWL, q, qd)
+    qd[sinking, 2] -= (1 + rate)[sinking]
+    falling = evaluate_ride(replace(EXACT, q=q, qd=qd), BICYCLE, BOWL)
     assert fell_at(falling, BICYCLE, BOWL) == pytest.approx(1.9963, abs=1e-14)
     assert until_fall(falling, BICYCLE, BOWL).time[-1] == TIMES[199] == 1.99
     assert until_fall(falling, BICYCLE, BOWL, beyond=1).time[-1] == TIMES[200]
-    # What comes after is no ride: nothing of it is measured.
-    after = replace(falling, qd=falling.qd + (TIMES > 1.9963)[:, None])
+    # What comes after the sample that has fallen is no ride: nothing of it is measured.
+    after = replace(falling, qd=falling.qd + (np.arange(len(TIMES)) > 200)[:, None])
     assert measure(after)["rear_rate_error"] == 0.0
     assert measure(after)["fell_at"] == fell_at(falling, BICYCLE, BOWL)
     for height, fall in ((0.089, 0.0), (0.091, None)):

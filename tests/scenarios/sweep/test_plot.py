@@ -15,6 +15,7 @@ from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.files import FigureOutput
 from velodrome.scenarios.sweep import SweepPlot, check_plots, parse_plots, write_sweep_figures
 from velodrome.scenarios.sweep import figure as figure_module
+from velodrome.scenarios.sweep.map_figure import MapPlot, select_map_runs
 from velodrome.scenarios.sweep.store import MANIFEST
 
 # The third start falls within the time; the step of the fourth is refused where it is MuJoCo's.
@@ -106,7 +107,34 @@ def test_a_sweep_that_runs_is_drawn_at_its_end(
     assert Path(drawn).stat().st_size > 10_000
 
 
-@pytest.mark.parametrize("text", ["position_error_max", "a:b:c", ":b", "a:"])
+def test_a_map_of_a_finished_sweep_has_a_figure_for_each_engine(folder: Path) -> None:
+    (plot,) = parse_plots(["fell:perturbation.lean_rate,simulation.duration"])
+    written = write_sweep_figures(folder, [plot], FigureOutput())
+    stem = "fell-over-perturbation.lean_rate-and-simulation.duration"
+    assert [path.name for path in written] == [f"{stem}-reference.png", f"{stem}-mujoco-native.png"]
+    tables = figure_module._read_tables(folder, ["reference", "mujoco-native"])
+    assert isinstance(plot, MapPlot)
+    runs = select_map_runs(tables["mujoco-native"], plot)
+    assert runs is not None
+    # Three rides at each step: those at the second are refused, so that they are in no share.
+    by_start = {rate: sorted(runs.value[runs.x == rate].tolist(), key=str) for rate in (0.0, 0.1, 9.0)}
+    fell = {row["perturbation.lean_rate"] for row in tables["mujoco-native"].to_pylist() if row["status"] == "fell"}
+    for rate, values in by_start.items():
+        assert values[0] == float(rate in fell)
+        assert np.isnan(values[1])
+    (median,) = parse_plots(["energy_drift:perturbation.lean_rate,simulation.duration"])
+    assert len(write_sweep_figures(folder, [median], FigureOutput())) == 2
+
+
+@pytest.mark.parametrize("text", ["max_slip:status,index", "ended:index,perturbation.lean_rate"])
+def test_a_map_needs_numbers(folder: Path, tmp_path: Path, text: str) -> None:
+    with pytest.raises(ScenarioError, match="has no numbers"):
+        check_plots(parse_plots([text]), planned(tmp_path, RIDES))
+    with pytest.raises(ScenarioError, match="has no numbers"):
+        write_sweep_figures(folder, parse_plots([text]), FigureOutput())
+
+
+@pytest.mark.parametrize("text", ["position_error_max", "a:b:c", ":b", "a:", "a:b,", "a:b,c,d"])
 def test_a_plot_is_two_names(text: str) -> None:
     with pytest.raises(ScenarioError, match="must be Y:X"):
         parse_plots([text])
