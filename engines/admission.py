@@ -80,10 +80,12 @@ def ride_engine(
         require_separate_wheels(problem.bicycle, problem.q)
     except ValueError as error:
         raise EngineError(str(error)) from error
-    return admit_trajectory(engine, problem, settings, simulate_guarded(engine, problem, settings, progress))
+    return admit_trajectory(engine, problem, settings, simulate_guarded(engine, problem, settings, progress), folder)
 
 
-def admit_trajectory(engine: Engine, problem: Problem, settings: Any, trajectory: Any) -> Trajectory:
+def admit_trajectory(
+    engine: Engine, problem: Problem, settings: Any, trajectory: Any, folder: Path | None = None
+) -> Trajectory:
     """Validate what an engine returns for a problem, and cut it, as `ride_engine` does.
 
     Raises

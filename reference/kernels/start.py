@@ -24,6 +24,7 @@ FASTEST = 1e9  # a larger rate means that the rolling constraints do not determi
 # about 1e-11 at the largest condition, and the choice of the wheel that determines the speeds changes the smallest
 # eigenvalue by far less than the factor between the two.
 _INERTIA, _CONDITION = 1e-6, 1e3
+_ROUND_OFF = 12 * _CONDITION * 2.0**-52  # largest relative round-off of velocities at that condition
 
 
 class StartRequests(NamedTuple):
@@ -62,8 +63,11 @@ def _settle_state(q, qd, p, function, parameters, c):
 
 
 @jit
-def _fill_velocities(rows, spin, velocities):
-    """Fill velocities (3, 9) of lean, steer and a wheel's spin at unit rates; return the condition of solving them."""
+def _fill_velocities(rows, spin, length, velocities):
+    """Fill velocities (3, 9) of lean, steer and a wheel's spin at unit rates; return the condition of solving them.
+
+    Velocities that may be round-off are zero; ``length`` is that of the bicycle, of a point's velocity at 1 rad/s.
+    """
     solved, inverse, size, k = np.empty(6, np.int64), np.empty((6, 6)), 0.0, 0
     for j in range(9):
         if j not in (4, 6, spin):
@@ -84,6 +88,8 @@ def _fill_velocities(rows, spin, velocities):
         for i in range(6):
             for k in range(6):
                 velocities[m, solved[i]] -= inverse[i, k] * rows[k, given]
+            if abs(velocities[m, solved[i]]) <= _ROUND_OFF * (length if solved[i] < 3 else 1.0):
+                velocities[m, solved[i]] = 0.0
     return np.sqrt(size * inverse_size)
 
 
@@ -96,9 +102,10 @@ def has_inertia(q, p, function, parameters, c):
     mass, bias, rows = np.empty((9, 9)), np.empty(9), np.empty((6, 9))
     mass_and_bias(q, np.zeros(9), c, mass, bias)
     rolling(q, np.zeros(9), p, function, parameters, c, rows, np.empty(6), np.empty(6))
+    length = abs(c.rear_x) + abs(c.rear_z) + abs(c.front_x) + abs(c.front_z) + c.rear_radius + c.front_radius
     velocities, others = np.empty((3, 9)), np.empty((3, 9))
-    condition = _fill_velocities(rows, 7, velocities)
-    other = _fill_velocities(rows, 8, others)
+    condition = _fill_velocities(rows, 7, length, velocities)
+    other = _fill_velocities(rows, 8, length, others)
     if not condition <= other:
         condition, velocities = other, others
     if not condition < _CONDITION:

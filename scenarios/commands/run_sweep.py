@@ -88,7 +88,7 @@ def run_sweep_command(
                 f"--retry {show_value(status)}: no row has such a status ({suggest_name(status, STATUSES)})"
             )
     wanted = parse_plots(plots)
-    with ProgressBars("checking every run of the sweep") as progress:
+    with ProgressBars("checking the sweep") as progress:
         plan = plan_sweep(path)
         check_plots(wanted, plan)
         work = _choose_work(scheduler, workers)

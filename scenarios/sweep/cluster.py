@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Generator, Sequence
 from concurrent.futures import CancelledError
 from functools import cache
+from itertools import islice
 from typing import Any
 
 from ..error import ScenarioError
@@ -128,7 +129,7 @@ class _Batches:
     """
 
     def __init__(self, tasks: Sequence[Task], time_limit: float) -> None:
-        self._waiting = deque(tasks)
+        self._waiting, self._left = iter(tasks), len(tasks)
         self._singles: deque[Task] = deque()
         self._time_limit = time_limit
         self._rows, self._seconds = 0, 0.0
@@ -139,8 +140,9 @@ class _Batches:
             return [self._singles.popleft()]
         size = _FIRST if not self._rows else int(min(_LARGEST, _SPAN * self._rows / max(self._seconds, 1e-6)))
         # The last batches are smaller, so that no worker waits long for another one.
-        size = min(len(self._waiting), max(1, min(size, len(self._waiting) // (2 * threads))))
-        return [self._waiting.popleft() for _ in range(size)]
+        size = min(self._left, max(1, min(size, self._left // (2 * threads))))
+        self._left -= size
+        return list(islice(self._waiting, size))
 
     def learn(self, found: Sequence[Done]) -> None:
         """Update the estimate of how long tasks take."""

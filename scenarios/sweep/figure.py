@@ -90,7 +90,7 @@ def check_plots(plots: Iterable[SweepPlot | MapPlot], plan: SweepPlan) -> None:
         With one line.
     """
     facts = {**ROW_FACTS, **METRICS}
-    known = {*facts, *_TIMES, *(key for task in plan.tasks for key in task.changes)}
+    known = {*facts, *_TIMES, *plan.parameters}
     for plot in plots:
         for column in plot.columns:
             _check_column(column, known)

@@ -46,10 +46,11 @@ def write_sweep_page(plan: SweepPlan, outcome: SweepOutcome, document: Mapping[s
 
 def _collect_errors(plan: SweepPlan, outcome: SweepOutcome) -> dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]:
     """Return values and median errors by parameter and engine, for parameters of numbers."""
-    keys = dict.fromkeys(key for task in plan.tasks for key in task.changes)
-    columns = row_schema(plan.tasks)
+    columns = row_schema(plan.parameters)
     numbers = [
-        key for key in keys if pa.types.is_floating(kind := columns.field(key).type) or pa.types.is_integer(kind)
+        key
+        for key in plan.parameters
+        if pa.types.is_floating(kind := columns.field(key).type) or pa.types.is_integer(kind)
     ]
     found: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = {key: {} for key in numbers}
     for engine in plan.file.engines:

@@ -10,9 +10,10 @@ import subprocess
 import sys
 import time
 from collections import Counter, deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ ATTEMPTS = 3  # a worker may be killed for other reasons; the third time its tas
 _AHEAD = 2  # groups sent to a worker, so that the next one is there before the last one's rows are read
 _GROUP = 32  # largest number of the reference's tasks in a group, which ride in one call of compiled code
 _CHUNK = 64  # largest number of neighbouring tasks, which share a start, that go to one worker
+_LONGEST_QUEUE = 10_000  # with fewer tasks waiting, as many more are made
 _STARTING = 600.0  # [s] for a worker to load and compile everything; half a minute on an idle machine
 _PATIENCE = 30.0  # [s] for a keeper to report that its child is dead, or to fork another, which takes milliseconds
 _LOOK = 0.2  # [s] between checks of the time limits and of silent workers
@@ -93,6 +95,7 @@ class Pool:
         self._alone: set[int] = set()  # tasks of groups that ended their process: one of them may do so again
         self._failed_starts = 0
         self._queue: deque[Task] = deque()
+        self._source: Iterator[Task] = iter(())  # of tasks that are not yet in the queue
         self._workers = [self._start_worker() for _ in range(workers)]
 
     def __enter__(self) -> Pool:
@@ -108,7 +111,7 @@ class Pool:
         self._workers = []
         self._selector.close()
 
-    def run(self, tasks: Iterable[Task]) -> Iterator[Done]:
+    def run(self, tasks: Collection[Task]) -> Iterator[Done]:
         """Do tasks in any order and yield the result of each once.
 
         Raises
@@ -116,10 +119,10 @@ class Pool:
         WorkersBroken
             If workers cannot even start.
         """
-        self._queue.extend(tasks)
+        self._source = iter(tasks)
         self._deaths.clear()
         self._alone.clear()
-        left = len(self._queue)
+        left = len(tasks)
         for worker in self._workers:
             self._feed(worker)
         while left:
@@ -194,6 +197,8 @@ class Pool:
 
     def _give_share(self, worker: _Worker) -> bool:
         """Give a worker a chunk of the queue, or half of another worker's tasks where the queue is empty."""
+        if len(self._queue) < _LONGEST_QUEUE:
+            self._queue.extend(islice(self._source, _LONGEST_QUEUE))
         if self._queue:
             size = max(1, min(_CHUNK, len(self._queue) // (4 * len(self._workers))))
             worker.mine.extend(self._queue.popleft() for _ in range(size))

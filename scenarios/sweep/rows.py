@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import pyarrow as pa
@@ -66,18 +66,17 @@ TIMING: dict[str, pa.DataType] = {
 }
 
 
-def row_schema(tasks: Sequence[Task]) -> pa.Schema:
-    """Return the columns of the data set except the engine, which is the partition: facts, parameters, metrics."""
-    fields = [*ROW_FACTS.items(), *_parameter_types(tasks).items(), *METRICS.items()]
+def row_schema(parameters: Mapping[str, set[type]]) -> pa.Schema:
+    """Return the columns of the data set except the engine, which is the partition: facts, parameters, metrics.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Types of the values of each parameter; see `SweepPlan.parameters`.
+    """
+    kinds = {key: _column_type(found) for key, found in parameters.items()}
+    fields = [*ROW_FACTS.items(), *kinds.items(), *METRICS.items()]
     return pa.schema([pa.field(name, kind) for name, kind in fields], metadata=versioned_metadata({}))
-
-
-def _parameter_types(tasks: Iterable[Task]) -> dict[str, pa.DataType]:
-    kinds: dict[str, set[type]] = {}
-    for task in tasks:
-        for key, value in task.changes.items():
-            kinds.setdefault(key, set()).add(type(value))
-    return {key: _column_type(found) for key, found in kinds.items()}
 
 
 def _column_type(kinds: set[type]) -> pa.DataType:

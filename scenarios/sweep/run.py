@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
 from collections.abc import Callable, Collection, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ..error import ScenarioError
 from .journal import ForeignLine, Journal, JournalLine, finished_rows
 from .plan import SweepPlan, Task
 from .pool import Done, Pool, WorkersBroken
-from .rows import REFUSED, reason_line
+from .rows import BROKEN, STATUSES
+from .selection import SelectedTasks
 from .store import JOURNAL, Opened, open_folder, refuse_other_limits, write_results, write_sweep_manifest
 from .worker import Setup
+
+_STATUSES = ("", *STATUSES)
+_CODES = {status: code for code, status in enumerate(_STATUSES)}
 
 Work = Callable[[Setup, Sequence[Task]], Generator[Done]]
 SweepWatch = Callable[[Task, Done, bool], None]
@@ -84,21 +89,24 @@ def run_sweep(
     opened = open_folder(out, plan, resume)
     stopped, interrupted = None, False
     with Journal(out / JOURNAL) as journal:
-        have = _read_stored(out / JOURNAL, plan, opened)
-        refuse_other_limits(out, plan, opened, {status for status, _ in have.values()} - set(retry))
-        missing = {task.index for task in plan.tasks if task.index not in have or have[task.index][0] in retry}
-        for index, (status, reason) in have.items():
-            if index not in missing:
-                watch(plan.tasks[index], Done(index, {"status": status, "reason": reason}, {}), False)
+        statuses, reasons = _read_stored(out / JOURNAL, plan, opened)
+        again = np.isin(statuses, [_CODES[status] for status in retry])
+        refuse_other_limits(out, plan, opened, _list_statuses(statuses) - set(retry))
+        missing = SelectedTasks(plan.tasks, (statuses == 0) | again)
+        left = len(missing)
+        for index in np.flatnonzero((statuses > 0) & ~again).tolist():
+            row = {"status": _STATUSES[statuses[index]], "reason": reasons.get(index)}
+            watch(plan.tasks[index], Done(index, row, {}), False)
         try:
-            if missing:
+            if left:
                 write_sweep_manifest(out, plan, opened, complete=False)
-            with closing(_yield_results(plan, work, missing)) as arriving:
+            setup = Setup(plan.base, plan.file.time_limit, plan.file.memory_limit)
+            with closing(work(setup, missing)) as arriving:
                 for done in arriving:
                     task = plan.tasks[done.index]
                     journal.append(JournalLine(opened.key, task.key, done.index, done.row, done.timing))
-                    have[done.index] = (done.row["status"], done.row["reason"])
-                    missing.discard(done.index)
+                    statuses[done.index] = _CODES[done.row["status"]]
+                    left -= 1
                     watch(task, done, True)
             journal.sync()
             write_results(out, plan, opened)
@@ -108,42 +116,39 @@ def run_sweep(
             stopped = str(error)
         except OSError as error:
             stopped = f"cannot write: {error.strerror or error}"
+    return SweepOutcome(out, _count_rows(plan, statuses), left, stopped, interrupted)
+
+
+def _list_statuses(codes: np.ndarray) -> set[str]:
+    return {_STATUSES[code] for code in np.unique(codes[codes > 0])}
+
+
+def _count_rows(plan: SweepPlan, codes: np.ndarray) -> dict[str, dict[str, int]]:
+    """Return the numbers of rows by engine and status."""
     counts: dict[str, Counter[str]] = {engine: Counter() for engine in plan.file.engines}
-    for index, (status, _) in have.items():
-        counts[plan.tasks[index].engine][status] += 1
-    rows = {name: dict(found) for name, found in counts.items()}
-    return SweepOutcome(out, rows, len(missing), stopped, interrupted)
+    for index in np.flatnonzero(codes).tolist():
+        counts[plan.tasks.find_engine_of(index)][_STATUSES[codes[index]]] += 1
+    return {name: dict(found) for name, found in counts.items()}
 
 
-def _read_stored(path: Path, plan: SweepPlan, opened: Opened) -> dict[int, tuple[str, str | None]]:
-    """Return status and reason of the rows of a journal, by the task's index.
+def _read_stored(path: Path, plan: SweepPlan, opened: Opened) -> tuple[np.ndarray, dict[int, str | None]]:
+    """Return a code for the status of every task, 0 where there is no row, and why broken rows broke, by index.
 
     Raises
     ------
     ScenarioError
         If a row does not belong to this sweep.
     """
-    found: dict[int, tuple[str, str | None]] = {}
+    codes = np.zeros(len(plan.tasks), np.uint8)
+    reasons: dict[int, str | None] = {}
     try:
         for _, line in finished_rows(path):
-            task = plan.tasks[line.index] if 0 <= line.index < len(plan.tasks) else None
-            if line.sweep != opened.key or task is None or line.key != task.key:
+            # The sweep's key is a digest of all its tasks: with it, the index says which task it is.
+            if line.sweep != opened.key or not 0 <= line.index < len(codes):
                 raise ForeignLine(f"the row {line.key}")
-            found[line.index] = (sys.intern(line.row["status"]), line.row.get("reason"))
+            codes[line.index] = _CODES[line.row["status"]]
+            if line.row["status"] in BROKEN:
+                reasons[line.index] = line.row.get("reason")
     except ForeignLine as error:
         raise ScenarioError(f"{path}: has {error}, which is not of this sweep; name another folder by --out") from error
-    return found
-
-
-def _yield_results(plan: SweepPlan, work: Work, missing: Collection[int]) -> Generator[Done]:
-    """Yield rows of all missing tasks, beginning with those that are refused, which need no work."""
-    tasks = [task for task in plan.tasks if task.index in missing]
-    for task in tasks:
-        if task.refused is not None:
-            yield Done(task.index, {"status": REFUSED, "reason": reason_line(task.refused)}, {})
-    with closing(work(_make_setup(plan), [task for task in tasks if task.refused is None])) as arriving:
-        yield from arriving
-
-
-def _make_setup(plan: SweepPlan) -> Setup:
-    return Setup(plan.base, plan.file.time_limit, plan.file.memory_limit)
+    return codes, reasons

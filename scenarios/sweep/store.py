@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -19,13 +20,14 @@ from ...engines.storage import versioned_metadata
 from ..error import ScenarioError
 from ..files import make_folder, write_json
 from ..run import read_json
+from .check import canonical_text
 from .journal import finished_rows, line_at
-from .plan import SweepPlan, canonical_text
+from .plan import SweepPlan
 from .rows import TIMING, make_record, row_schema
 
 MANIFEST, JOURNAL, RESULTS, TIMINGS = "sweep.json", "journal.txt", "results", "timing.parquet"
 _BLOCK = 20_000  # rows of a row group
-SWEEP_VERSION = 2  # of the manifest, the journal and the data set; earlier, "format" says it
+SWEEP_VERSION = 3  # of the manifest, the journal and the data set; earlier, "format" says it
 
 
 @dataclass(frozen=True)
@@ -132,7 +134,7 @@ def _same(path: Path, then: Mapping[str, Any], now: Mapping[str, Any]) -> None:
     version = then.get(VERSION_KEY, then.get("format"))
     if version != SWEEP_VERSION or not isinstance(then.get("limits"), dict) or "key" not in then:
         raise ScenarioError(
-            f"{path.parent}: was begun by another version of velodrome, whose rows do not name their sweep; "
+            f"{path.parent}: was begun by another version of velodrome, which numbered the runs otherwise; "
             "start it again in another folder by --out"
         )
     if then.get("hash") != now["hash"]:
@@ -152,18 +154,24 @@ def write_results(out: Path, plan: SweepPlan, opened: Opened) -> None:
     OSError
         If the disk is full or another error occurs; the journal stays, and no incomplete file looks complete.
     """
-    offsets = {line.index: offset for offset, line in finished_rows(out / JOURNAL)}
-    columns = row_schema(plan.tasks)
+    offsets = np.full(len(plan.tasks), -1)  # an array: eight bytes a row
+    for offset, line in finished_rows(out / JOURNAL):
+        offsets[line.index] = offset
+    columns = row_schema(plan.parameters)
+    engines = {engine: k for k, engine in enumerate(plan.file.engines)}
+    owners = np.fromiter((engines[plan.tasks.find_engine_of(i)] for i in range(len(offsets))), np.int8, len(offsets))
     with (out / JOURNAL).open("rb") as journal:
-        done = [(task, offsets[task.index]) for task in plan.tasks if task.index in offsets]
+        done = np.flatnonzero(offsets >= 0)
         for engine, version in opened.facts["engines"].items():
             part = part_of(out, engine)
             part.parent.mkdir(parents=True, exist_ok=True)
-            own = ((task, line_at(journal, offset)) for task, offset in done if task.engine == engine)
+            own = (
+                (plan.tasks[i], line_at(journal, offsets[i])) for i in done[owners[done] == engines[engine]].tolist()
+            )
             # A run that was killed could not report its version.
             found = ({"version": version} | make_record(task, line.row, columns) for task, line in own)
             _write(part, columns, found)
-        every = ((task, line_at(journal, offset)) for task, offset in done)
+        every = ((plan.tasks[i], line_at(journal, offsets[i])) for i in done.tolist())
         clocks = ({"key": task.key, "index": task.index, "engine": task.engine, **line.timing} for task, line in every)
         _write(out / TIMINGS, pa.schema(list(TIMING.items()), metadata=versioned_metadata({})), clocks)
     write_sweep_manifest(out, plan, replace(opened, limits=_limits(plan)), complete=True)

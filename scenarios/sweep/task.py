@@ -8,6 +8,7 @@ import math
 import time
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -21,10 +22,11 @@ from ...engines.guard import call_engine
 from ...reports.measure import flatten_metrics
 from ..error import ScenarioError
 from ..run import claimed_noise, configure_engine, measure_one
-from ..scenario import Scenario, ScenarioTemplate, Start, make_start
-from .plan import canonical_text, prune_settings
+from ..scenario import Scenario, ScenarioTemplate, Start, make_starts
+from .check import canonical_text, prune_settings
 from .rows import METRICS, REFUSED, reason_line
 
+_SOURCE = "task"  # what errors of a scenario begin with
 _KEPT_STARTS = 64  # starts that are kept for the other engines at the same points
 
 
@@ -114,10 +116,13 @@ class Tasks:
         """Ride the reference at points; those with the same settings share batches."""
         found: dict[int, tuple[dict[str, Any], dict[str, Any]]] = {}
         batches: dict[str, dict[int, tuple[_Prepared, float]]] = {}
+        begin = time.process_time()
+        scenarios = self._find_starts(REFERENCE, points)
+        share = (time.process_time() - begin) / len(points) if points else 0.0
         for i, changes in enumerate(points):
-            begin = time.process_time()
+            begin = time.process_time() - share
             try:
-                ready = self._prepare(REFERENCE, changes)
+                ready = self._prepare(REFERENCE, changes, scenarios.get(i))
             except Exception as error:
                 ready = _failed_row(error)
             if not isinstance(ready, _Prepared):
@@ -161,12 +166,21 @@ class Tasks:
         kept = reason_line(why_failed(ride)) if isinstance(ride, Exception) else ride
         self._references = {f"{_start_text(changes)} {chosen}": kept}
 
-    def _prepare(self, name: str, changes: Mapping[str, Any]) -> _Prepared | dict[str, Any]:
-        """Return a task ready to ride, or its row where there is nothing to ride."""
+    def _apply(self, name: str, changes: Mapping[str, Any]) -> Scenario:
+        """Return the scenario of an engine at a point."""
         if name not in self._templates:
-            self._templates[name] = ScenarioTemplate(self._base, "task", lambda data: prune_settings(data, name))
-        scenario = self._templates[name].apply(changes)
-        engine, version, settings = _load_configured_engine(name, canonical_text(scenario.engines.get(name, {})))
+            self._templates[name] = ScenarioTemplate(self._base, _SOURCE, lambda data: prune_settings(data, name))
+        return self._templates[name].apply(changes)
+
+    def _prepare(
+        self, name: str, changes: Mapping[str, Any], scenario: Scenario | None = None
+    ) -> _Prepared | dict[str, Any]:
+        """Return a task ready to ride, or its row where there is nothing to ride; ``scenario`` if it is known."""
+        try:
+            scenario = self._apply(name, changes) if scenario is None else scenario
+            engine, version, settings = _load_configured_engine(name, canonical_text(scenario.engines.get(name, {})))
+        except ScenarioError as error:  # values that contradict one another, or a drawn one out of range
+            return {"status": REFUSED, "reason": reason_line(str(error).removeprefix(f"{_SOURCE}: "))}
         facts: dict[str, Any] = {"version": version}
         start = self._find_start(scenario, changes)
         if isinstance(start, str):
@@ -216,17 +230,33 @@ class Tasks:
             self._keep_reference(ready, changes, ride)
         return self._references[text]
 
+    def _find_starts(self, name: str, points: Sequence[Mapping[str, Any]]) -> dict[int, Scenario]:
+        """Find the starts at points together, and keep them; return the scenarios of valid points by their index."""
+        found: dict[int, Scenario] = {}
+        for i, changes in enumerate(points):
+            try:
+                found[i] = self._apply(name, changes)
+            except Exception:  # the point's own row says what is wrong
+                continue
+        texts = {i: _start_text(points[i]) for i in found}
+        missing = {texts[i]: scenario for i, scenario in found.items() if texts[i] not in self._starts}
+        with suppress(Exception):  # as a lack of memory; the rows find their starts one by one, and say what is wrong
+            self._keep_starts(missing, most=len(points))
+        return found
+
     def _find_start(self, scenario: Scenario, changes: Mapping[str, Any]) -> Start | str:
         """Return the start of a scenario, or why there is none; the last ones are kept for the other engines."""
         text = _start_text(changes)
         if text not in self._starts:
-            try:
-                self._starts[text] = make_start(scenario)
-            except ScenarioError as error:
-                self._starts[text] = str(error)
-            if len(self._starts) > _KEPT_STARTS:
-                self._starts.popitem(last=False)
+            self._keep_starts({text: scenario})
         return self._starts[text]
+
+    def _keep_starts(self, missing: Mapping[str, Scenario], most: int = 0) -> None:
+        """Find starts and keep them, together with the last ones of before: ``most`` of them, or more."""
+        for text, start in zip(missing, make_starts(list(missing.values())), strict=True):
+            self._starts[text] = str(start) if isinstance(start, ScenarioError) else start
+        while len(self._starts) > max(_KEPT_STARTS, most):
+            self._starts.popitem(last=False)
 
 
 def _start_text(changes: Mapping[str, Any]) -> str:

@@ -45,7 +45,7 @@ def compare_with_search(requests: list[MotionRequest]) -> tuple[int, int]:
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_motions_are_those_of_the_full_search(family: int) -> None:
-    found, existing = compare_with_search(draw_requests(family, 60, family))
+    found, existing = compare_with_search(draw_requests(family, 36, family))
     assert found > 0.5 * existing > 0
 
 

@@ -1,0 +1,44 @@
+"""Some of a sweep's tasks, kept as ranges of their indices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import overload
+
+import numpy as np
+
+from .plan import Task, TaskSequence
+
+
+class SelectedTasks(Sequence[Task]):
+    """Tasks of a sweep, each made when it is asked for; memory grows with the number of gaps, not of tasks.
+
+    Parameters
+    ----------
+    tasks : TaskSequence
+    chosen : ndarray of bool, shape (n,)
+        Which of the tasks.
+    """
+
+    def __init__(self, tasks: TaskSequence, chosen: np.ndarray) -> None:
+        self._tasks = tasks
+        edges = np.flatnonzero(np.diff(chosen, prepend=False, append=False))
+        self._starts = edges[::2]
+        self._ends = np.cumsum(edges[1::2] - edges[::2])  # of each range, among the chosen tasks
+
+    def __len__(self) -> int:
+        return int(self._ends[-1]) if len(self._ends) else 0
+
+    @overload
+    def __getitem__(self, index: int) -> Task: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Task]: ...
+
+    def __getitem__(self, index: int | slice) -> Task | list[Task]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        number = range(len(self))[index]
+        k = int(np.searchsorted(self._ends, number, side="right"))
+        before = int(self._ends[k - 1]) if k else 0
+        return self._tasks[int(self._starts[k]) + number - before]
