@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,7 +15,6 @@ from typing import Annotated, Any
 import typer
 
 from .options import JsonOption, ending_with, print_json
-from .progress import SILENCE, ProgressBars
 
 # Short uses of what needs kernels, which compile what longer ones need. Those that start together need different ones:
 # a ride on waves starts at given angles, with no circular motion. The output of runs goes to the folder `runs`.
@@ -43,7 +42,10 @@ def warm_up_command(
 
     What is compiled already is not compiled again. The exit status is 1 if a part of it fails.
     """
+    from .progress import SILENCE, ProgressBars
+
     begin = time.perf_counter()
+    quiet = {**os.environ, SILENCE: "off"}
     with ProgressBars() as progress:
         from ...reference.kernels.cache import find_kernel_files, find_kernel_folder
 
@@ -53,7 +55,7 @@ def warm_up_command(
             TemporaryDirectory(prefix="velodrome-warm-up-") as work,
             ThreadPoolExecutor(processes or _count_cores()) as pool,
         ):
-            uses = {pool.submit(_use, arguments, Path(work)): arguments for arguments in _USES}
+            uses = {pool.submit(_use, arguments, Path(work), quiet): arguments for arguments in _USES}
             pending = set(uses)
             while pending:
                 done, pending = wait(pending, timeout=_PAUSE)
@@ -80,14 +82,14 @@ def _count_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _use(arguments: Sequence[str], work: Path) -> str | None:
+def _use(arguments: Sequence[str], work: Path, environment: Mapping[str, str]) -> str | None:
     """Run a command in a process of its own; return its complaint if it fails."""
     code = _MAIN.format(package=__name__.partition(".scenarios.")[0])
     try:
         result = subprocess.run(
             [sys.executable, "-c", code, *arguments],
             cwd=work,
-            env={**os.environ, SILENCE: "off"},
+            env=environment,
             capture_output=True,
             text=True,
             timeout=_PATIENCE,

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numba as nb
 import pytest
 from numba.core import config, event
 from numba.core.errors import TypingError
@@ -104,6 +105,24 @@ def test_compiled_code_is_found_again(folder: Path) -> None:
     assert len(list(folder.glob("*.nbc"))) == 2
     assert count_compilations(lambda: [jit(double)(1.5), jit(double)(2)]) == 0
     assert count_compilations(lambda: jit(double)(1.5j)) == 1
+
+
+def test_loaded_kernel_is_compiled_into_others(folder: Path) -> None:
+    """Its bitcode is parsed then, and not before."""
+    jit(double)(1.5)
+    inner = jit(double)
+
+    @nb.njit
+    def quadruple(x: Any) -> Any:
+        return inner(inner(x))
+
+    assert count_compilations(lambda: inner(1.5)) == 0
+    (loaded,) = inner.overloads.values()
+    assert loaded.library._shared_module is None
+    assert count_compilations(lambda: quadruple(1.5)) == 1
+    assert loaded.library._shared_module is not None
+    assert quadruple(1.5) == 6.0
+    assert inner(1.5) == 3.0
 
 
 def test_damaged_file_is_compiled_anew(folder: Path) -> None:
