@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from ..reference.fall import Fall, fall_criterion, heights_above_fallen, solve_fall
 from ..reference.rim import find_second_touch, require_clear_rims
 from ..reference.wheel_overlap import find_wheel_collision, require_separate_wheels
+from .disk_arrays import is_long, move_to_disk
 from .engine import (
     REQUIRED,
     SHAPES,
@@ -36,7 +38,9 @@ CLOCK_ERROR = 1e-9
 FALL_ERROR = 0.01
 
 
-def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progress) -> Trajectory:
+def ride_engine(
+    engine: Engine, problem: Problem, settings: Any, progress: Progress, folder: Path | None = None
+) -> Trajectory:
     """Run a problem in an engine and validate the trajectory.
 
     The trajectory is cut before a state that is not finite, and where a rim touches the ground at a second place or the
@@ -50,6 +54,9 @@ def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progr
     problem : Problem
     settings : Settings
     progress : callable
+    folder : Path, optional
+        Folder for a temporary file with the arrays of a long ride, see `velodrome.engines.disk_arrays`; by default
+        they are in memory.
 
     Returns
     -------
@@ -57,6 +64,8 @@ def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progr
 
     Raises
     ------
+    OSError
+        If the temporary file cannot be written.
     EngineError
         If the engine does not apply the problem's inputs, a rim lies inside the ground or the wheels overlap at the
         start, or the engine returns no trajectory, or one that does not fit the problem. The message states the fault.
@@ -71,10 +80,12 @@ def ride_engine(engine: Engine, problem: Problem, settings: Any, progress: Progr
         require_separate_wheels(problem.bicycle, problem.q)
     except ValueError as error:
         raise EngineError(str(error)) from error
-    return admit_trajectory(engine, problem, settings, simulate_guarded(engine, problem, settings, progress))
+    return admit_trajectory(engine, problem, settings, simulate_guarded(engine, problem, settings, progress), folder)
 
 
-def admit_trajectory(engine: Engine, problem: Problem, settings: Any, trajectory: Any) -> Trajectory:
+def admit_trajectory(
+    engine: Engine, problem: Problem, settings: Any, trajectory: Any, folder: Path | None = None
+) -> Trajectory:
     """Validate what an engine returns for a problem, and cut it, as `ride_engine` does.
 
     Raises
@@ -86,7 +97,7 @@ def admit_trajectory(engine: Engine, problem: Problem, settings: Any, trajectory
         raise EngineError(f"it gave a {type(trajectory).__name__}, not a Trajectory")
     for wrong in _list_faults(engine, problem, settings, trajectory):
         raise EngineError(wrong)
-    trajectory = _copy_arrays(trajectory)
+    trajectory = _copy_arrays(trajectory, folder)
     asked = problem.times[: len(trajectory.time)]
     if not np.array_equal(trajectory.time, asked):
         trajectory = replace(trajectory, time=asked.copy())
@@ -100,11 +111,14 @@ def admit_trajectory(engine: Engine, problem: Problem, settings: Any, trajectory
     return _cut_at_collision(problem, replace(trajectory.first(bad), ended=trajectory.ended or ended, fall=None))
 
 
-def _copy_arrays(trajectory: Trajectory) -> Trajectory:
+def _copy_arrays(trajectory: Trajectory, folder: Path | None) -> Trajectory:
     """Copy a trajectory's arrays, which an engine may reuse, and convert numpy's scalars to Python's."""
+    trajectory = replace(trajectory, steps=int(trajectory.steps), cpu_time=float(trajectory.cpu_time))
+    if folder is not None and is_long(trajectory):
+        return move_to_disk(trajectory, folder)
     given = {name: value for name in SHAPES if (value := getattr(trajectory, name)) is not None}
     copies: dict[str, Any] = {name: np.array(value, dtype=float, order="C") for name, value in given.items()}
-    return replace(trajectory, **copies, steps=int(trajectory.steps), cpu_time=float(trajectory.cpu_time))
+    return replace(trajectory, **copies)
 
 
 def _cut_at_collision(problem: Problem, trajectory: Trajectory) -> Trajectory:

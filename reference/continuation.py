@@ -130,7 +130,10 @@ def _follow_steps(equations: Steady, first: Point, longest: float, most: int) ->
     while most > 0 and not ended:
         unknowns, tangents = np.empty((2, min(_CHUNK, most) + 1, UNKNOWNS))
         unknowns[0], tangents[0] = first.unknowns, first.tangent
-        filled, distance, ended = kernel.follow(distance, longest, largest, *equations.where, unknowns, tangents)
+        try:
+            filled, distance, ended = kernel.follow(distance, longest, largest, *equations.where, unknowns, tangents)
+        except ZeroDivisionError:  # see `Steady.expand`
+            return
         points = [Point(*row) for row in zip(unknowns[1:filled], tangents[1:filled], strict=True)]
         yield from points
         first, most = points[-1] if points else first, most - len(points)

@@ -18,7 +18,6 @@ from .kernels import rides as kernel
 from .kinematics import WHEELS, constants
 from .rim import bicycle_rim_search, require_clear_rims, second_touch
 from .surface import Surface, evaluate
-from .tableau import TABLEAU
 
 _TOUCHING_WHEEL = {integrate.REAR_TOUCHED: WHEELS[0], integrate.FRONT_TOUCHED: WHEELS[1]}
 _ALL_CALLS = 1 << 40  # more calls than any ride takes
@@ -149,7 +148,7 @@ def simulate(
     riding = True
     while riding:
         calls = _ALL_CALLS if progress is None else 1
-        kernel.continue_rides(0, 1, calls, times, tolerance, TABLEAU, setups, surface.function.real, states)
+        kernel.continue_rides(0, 1, calls, times, tolerance, setups, surface.function.real, states)
         riding = states.counts[0, 0] == integrate.MORE
         _require_start(start, states, 0)
         if progress is not None:
@@ -192,9 +191,7 @@ def simulate_many(
         function = own[0].surface.function.real
 
         def ride(part: range, setups=setups, states=states, function=function) -> None:
-            kernel.continue_rides(
-                part.start, part.stop, _ALL_CALLS, times, tolerance, TABLEAU, setups, function, states
-            )
+            kernel.continue_rides(part.start, part.stop, _ALL_CALLS, times, tolerance, setups, function, states)
 
         _share(ride, len(own), threads)
         for k, (i, start) in enumerate(zip(kind, own, strict=True)):

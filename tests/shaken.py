@@ -1,8 +1,9 @@
 """Shake linear algebra by round-off: a pytest plugin, ``-p tests.shaken --shaken SEED``.
 
 Another machine's LAPACK rounds otherwise. What it would give is had by changing each entry of the matrices whose
-eigenvalues are asked for, and of the results of decompositions and solves, by some units in the last place. The same
-matrix is always changed alike, as one machine would do it.
+eigenvalues are asked for, and of the results of decompositions and solves, by some units in the last place; so are the
+motions that the compiled Newton's method finds, whose bits depend on the compiler. The same matrix is always changed
+alike, as one machine would do it.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from zlib import crc32
 
 import numpy as np
 import pytest
+
+from velodrome.reference.kernels import newton
 
 _ULPS = 4 * np.finfo(float).eps
 
@@ -57,6 +60,14 @@ def shake(seed: int, replace: Callable[[Any, str, Any], None] = setattr) -> None
         replace(np.linalg, name, with_moved_input(getattr(np.linalg, name)))
     for name in ("svd", "lstsq", "solve", "inv"):
         replace(np.linalg, name, with_moved_result(getattr(np.linalg, name)))
+    solve = newton.solve_motion
+
+    def solve_moved(*arguments: Any) -> Any:
+        outcome, unknowns = solve(*arguments), arguments[-1]
+        unknowns[:] = moved(unknowns, key_of(unknowns))
+        return outcome
+
+    replace(newton, "solve_motion", solve_moved)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -22,7 +22,6 @@ SAME_MEANING = {
     "angular_velocities": "of the bicycle's bodies",
     "contact_forces": "of the ground on the wheels: in one state, and along a ride",
     "metric": "of the arclength along a family",
-    "observe": "contacts and energies along a ride",
     "residual": "of the equations of motion",
     "solve": "linear equations: of any matrix, and of the reduced system",
 }

@@ -99,7 +99,7 @@ class DrakeEngine(Generic[S]):
             If Drake refuses the bicycle, or a wheel has no contact point at the start.
         """
         self.check(problem, settings)
-        from .ride import read_coordinates, ride_simulation
+        from .ride import convert_motions, ride_simulation
 
         module, name = self.builder.split(":")
         build: Callable[[Problem, Any], DrakeRig] = getattr(import_module(module), name)
@@ -108,7 +108,7 @@ class DrakeEngine(Generic[S]):
         ride = ride_simulation(build(problem, settings), problem, settings.step, counts, progress)
         recording = ride.recording
         motion = recording.motion
-        q, qd = read_coordinates(problem, recording.time, motion)
+        q, qd = convert_motions(problem, recording.time, motion)
         return Trajectory(
             engine=self.name,
             version=self.version,

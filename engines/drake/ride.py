@@ -135,10 +135,10 @@ class RideWatch:
         return self._fall.look(time, height, motion)
 
     def _convert(self, times: np.ndarray, states: tuple[BodyMotions, BodyMotions]) -> tuple[np.ndarray, np.ndarray]:
-        return read_coordinates(self._problem, times, BodyMotions.stack(states))
+        return convert_motions(self._problem, times, BodyMotions.stack(states))
 
 
-def read_coordinates(problem: Problem, times: np.ndarray, motion: BodyMotions) -> tuple[np.ndarray, np.ndarray]:
+def convert_motions(problem: Problem, times: np.ndarray, motion: BodyMotions) -> tuple[np.ndarray, np.ndarray]:
     """Compute generalised coordinates and rates (n, 9), with angles on the same turn as the problem's start."""
     q, qd = coordinates_from_bodies(
         problem.bicycle, times, motion.position[:, 0], motion.velocity[:, 0], motion.rotation, motion.spin

@@ -81,11 +81,11 @@ class PinocchioEngine:
             If a wheel has no contact at the start, or the solver fails there.
         """
         refuse_releases(self.name, settings, PINOCCHIO)
-        from .ride import read_coordinates, ride_bicycle
+        from .ride import convert_recording, ride_bicycle
 
         result = ride_bicycle(problem, settings, progress)
         seen = result.recording
-        q, qd = read_coordinates(problem, seen, seen.time)
+        q, qd = convert_recording(problem, seen, seen.time)
         return Trajectory(
             engine=self.name,
             version=self.version,

@@ -108,7 +108,7 @@ class PinocchioOutcome:
     largest_residual: float
 
 
-def read_coordinates(problem: Problem, seen: PinocchioRecording, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def convert_recording(problem: Problem, seen: PinocchioRecording, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute generalised coordinates and rates (n, 9), with angles on the same turn as the problem's start."""
     motion = (seen.configuration, seen.velocity, seen.position[:, 0], seen.rotation, seen.spin)
     q, qd = from_pinocchio(problem.bicycle, times, *motion)
@@ -234,7 +234,7 @@ class PinocchioRide:
     def _convert_states(
         self, times: np.ndarray, states: tuple[PinocchioRecording, PinocchioRecording]
     ) -> tuple[np.ndarray, np.ndarray]:
-        return read_coordinates(self._problem, PinocchioRecording.join(states), times)
+        return convert_recording(self._problem, PinocchioRecording.join(states), times)
 
     def record(self, recording: PinocchioRecording, k: int) -> None:
         """Record the present state as sample k."""

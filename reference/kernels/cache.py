@@ -26,9 +26,9 @@ from typing import Any, NamedTuple
 
 import numba as nb
 from numba.core import config
-from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
+from .loading import CompiledCode, load_code, take_code
 from .locks import unlock, wait_for_lock
 
 _HERE = Path(__file__).parent
@@ -126,7 +126,7 @@ class KernelCache:
             data = _read(folders.read, name, key)  # another process may have compiled it in the meantime
             if data is not None:
                 self.release()
-        return None if data is None else CompileResult._rebuild(target_context, *data)
+        return None if data is None else load_code(target_context, data)
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Write compiled code, and unlock it."""
@@ -134,7 +134,7 @@ class KernelCache:
             folder = find_folders(self._chosen).write
             if folder is not None and not data.lifted and not data.library.has_dynamic_globals:
                 key = self._key(sig, data.codegen)
-                _write(folder / self._file_name(key), dumps((key, data._reduce())))
+                _write(folder / self._file_name(key), dumps((key, take_code(data))))
         finally:
             self.release()
 
@@ -203,7 +203,7 @@ def _find_imports(path: Path) -> frozenset[Path]:
     return frozenset(found)
 
 
-def _read(folders: tuple[Path, ...], name: str, key: tuple[Any, ...]) -> Any:
+def _read(folders: tuple[Path, ...], name: str, key: tuple[Any, ...]) -> CompiledCode | None:
     """Return the code in the first folder that has it under this name and key; None if none has."""
     for folder in folders:
         try:

@@ -13,6 +13,7 @@ import numpy as np
 
 from . import lean
 from .compilation import jit
+from .dormand_prince import SIZE, error_norm, fill_dense_output, fill_extra_stage, fill_stage, fill_step
 from .dynamics import wheels
 from .fall import height_above_fallen, may_fall_within
 from .lean import derivative
@@ -20,7 +21,6 @@ from .pose import aligned
 from .projection import project
 from .rim import bound, least_clearance
 
-SIZE = 24
 DONE, MORE, FAILED, REAR_TOUCHED, FRONT_TOUCHED, FELL = range(6)
 _LOOKS = 8  # checks of the rims while a wheel rolls over a length of the ground's detail
 _BISECTIONS = 60
@@ -34,54 +34,18 @@ SMALLEST_STEP = 1e-8
 
 
 @jit
-def _combine(y, h, weights, count, stages, out):
-    """Fill out = y + h sum_j weights[j] stages[j]."""
-    for i in range(SIZE):
-        out[i] = y[i]
-    for j in range(count):
-        a = h * weights[j]
-        if a != 0.0:
-            for i in range(SIZE):
-                out[i] += a * stages[j, i]
+def _eighth_root(x):
+    """Return x^(1/8): with the same bits on every machine, unlike a power."""
+    return math.sqrt(math.sqrt(math.sqrt(x)))
 
 
 @jit
-def _error_norm(y, new, h, stages, e3, e5, tolerance, error3, error5):
-    """Return the error norm of a step in units of the tolerance, which is relative above 1 and absolute below.
-
-    ``error3`` and ``error5`` (24,) are overwritten.
-    """
-    for i in range(SIZE):
-        error3[i] = error5[i] = 0.0
-    for j in range(13):
-        for i in range(SIZE):
-            error3[i] += e3[j] * stages[j, i]
-            error5[i] += e5[j] * stages[j, i]
-    norm5 = norm3 = 0.0
-    for i in range(SIZE):
-        unit = tolerance * (1 + max(abs(y[i]), abs(new[i])))
-        norm5 += (error5[i] / unit) ** 2
-        norm3 += (error3[i] / unit) ** 2
-    denominator = norm5 + 0.01 * norm3
-    return 0.0 if denominator == 0 else abs(h) * norm5 / math.sqrt(denominator * SIZE)
-
-
-@jit
-def _fill_dense_output(y, new, h, stages, a_extra, d, function, parameters, bicycle, work, out):
-    """Fill ``out`` (7, 24), the coefficients of the dense output; fill the three extra rows of ``stages``."""
-    for s in range(3):
-        _combine(y, h, a_extra[s], 13 + s, stages, work)
-        derivative(work, function, parameters, bicycle, stages[13 + s])
-    for i in range(SIZE):
-        delta = new[i] - y[i]
-        out[0, i] = delta
-        out[1, i] = h * stages[0, i] - delta
-        out[2, i] = 2 * delta - h * (stages[12, i] + stages[0, i])
-        for k in range(4):
-            total = 0.0
-            for j in range(16):
-                total += d[k, j] * stages[j, i]
-            out[3 + k, i] = h * total
+def _complete_dense_output(y, new, h, stages, k, function, parameters, bicycle, work, out):
+    """Fill ``out`` (7, 24), the coefficients of the dense output, and the three extra rows of ``stages``."""
+    for s in range(13, 16):
+        fill_extra_stage(s, y, h, k, work)
+        derivative(work, function, parameters, bicycle, stages[s])
+    fill_dense_output(y, new, h, k, out)
 
 
 @jit
@@ -216,9 +180,7 @@ def _fall_within(y, coefficients, fall, function, parameters, work):
 
 
 @jit
-def dop853(
-    y, times, index, t, h, tolerance, most_steps, tableau, ground, fall, function, parameters, c, out, fallen, at
-):
+def dop853(y, times, index, t, h, tolerance, most_steps, ground, fall, function, parameters, c, out, fallen, at):
     """Advance ``y`` in place and fill rows ``index``... of ``out`` (n, 24) at ``times``.
 
     Each accepted step and each output is projected onto gaps, contact equations and rolling. Stops at the last time,
@@ -230,10 +192,10 @@ def dop853(
 
     Returns ``(status, index, t, h, steps, evaluations)``.
     """
-    a, b, e3, e5, a_extra, d = tableau
     bicycle = aligned(c)
     stages, coefficients = np.empty((16, SIZE)), np.empty((7, SIZE))
-    new, work, error5 = np.empty(SIZE), np.empty(SIZE), np.empty(SIZE)
+    k = stages.reshape(-1)  # the same numbers
+    new, work, work2 = np.empty(SIZE), np.empty(SIZE), np.empty(SIZE)
     derivative(y, function, parameters, bicycle, stages[0])
     steps, evaluations, rejected = 0, 1, False
     bounds = _rim_bounds(y, ground, function, parameters, c) if ground.curved else (1.0, 1.0)
@@ -242,14 +204,14 @@ def dop853(
         if not SMALLEST_STEP < h < 1e300:
             return FAILED, index, t, h, steps, evaluations
         for s in range(1, 12):
-            _combine(y, h, a[s], s, stages, work)
+            fill_stage(s, y, h, k, work)
             derivative(work, function, parameters, bicycle, stages[s])
-        _combine(y, h, b, 12, stages, new)
+        fill_step(y, h, k, new)
         derivative(new, function, parameters, bicycle, stages[12])
         evaluations += 12
-        error = _error_norm(y, new, h, stages, e3, e5, tolerance, work, error5)
+        error = error_norm(y, new, h, k, tolerance, work, work2)
         if not error < 1:  # also if it is not a number
-            h *= max(0.2, 0.9 * error ** (-1 / 8)) if error < 1e300 else 0.2
+            h *= max(0.2, 0.9 / _eighth_root(error)) if error < 1e300 else 0.2
             rejected = True
             continue
         next_bounds = _rim_bounds(new, ground, function, parameters, c) if ground.curved else bounds
@@ -257,7 +219,7 @@ def dop853(
         clear, standing = _are_clear(bounds, next_bounds), not may_fall_within(h, height, next_height)
         end, status, before, after = t + h, MORE, 2.0, 2.0
         if times[index] <= end or not clear or not standing:
-            _fill_dense_output(y, new, h, stages, a_extra, d, function, parameters, bicycle, work, coefficients)
+            _complete_dense_output(y, new, h, stages, k, function, parameters, bicycle, work, coefficients)
             evaluations += 3
             if not clear:
                 touch, wheel = _second_touch(y, new, coefficients, ground, function, parameters, c, work)
@@ -273,15 +235,15 @@ def dop853(
                     return FAILED, index, t, h, steps, evaluations
                 index += 1
             if status == FELL:
-                for k, share in enumerate((before, after)):
-                    _interpolate(y, coefficients, share, fallen[k])
-                    at[k] = t + share * h
-                    if not project(fallen[k], function, parameters, c, bicycle):
+                for j, share in enumerate((before, after)):
+                    _interpolate(y, coefficients, share, fallen[j])
+                    at[j] = t + share * h
+                    if not project(fallen[j], function, parameters, c, bicycle):
                         return FAILED, index, t, h, steps, evaluations
             if status != MORE:
                 # What happens after the last time is not part of this motion.
                 return (DONE if index == times.size else status), index, end, h, steps + 1, evaluations
-        factor = 10.0 if error == 0 else min(10.0, 0.9 * error ** (-1 / 8))
+        factor = 10.0 if error == 0 else min(10.0, 0.9 / _eighth_root(error))
         for i in range(SIZE):
             y[i] = new[i]
         if not project(y, function, parameters, c, bicycle):

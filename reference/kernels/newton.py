@@ -113,7 +113,9 @@ def solve_motion(u, condition, most, real, function, parameters, a, c, full):
         share = min(1.0, 0.5 / size) if size > 0 else 1.0
         for i in range(COORDINATES):
             u[i] += share * step[i]
-        if size < 1e-9:  # convergence is quadratic: what remains is round-off
+        # Where convergence is quadratic, the step after one of 1e-9 is round-off. It is linear where the rear wheel
+        # nearly stands, sigma b^2 = 0, and round-off is larger next to a fold.
+        if size < _SETTLED or (size < 1e-9 and iteration == most):
             circle_and_unknowns(u, real, parameters, a, rows, full)
             return (iteration, sign) if is_solution(full, real, parameters, c) else (0, 0.0)
     return 0, 0.0

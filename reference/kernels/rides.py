@@ -143,7 +143,7 @@ def begin_rides(first, last, setups, function, states):
 
 
 @jit_released
-def continue_rides(first, last, most_calls, times, tolerance, tableau, setups, function, states):
+def continue_rides(first, last, most_calls, times, tolerance, setups, function, states):
     """Continue the rides ``first`` to ``last`` by up to ``most_calls`` times `STEPS_A_CALL` steps each.
 
     Fills the forces of rides that have ended. See `integrate.dop853`.
@@ -163,7 +163,6 @@ def continue_rides(first, last, most_calls, times, tolerance, tableau, setups, f
                 clock[1],
                 tolerance,
                 STEPS_A_CALL,
-                tableau,
                 ground,
                 fall,
                 function,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...engines.disk_arrays import release_pages
 from ...engines.engine import REFERENCE, Trajectory
 from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.kinematics import FRONT_ANGLE, LEAN, REAR_ANGLE, STEER, WHEELS, YAW
@@ -86,6 +87,7 @@ def drawable_values(ride: RideData, plot: Plot) -> dict[str, np.ndarray]:
         values = plot.values(ride, run)
         if values is not None and np.isfinite(values).any():
             found[name] = values
+        release_pages(run)
     return found
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...engines.disk_arrays import release_pages
 from ...engines.engine import REFERENCE
 from ..drawing import ERROR, PLOTS, RADIUS, SMALLEST_SIZE, Plot, RideData, choose_samples
 
@@ -213,38 +214,46 @@ def draw_curves(ride: RideData, circular: bool) -> list[tuple[str, list[DrawnCur
     list of (str, list of DrawnCurve)
         Title of the group and its panels; groups without a panel are omitted.
     """
-    found = [
-        (title, panel, *_select_drawable(ride, panel))
+    panels = [
+        (title, panel, _explain_absent(ride, panel))
         for title, panels in GROUPS
         for panel in panels
         if circular or panel.key != RADIUS.key
     ]
-    count = sum(len(values) for _, _, values, _ in found)
+    count = sum(len(ride.trajectories) - len(absent) for _, _, absent in panels)
     most = max(4, min(MOST_CURVE_POINTS, ALL_CURVE_POINTS // max(1, count)))
     groups: dict[str, list[DrawnCurve]] = {}
-    for title, panel, values, absent in found:
-        if not values:
-            continue
-        curves = {name: make_curve(ride.trajectories[name].time, series, most) for name, series in values.items()}
-        extremes = {name: _find_extremes(series, panel.log) for name, series in values.items()}
-        groups.setdefault(title, []).append(DrawnCurve(panel, curves, extremes, absent))
+    for title, panel, absent in panels:
+        if len(absent) < len(ride.trajectories):
+            groups.setdefault(title, []).append(_draw_panel(ride, panel, absent, most))
     return list(groups.items())
 
 
-def _select_drawable(ride: RideData, panel: Panel) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Return the values of a panel by engine, and why the other engines have none that can be drawn."""
-    values: dict[str, np.ndarray] = {}
+def _explain_absent(ride: RideData, panel: Panel) -> dict[str, str]:
+    """Return why engines have no values of a panel that can be drawn; the engines that have some are not in it."""
     absent: dict[str, str] = {}
     for name, run in ride.trajectories.items():
         series = panel.plot.values(ride, run)
         if series is None:
             absent[name] = THE_MEASURE if name == REFERENCE and panel.plot is ERROR else NOT_GIVEN
-        elif np.isfinite(series).any():
-            values[name] = series
-        else:
+        elif not np.isfinite(series).any():
             # A finite quantity has no logarithm only where it is too small.
             absent[name] = TOO_SMALL if panel.log and not run.not_finite() else NOT_FINITE
-    return values, absent
+        release_pages(run)
+    return absent
+
+
+def _draw_panel(ride: RideData, panel: Panel, absent: dict[str, str], most: int) -> DrawnCurve:
+    """Draw a panel with curves of ``most`` points, computing the values of one engine at a time."""
+    curves: dict[str, dict[str, list[float | None]]] = {}
+    extremes: dict[str, tuple[float, float, float]] = {}
+    for name, run in ride.trajectories.items():
+        series = None if name in absent else panel.plot.values(ride, run)
+        if series is not None:
+            curves[name] = make_curve(run.time, series, most)
+            extremes[name] = _find_extremes(series, panel.log)
+        release_pages(run)
+    return DrawnCurve(panel, curves, extremes, absent)
 
 
 def _find_extremes(values: np.ndarray, log: bool) -> tuple[float, float, float]:

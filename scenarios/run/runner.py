@@ -14,9 +14,10 @@ import numpy as np
 import tomli_w
 
 from ...engines.admission import ride_engine
+from ...engines.disk_arrays import release_pages
 from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, why_failed
 from ...engines.storage import write_trajectory
-from ...reports.measure import ROUND_OFF, compute_metrics, cut_at_fall, evaluate_ride
+from ...reports.measure import ROUND_OFF, compute_metrics, cut_at_fall
 from ..error import ScenarioError
 from ..files import file_digest, write_sealed, write_text
 from ..scenario import (
@@ -39,6 +40,7 @@ from .folder import (
     write_page,
     write_run_recording,
 )
+from .long_rides import evaluate_stored_ride
 
 
 class RunWatch(Protocol):
@@ -252,12 +254,13 @@ def store_run(
     def store(name: str, rides: Rides) -> None:
         if name in rides.trajectories:
             write_trajectory(rides.trajectories[name], folder / f"{name}.parquet")
+            release_pages(rides.trajectories[name])
         write_manifest(folder, plan, digest, rides.trajectories, rides.failures)
 
-    rides = ride_plan(plan, watch, note, trace, store, accept)
+    rides = ride_plan(plan, watch, note, trace, store, accept, folder)
     with _block_interrupts():
         say("measuring the rides")
-        result = measure_run(plan, rides)
+        result = measure_run(plan, rides, folder)
         say("writing the recording and the report")
         write_sealed(folder / "metrics.json", result.metrics, RUN_VERSION)
         recorded = None
@@ -287,6 +290,7 @@ def ride_plan(
     trace: Trace | None = None,
     store: Callable[[str, Rides], None] | None = None,
     accept: Callable[[str], None] | None = None,
+    folder: Path | None = None,
 ) -> Rides:
     """Simulate the problem of a plan with every engine.
 
@@ -297,6 +301,8 @@ def ride_plan(
         As `run_plan` takes them.
     store : callable, optional
         Called after each engine with its name and the rides so far.
+    folder : Path, optional
+        Folder for the temporary files of long rides; by default every ride is kept in memory.
 
     Returns
     -------
@@ -325,7 +331,7 @@ def ride_plan(
     try:
         for name, (engine, settings) in plan.engines.items():
             try:
-                trajectory = ride_engine(engine, problem, settings, lambda time, name=name: report(name, time))
+                trajectory = ride_engine(engine, problem, settings, lambda time, name=name: report(name, time), folder)
                 if accept is not None:
                     accept(name)
             except Exception as error:  # whatever an engine raises must not cost the others' results
@@ -345,14 +351,34 @@ def ride_plan(
     return rides
 
 
-def measure_run(plan: RunPlan, rides: Rides) -> RunResult:
-    """Compute the metrics and verdicts of the rides of a plan."""
+def measure_run(plan: RunPlan, rides: Rides, folder: Path | None = None) -> RunResult:
+    """Compute the metrics and verdicts of the rides of a plan, one ride after the other.
+
+    Parameters
+    ----------
+    plan : RunPlan
+    rides : Rides
+    folder : Path, optional
+        Folder for the temporary files of long rides, as `ride_plan` takes it.
+
+    Returns
+    -------
+    RunResult
+    """
     where = (plan.start.problem.bicycle, plan.start.problem.surface)
-    followed = {name: evaluate_ride(trajectory, *where) for name, trajectory in rides.trajectories.items()}
-    metrics = measure_rides(plan, rides.trajectories, followed)
+    shown: dict[str, Trajectory] = {}
+    metrics: dict[str, dict[str, Any]] = {}
+    reference: Trajectory | None = None  # the first of the rides, if it is among them
+    for name, trajectory in rides.trajectories.items():
+        followed = evaluate_stored_ride(trajectory, *where, folder)
+        noise = claimed_noise(*plan.engines[name])
+        metrics[name] = measure_one(plan.start, trajectory, reference, step_noise=noise, followed=followed)
+        shown[name] = cut_at_fall(followed, *where)
+        release_pages(trajectory, followed)
+        reference = followed if name == REFERENCE else reference
     return RunResult(
         trajectories=rides.trajectories,
-        shown={name: cut_at_fall(trajectory, *where) for name, trajectory in followed.items()},
+        shown=shown,
         metrics=metrics,
         failures=rides.failures,
         verdicts=judge_run(plan, metrics),
@@ -381,26 +407,6 @@ def measure_one(
         step_noise=step_noise,
         followed=followed,
     )
-
-
-def measure_rides(
-    plan: RunPlan, trajectories: Mapping[str, Trajectory], followed: Mapping[str, Trajectory]
-) -> dict[str, dict[str, Any]]:
-    """Compute the metrics of every trajectory, with errors relative to the reference's if it is among them.
-
-    ``followed`` holds the trajectories as `velodrome.reports.measure.consistency.evaluate_ride` returns them.
-    """
-    reference = followed.get(REFERENCE)
-    return {
-        name: measure_one(
-            plan.start,
-            trajectory,
-            None if name == REFERENCE else reference,
-            step_noise=claimed_noise(*plan.engines[name]),
-            followed=followed[name],
-        )
-        for name, trajectory in trajectories.items()
-    }
 
 
 def claimed_noise(engine: Engine, settings: Settings) -> float:

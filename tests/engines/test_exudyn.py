@@ -252,9 +252,13 @@ def test_a_fall_ends_the_run_and_prints_nothing(capfd) -> None:
     bicycle = Bicycle()
     q, qd = consistent_state(bicycle, Plane(), (0.0, 0.0), 0.3, 0.0, (1.0, 0.0, 2.0))
     task = Problem(bicycle, Plane(), q, qd, np.arange(1001) / 100)
-    result = run(task, 1e-3)
+    standing = run(task, 1e-3)
+    assert standing.ended is not None
+    assert standing.ended.startswith("the bicycle fell at t")
+    result = run(dataclasses.replace(task, beyond_fall=True), 1e-3)
     assert result.ended is not None
     assert "did not converge at t" in result.ended
+    assert len(standing.time) < len(result.time)
     assert 0 < len(result.time) < len(task.times)
     assert result.contact_force is not None
     assert len(result.q) == len(result.contact_force) == len(result.time)

@@ -372,15 +372,16 @@ def test_settings_are_checked(settings) -> None:
 
 def test_fall_ends_with_a_reason_whatever_the_output(q2) -> None:
     q, qd = consistent_state(Bicycle(), Plane(), (0.1, 0.2), 0.05, 0.0, (0.0, 0.0, 3.0))
-    problem = Problem(Bicycle(), Plane(), q, qd, every(0.01, 4.0))
-    often, seldom = run(problem), run(replace(problem, times=every(0.05, 4.0)))
-    assert often.ended is not None
-    assert often.ended.startswith("a wheel lies flat or has no contact point")
-    assert often.ended == seldom.ended
-    assert 0.5 < often.time[-1] < 4.0
-    for trajectory in (often, seldom):
-        assert len(trajectory.q) == len(trajectory.time) == len(trajectory.contact_force)  # pyright: ignore
-        assert np.all(np.isfinite(trajectory.q))
+    for beyond, why in ((False, "the bicycle fell"), (True, "a wheel lies flat or has no contact point")):
+        problem = Problem(Bicycle(), Plane(), q, qd, every(0.01, 4.0), beyond_fall=beyond)
+        often, seldom = run(problem), run(replace(problem, times=every(0.05, 4.0)))
+        assert often.ended is not None
+        assert often.ended.startswith(why)
+        assert often.ended == seldom.ended
+        assert 0.5 < often.time[-1] < 4.0
+        for trajectory in (often, seldom):
+            assert len(trajectory.q) == len(trajectory.time) == len(trajectory.contact_force)  # pyright: ignore
+            assert np.all(np.isfinite(trajectory.q))
 
 
 def test_instability_ends_with_a_reason_and_no_litter(q2, tmp_path, monkeypatch) -> None:

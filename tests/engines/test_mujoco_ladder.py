@@ -295,7 +295,7 @@ def test_required_friction_counts_pull_as_impossible() -> None:
 
 def test_default_slides_for_want_of_friction_then_falls_by_creep() -> None:
     """On Q2: with a coefficient of 1 in a pyramid the front wheel slides at once; with 2 it still creeps and falls."""
-    problem = replace(motion("1/200"), times=every(0.02, 1.0))
+    problem = replace(motion("1/200"), times=every(0.02, 1.0), beyond_fall=True)
     sliding, creeping, careful = (
         run(engine, problem, **settings)
         for engine, settings in ((default, {}), (default, {"friction": 2.0}), (native, {}))
@@ -341,7 +341,7 @@ def test_fall() -> None:
     """The multipliers end where the rim comes to lie flat; a contact lets go, and the bicycle drops on."""
     q, qd = consistent_state(Bicycle(), Plane(), (0.1, 0.2), 0.05, 0.0, (0.0, 0.0, 3.0))
     for engine in (multipliers, exact_contact):
-        trajectory = run(engine, Problem(Bicycle(), Plane(), q, qd, every(0.02, 4.0)))
+        trajectory = run(engine, Problem(Bicycle(), Plane(), q, qd, every(0.02, 4.0), beyond_fall=True))
         low = trajectory.body_position[:, 0, 2] < 0.09  # a tenth of its height
         assert 0.5 < trajectory.time[np.argmax(low)] < 3.0
         assert np.all(np.isfinite(trajectory.qd))

@@ -1,7 +1,8 @@
 """Coefficients of the Dormand-Prince method of order 8 with error estimates of orders 5 and 3 and dense output.
 
 They are those of Hairer's DOP853, as `scipy.integrate.DOP853` has them; importing that takes half a second. Each row
-has its coefficients other than zero by column.
+has its coefficients other than zero by stage, in ascending order: those of the state at each stage and at the end of a
+step, of both error estimates, of the states at the three extra stages of the dense output, and of its coefficients.
 
 References
 ----------
@@ -10,20 +11,7 @@ E. Hairer, S. P. Norsett, G. Wanner: Solving Ordinary Differential Equations I. 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import numpy as np
-
-
-def _fill(shape: tuple[int, int], rows: Sequence[dict[int, float]]) -> np.ndarray:
-    """Return a table with the given coefficients and zeros elsewhere."""
-    table = np.zeros(shape)
-    for i, row in enumerate(rows):
-        table[i, list(row)] = list(row.values())
-    return table
-
-
-_STAGES: tuple[dict[int, float], ...] = (
+STAGES: tuple[dict[int, float], ...] = (
     {},
     {0: 0.05260015195876773},
     {0: 0.0197250569845379, 1: 0.0591751709536137},
@@ -77,43 +65,37 @@ _STAGES: tuple[dict[int, float], ...] = (
         10: 0.6433927460157636,
     },
 )
-_SUM: tuple[dict[int, float], ...] = (
-    {
-        0: 0.054293734116568765,
-        5: 4.450312892752409,
-        6: 1.8915178993145003,
-        7: -5.801203960010585,
-        8: 0.3111643669578199,
-        9: -0.1521609496625161,
-        10: 0.20136540080403034,
-        11: 0.04471061572777259,
-    },
-)
-_ERROR_3: tuple[dict[int, float], ...] = (
-    {
-        0: -0.18980075407240762,
-        5: 4.450312892752409,
-        6: 1.8915178993145003,
-        7: -5.801203960010585,
-        8: -0.4226823213237919,
-        9: -0.1521609496625161,
-        10: 0.20136540080403034,
-        11: 0.02265179219836082,
-    },
-)
-_ERROR_5: tuple[dict[int, float], ...] = (
-    {
-        0: 0.01312004499419488,
-        5: -1.2251564463762044,
-        6: -0.4957589496572502,
-        7: 1.6643771824549864,
-        8: -0.35032884874997366,
-        9: 0.3341791187130175,
-        10: 0.08192320648511571,
-        11: -0.022355307863886294,
-    },
-)
-_EXTRA_STAGES: tuple[dict[int, float], ...] = (
+SUM: dict[int, float] = {
+    0: 0.054293734116568765,
+    5: 4.450312892752409,
+    6: 1.8915178993145003,
+    7: -5.801203960010585,
+    8: 0.3111643669578199,
+    9: -0.1521609496625161,
+    10: 0.20136540080403034,
+    11: 0.04471061572777259,
+}
+ERROR_3: dict[int, float] = {
+    0: -0.18980075407240762,
+    5: 4.450312892752409,
+    6: 1.8915178993145003,
+    7: -5.801203960010585,
+    8: -0.4226823213237919,
+    9: -0.1521609496625161,
+    10: 0.20136540080403034,
+    11: 0.02265179219836082,
+}
+ERROR_5: dict[int, float] = {
+    0: 0.01312004499419488,
+    5: -1.2251564463762044,
+    6: -0.4957589496572502,
+    7: 1.6643771824549864,
+    8: -0.35032884874997366,
+    9: 0.3341791187130175,
+    10: 0.08192320648511571,
+    11: -0.022355307863886294,
+}
+EXTRA_STAGES: tuple[dict[int, float], ...] = (
     {
         0: 0.056167502283047954,
         6: 0.25350021021662483,
@@ -145,7 +127,7 @@ _EXTRA_STAGES: tuple[dict[int, float], ...] = (
         14: -9.15095847217987,
     },
 )
-_DENSE_OUTPUT: tuple[dict[int, float], ...] = (
+DENSE_OUTPUT: tuple[dict[int, float], ...] = (
     {
         0: -8.428938276109013,
         5: 0.5667149535193777,
@@ -202,14 +184,4 @@ _DENSE_OUTPUT: tuple[dict[int, float], ...] = (
         14: -39.17726167561544,
         15: -149.72683625798564,
     },
-)
-
-# (A, B, E3, E5, A of the extra stages, D) in Hairer's letters, shapes (12, 12), (12,), (13,), (13,), (3, 16), (4, 16).
-TABLEAU = (
-    _fill((12, 12), _STAGES),
-    _fill((1, 12), _SUM)[0],
-    _fill((1, 13), _ERROR_3)[0],
-    _fill((1, 13), _ERROR_5)[0],
-    _fill((3, 16), _EXTRA_STAGES),
-    _fill((4, 16), _DENSE_OUTPUT),
 )
