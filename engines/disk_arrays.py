@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -57,7 +58,7 @@ def move_to_disk(trajectory: Trajectory, folder: Path) -> Trajectory:
     return replace(trajectory, **write_disk_arrays(blocks, samples, folder))
 
 
-def write_disk_arrays(blocks: Iterable[Mapping[str, np.ndarray]], samples: int, folder: Path) -> dict[str, np.ndarray]:
+def write_disk_arrays(blocks: Iterable[Mapping[str, np.ndarray]], samples: int, folder: Path) -> dict[str, Any]:
     """Write arrays that are given in consecutive blocks to a temporary file, and map it into memory.
 
     Parameters
@@ -78,7 +79,9 @@ def write_disk_arrays(blocks: Iterable[Mapping[str, np.ndarray]], samples: int, 
     OSError
         If the file cannot be written.
     """
-    item, place, shapes, begins = np.dtype(float).itemsize, 0, {}, {}
+    item, place = np.dtype(float).itemsize, 0
+    shapes: dict[str, tuple[int, ...]] = {}
+    begins: dict[str, int] = {}
     with tempfile.TemporaryFile(prefix=".long-ride-", dir=folder) as file:
         done = 0
         for block in blocks:

@@ -148,7 +148,7 @@ def _locate(request: MotionRequest) -> _Cell:
 
 def _search_cell(cell: _Cell, requests: dict[int, MotionRequest]) -> Iterator[tuple[int, CircularMotion]]:
     """Yield the motions of a cell that are clear, by their key in ``requests``."""
-    charts = [_follow_branches(cell.bicycle, node, cell.family, cell.every) for node in cell.nodes]
+    charts = [_follow_branches(cell.bicycle, node, cell.family, cell.every) for node in cell.nodes]  # type: ignore[arg-type]
     if any(chart is None for chart in charts):
         return
     pairs = list(zip(*charts, strict=False))  # type: ignore[arg-type]

@@ -16,7 +16,7 @@ from ..engine import EngineError, Problem
 from .model import Model
 
 # Coordinates of the system and their rates.
-_State = tuple[np.ndarray, np.ndarray]
+_State = tuple[list[float], list[float]]
 Look = Callable[[float], Ending | None]
 
 

@@ -90,7 +90,9 @@ class HeightLook:
 
     def __init__(self, data: mujoco.MjData, problem: Problem) -> None:
         self._data, self._start = data, problem.q
-        self.watch = FallWatch(problem.bicycle, problem.surface, self._convert)
+        self.watch: FallWatch[tuple[np.ndarray, np.ndarray]] = FallWatch(
+            problem.bicycle, problem.surface, self._convert
+        )
         function, parameters = problem.surface.function.real, problem.surface.parameters
         self._height = bind_kernel(find_height, data.qpos, fall_criterion(problem.bicycle), function, parameters)
 

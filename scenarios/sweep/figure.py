@@ -182,7 +182,9 @@ def _prepare_maps(tables: Mapping[str, pa.Table], plot: MapPlot) -> dict[str, Ca
         runs = select_map_runs(table, plot)
         if runs is not None:
             name = plot.name if len(tables) == 1 else f"{plot.name}-{engine}"
-            found[name] = lambda title, columns, of=(engine, runs): sweep_map_figure(title, shown, *of, columns)
+            found[name] = lambda title, columns, engine=engine, runs=runs: sweep_map_figure(
+                title, shown, engine, runs, columns
+            )
     if not found:
         names = ", ".join(show_value(column) for column in plot.columns)
         raise ScenarioError(f"--plot: no row of the sweep has a value of all of {names}")
