@@ -55,6 +55,7 @@ from velodrome.scenarios.scenario.schema import load_scenario
 
 def store(duration, engines, out):
     fields = {"simulation.duration": duration, "simulation.output_rate": 10_000.0}
+    fields |= {f"engines.{name}.step": 1e-4 for name in engines}
     made = plan_run(*load_scenario("plane-circle", fields), wanted=engines)
     store_run(made, Path(out), lambda *_: None, lambda _: None, recording=False)
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
