@@ -21,8 +21,8 @@ POINTS: list[dict[str, Any]] = [
     {"perturbation.lean": 0.01},
     {"perturbation.lean": -0.02, "perturbation.steer": 0.01},
     {"surface.alpha": 0.006, "motion.rear_rate": 17.0},
-    {"perturbation.lean": 0.9, "simulation.duration": 3.0},  # falls
-    {"perturbation.lean": 0.9, "simulation.duration": 3.0, "simulation.beyond_fall": True},
+    {"perturbation.lean_rate": 3.0, "simulation.duration": 3.0},  # falls
+    {"perturbation.lean_rate": 3.0, "simulation.duration": 3.0, "simulation.beyond_fall": True},
     {"perturbation.lean": 3.0},  # cannot be reached
     {"motion.rear_rate": 0.001},  # no such motion
     {"motion.rear_rate": -1.0},  # no valid scenario
