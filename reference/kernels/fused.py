@@ -6,7 +6,7 @@ differently wherever it inlines them: so a kernel has the same bits in every cal
 """
 
 # numba fills its types in at run time.
-# pyright: reportAttributeAccessIssue=false
+# pyright: reportAttributeAccessIssue=false, reportCallIssue=false
 
 from __future__ import annotations
 

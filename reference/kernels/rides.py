@@ -88,7 +88,7 @@ class RideStates(NamedTuple):
 @jit
 def unpack_constants(row):
     """Return the `kinematics.Constants` in a row (28,) of an array."""
-    return Constants(*to_fixed_tuple(row, CONSTANTS))
+    return Constants(*to_fixed_tuple(row, CONSTANTS))  # pyright: ignore[reportCallIssue]
 
 
 @jit

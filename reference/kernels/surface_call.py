@@ -6,7 +6,7 @@ surfaces are C callbacks (`compilation.compile_callback`) and borrow their param
 """
 
 # numba fills its types in at run time.
-# pyright: reportAttributeAccessIssue=false
+# pyright: reportAttributeAccessIssue=false, reportCallIssue=false
 
 from __future__ import annotations
 

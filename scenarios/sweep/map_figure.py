@@ -88,7 +88,8 @@ def select_map_runs(table: pa.Table, plot: MapPlot) -> MapRuns | None:
 
 
 def _is_one_of(status: pa.ChunkedArray, names: Collection[str]) -> np.ndarray:
-    return np.asarray(pc.is_in(status, value_set=pa.array(list(names))).to_numpy(), bool)
+    found = pc.is_in(status, value_set=pa.array(list(names)))  # pyright: ignore[reportAttributeAccessIssue]
+    return np.asarray(found.to_numpy(), bool)
 
 
 def _read_numbers(table: pa.Table, name: str) -> np.ndarray:

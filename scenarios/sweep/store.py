@@ -166,7 +166,8 @@ def write_results(out: Path, plan: SweepPlan, opened: Opened) -> None:
             part = part_of(out, engine)
             part.parent.mkdir(parents=True, exist_ok=True)
             own = (
-                (plan.tasks[i], line_at(journal, offsets[i])) for i in done[owners[done] == engines[engine]].tolist()
+                (plan.tasks[i], line_at(journal, int(offsets[i])))
+                for i in done[owners[done] == engines[engine]].tolist()
             )
             # A run that was killed could not report its version.
             found = ({"version": version} | make_record(task, line.row, columns) for task, line in own)

@@ -1,5 +1,8 @@
 """Rides of many problems in one call: each as alone, to the bit, in any number of threads."""
 
+# mujoco and numba carry no types for these.
+# pyright: reportAttributeAccessIssue=false
+
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace

@@ -38,7 +38,7 @@ def test_slip_and_energies_are_those_of_the_equations_of_motion(q: tuple, qd: tu
     assert np.hypot(*seen.slip[0].T) ** 2 + across**2 == pytest.approx((velocity**2).sum(axis=1), rel=1e-12, abs=1e-20)
     kinetic, potential = dynamics.energies(state, speed, c)
     largest = 0.5 * (np.abs(speed) @ np.full((9, 9), 100.0) @ np.abs(speed))
-    assert seen.kinetic_energy[0] == pytest.approx(kinetic, abs=1e-14 * largest + 1e-12)
+    assert seen.kinetic_energy[0] == pytest.approx(kinetic, abs=float(1e-14 * largest + 1e-12))
     assert seen.potential_energy[0] == pytest.approx(potential, abs=1e-12)
 
 
