@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numba as nb
 import numpy as np
 import pytest
-from numba.core.runtime import _nrt_python
+from numba.core.runtime import _nrt_python  # pyright: ignore[reportAttributeAccessIssue]
 from numba.core.runtime.nrt import rtsys
 
 from velodrome.reference.bicycle import Bicycle
