@@ -177,7 +177,8 @@ def _prepare_maps(tables: Mapping[str, pa.Table], plot: MapPlot) -> dict[str, Ca
     """Return the functions that draw the maps of all engines with values, by the name of their files."""
     from ...reports.figures import sweep_map_figure
 
-    shown, found = _describe_map(plot, tables), dict[str, Callable[..., Figure]]()
+    shown = _describe_map(plot, tables)
+    found: dict[str, Callable[..., Figure]] = {}
     for engine, table in tables.items():
         runs = select_map_runs(table, plot)
         if runs is not None:

@@ -13,6 +13,7 @@ import pytest
 from velodrome.engines.engine import EngineError, Problem, Trajectory
 from velodrome.engines.lagrange import ENGINE as REFERENCE
 from velodrome.engines.mujoco import default, edges, exact_contact, multipliers, native
+from velodrome.engines.mujoco import ride as ride_module
 from velodrome.engines.mujoco.convergence import watch_solver
 from velodrome.engines.mujoco.knife_edge import knife_edges, stiffen
 from velodrome.engines.mujoco.ride import set_start
@@ -151,6 +152,8 @@ def test_unconverged_steps_are_counted_as_steps() -> None:
 def limit_iterations(monkeypatch: pytest.MonkeyPatch, kind: type[ContactSettings], iterations: int) -> None:
     options = {"iterations": iterations, "ls_iterations": 200}
     monkeypatch.setattr(kind, "solver_options", property(lambda self: options))
+    # Settings determine a model, but not those that are replaced here.
+    monkeypatch.setattr(ride_module, "_compile_model", ride_module._compile_model.__wrapped__)
 
 
 def test_ride_ends_where_the_solver_fails(monkeypatch) -> None:

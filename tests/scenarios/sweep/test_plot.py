@@ -126,7 +126,7 @@ def test_a_map_of_a_finished_sweep_has_a_figure_for_each_engine(folder: Path) ->
     assert len(write_sweep_figures(folder, [median], FigureOutput())) == 2
 
 
-@pytest.mark.parametrize("text", ["max_slip:status,index", "ended:index,perturbation.lean_rate"])
+@pytest.mark.parametrize("text", ["max_slip:status,index", "warnings:index,perturbation.lean_rate"])
 def test_a_map_needs_numbers(folder: Path, tmp_path: Path, text: str) -> None:
     with pytest.raises(ScenarioError, match="has no numbers"):
         check_plots(parse_plots([text]), planned(tmp_path, RIDES))
