@@ -245,7 +245,7 @@ def _record_ride(
         samples += reached
         steps += int(found["steps"][last])
         unconverged, worst = unconverged + int(found["unconverged"][last]), max(worst, float(found["worst"][last]))
-        if not problem.beyond_fall:
+        if not problem.beyond_fall and samples > 0:
             begun = process_time()
             standing = _count_standing(problem, recording, max(first - 1, 0), samples)
             if standing > 0 and (standing < samples or ended is not None):

@@ -331,12 +331,13 @@ def test_measured_moments_of_inertia_are_taken_and_points_without_mass() -> None
 
 def test_a_bicycle_that_falls_ends_its_ride() -> None:
     q, qd = consistent_state(BICYCLE, Plane(), (2.0, 1.0), 0.5, 0.0, (1.0, 0.0, 1.0))
-    problem = Problem(BICYCLE, Plane(), q, qd, np.arange(501) / 100)
-    found = MULTIPLIERS.simulate(problem, MULTIPLIERS.settings(), lambda _: None)
-    assert found.ended is not None
-    assert "wheel lies flat" in found.ended
-    assert 1 < len(found.time) < len(problem.times)
-    assert not found.not_finite()
+    for beyond, why in ((False, "the bicycle fell"), (True, "wheel lies flat")):
+        problem = Problem(BICYCLE, Plane(), q, qd, np.arange(501) / 100, beyond_fall=beyond)
+        found = MULTIPLIERS.simulate(problem, MULTIPLIERS.settings(), lambda _: None)
+        assert found.ended is not None
+        assert why in found.ended
+        assert 1 < len(found.time) < len(problem.times)
+        assert not found.not_finite()
 
 
 def test_a_solver_that_fails_ends_the_ride_with_drakes_words() -> None:

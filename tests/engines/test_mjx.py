@@ -289,7 +289,7 @@ def test_jax_is_left_as_it_was() -> None:
 def test_ride_ends_where_a_wheel_lies_flat() -> None:
     """At walking pace the bicycle falls over; MuJoCo looks at its wheels every 10 ms, MJX in every step."""
     start = consistent_state(Bicycle(), Plane(), (0.0, 0.0), 0.3, 0.0, (0.5, 0.0, 1.0))
-    problem = Problem(Bicycle(), Plane(), *start, np.arange(151) * 0.01)
+    problem = Problem(Bicycle(), Plane(), *start, np.arange(151) * 0.01, beyond_fall=True)
     ours, theirs = (run(engine, problem) for engine in (ENGINE, NATIVE))
     assert theirs.ended is not None
     assert ours.ended is not None

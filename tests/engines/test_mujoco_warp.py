@@ -233,7 +233,7 @@ def test_places_of_a_batch_give_the_same_bits(scenario: str) -> None:
 
 def test_ride_ends_where_a_wheel_lies_flat() -> None:
     start = consistent_state(Bicycle(), Plane(), (0.0, 0.0), 0.3, 0.0, (0.5, 0.0, 1.0))
-    problem = Problem(Bicycle(), Plane(), *start, np.arange(151) * 0.01)
+    problem = Problem(Bicycle(), Plane(), *start, np.arange(151) * 0.01, beyond_fall=True)
     ours, theirs = (run(engine, problem) for engine in (ENGINE, NATIVE))
     assert theirs.ended is not None
     assert ours.ended is not None
