@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..reference.fall import Fall, fall_criterion, heights_above_fallen, solve_fall
+from ..reference.fall import Fall, fall_criterion, find_first_ending, heights_above_fallen, solve_fall
 from ..reference.rim import find_second_touch, require_clear_rims
 from ..reference.wheel_overlap import find_wheel_collision, require_separate_wheels
 from .disk_arrays import is_long, move_to_disk
@@ -137,11 +137,10 @@ def _cut_at_collision(problem: Problem, trajectory: Trajectory) -> Trajectory:
 
     It keeps at least its first sample.
     """
-    found = (
+    ending = find_first_ending(
         find_second_touch(problem.bicycle, problem.surface, trajectory.time, trajectory.q, trajectory.qd),
         find_wheel_collision(problem.bicycle, trajectory.time, trajectory.q),
     )
-    ending = min((one for one in found if one is not None), key=lambda one: one.time, default=None)
     if ending is None:
         return trajectory
     return replace(trajectory.until(ending.time), ended=ending.why, fall=None)

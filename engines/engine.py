@@ -216,7 +216,11 @@ class Trajectory:
 
     def first(self, samples: int) -> Self:
         """Return the first samples of the trajectory; steps and CPU time remain those of the whole."""
-        cut = {name: value[:samples] for name in SHAPES if (value := getattr(self, name)) is not None}
+        return self.part(slice(samples))
+
+    def part(self, rows: slice) -> Self:
+        """Return some samples of the trajectory; steps and CPU time remain those of the whole."""
+        cut = {name: value[rows] for name in SHAPES if (value := getattr(self, name)) is not None}
         return replace(self, **cut)
 
     def until(self, time: float) -> Self:

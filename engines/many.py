@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from .admission import admit_trajectory, require_sound_start, ride_engine
 from .engine import Engine, EngineError, Problem, Trajectory
+from .groups import group_by_times
 from .guard import find_simulate_many
+
+# Rides and samples held at once: some ten megabytes, and a call's own time does not matter any more.
+_RIDES_A_CALL, _SAMPLES_A_CALL = 64, 20_000
 
 
 def ride_engine_many(
@@ -54,6 +58,29 @@ def ride_engine_many(
     return [found[i] for i in range(len(problems))]
 
 
+def ride_in_batches(
+    engine: Engine, problems: Sequence[Problem], settings: Any, threads: int = 1
+) -> Iterator[tuple[int, Trajectory | Exception]]:
+    """Run any number of problems in calls of `ride_engine_many` that hold some megabytes of samples each.
+
+    Parameters
+    ----------
+    engine, problems, settings, threads
+        As `ride_engine_many` takes them.
+
+    Yields
+    ------
+    index : int
+        Of the problem; those with the same output times follow one another.
+    ride : Trajectory or Exception
+    """
+    for group in group_by_times(problems):
+        size = max(1, min(_RIDES_A_CALL, _SAMPLES_A_CALL // len(problems[group[0]].times)))
+        for first in range(0, len(group), size):
+            part = group[first : first + size]
+            yield from zip(part, ride_engine_many(engine, [problems[i] for i in part], settings, threads), strict=True)
+
+
 def _ride_alone(engine: Engine, problem: Problem, settings: Any) -> Trajectory | Exception:
     try:
         return ride_engine(engine, problem, settings, lambda _: None)
@@ -68,5 +95,5 @@ def _admit(engine: Engine, problem: Problem, settings: Any, ride: Any) -> Trajec
         return _ride_alone(engine, problem, settings)
     try:
         return admit_trajectory(engine, problem, settings, ride)
-    except EngineError as error:
+    except Exception as error:
         return error

@@ -35,8 +35,10 @@ from .circular import LEAN, REAR_SPEED, SIGMA, STEER, CircularMotion, Steady, mi
 from .continuation import Point, follow_curve, root_between
 from .families import NEAR_ENOUGH, follow_other_parts, rear_rate_slope, up_to_end, wrap_angle
 from .kernels.branches import BranchPoints, carry_motions, motion_at
+from .kernels.circle import SIGMA_UNIT
 from .kernels.curve import CHOSEN
 from .kernels.newton import solve_motion
+from .kernels.steady import UNKNOWNS
 from .surface import Paraboloid, SurfaceOfRevolution
 
 _SHARE = 1e-3  # of the rate's square: its least distance from the ends of a branch
@@ -324,7 +326,7 @@ def _square(point: Point) -> float:
 
 def _determinant_sign(equations: Steady, point: Point) -> float:
     """Return the sign of the determinant of the equations and the rate's condition at a point; 0 if it is lost."""
-    condition = rear_rate_condition(float(np.sqrt(400.0 * max(_square(point), 0.0))))
-    u, full = point.unknowns[CHOSEN], np.empty(22)
+    condition = rear_rate_condition(float(np.sqrt(SIGMA_UNIT * max(_square(point), 0.0))))
+    u, full = point.unknowns[CHOSEN], np.empty(UNKNOWNS)
     iterations, sign = solve_motion(u, condition.terms, 8, *equations.all_arguments, full)
     return float(sign) if iterations else 0.0

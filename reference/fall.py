@@ -5,7 +5,7 @@ The rear frame's centre of mass is then nearly on the ground, at a lean of some 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from .bicycle import BODIES, Bicycle
 from .kernels.fall import FallCriterion, measure_heights
-from .surface import Surface
+from .surface import Surface, evaluate
 
 LOOK_INTERVAL = 0.01  # between two looks at a ride of fixed steps [s]
 _NEAR = 3.0  # heights above the ground, in units of the criterion's, below which a bicycle is looked at in every step
@@ -58,6 +58,11 @@ class Ending:
     fall: Fall | None = None
 
 
+def find_first_ending(*endings: Ending | None) -> Ending | None:
+    """Return the ending with the least time; None if there is none."""
+    return min((one for one in endings if one is not None), key=lambda ending: ending.time, default=None)
+
+
 def fall_criterion(bicycle: Bicycle, watched: bool = True) -> FallCriterion:
     """Return the criterion of a bicycle for kernels; a ride ends at its fall if ``watched``."""
     x, _, z = bicycle.centre(BODIES[0]) - bicycle.reference_point
@@ -84,6 +89,12 @@ def heights_above_fallen(
     states, height, rate = np.concatenate([q, qd], axis=1), np.empty(len(q)), np.empty(len(q))
     measure_heights(states, fall_criterion(bicycle), surface.function.real, surface.parameters, height, rate)
     return height, rate
+
+
+def count_standing(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray) -> int:
+    """Return the number of states, coordinates and rates (n, 9), before the first in which the bicycle has fallen."""
+    low = np.flatnonzero(heights_above_fallen(bicycle, surface, q, qd)[0] <= 0)
+    return int(low[0]) if len(low) else len(q)
 
 
 def solve_fall(times: np.ndarray, heights: np.ndarray, rates: np.ndarray) -> float:
@@ -140,6 +151,11 @@ class FallWatch(Generic[_State]):
     def is_due(self, time: float) -> bool:
         """Return whether the bicycle is to be looked at: every 10 ms, and at every step once it is near its fall."""
         return time >= self._due
+
+    def measure_height(self, centre: Sequence[float] | np.ndarray) -> float:
+        """Return the height of the rear frame's centre of mass (3,) [m] above that of a fallen bicycle [m]."""
+        bicycle, surface = self._where
+        return float(centre[2] - evaluate(surface, centre[0], centre[1])[0] - fall_criterion(bicycle).limit)
 
     def look(self, time: float, height: float, state: _State) -> Ending | None:
         """Look at the bicycle at a time [s]; return when and why the ride ends, None if it does not.

@@ -185,7 +185,7 @@ def simulate_many(
     """
     times = np.ascontiguousarray(times, float)
     found: dict[int, PreciseMotion | ValueError] = {}
-    for kind in _group_by_ground(starts):
+    for kind in group_by_ground(starts):
         own = [starts[i] for i in kind]
         setups, states = _set_rides_up(own, len(times))
         function = own[0].surface.function.real
@@ -208,7 +208,7 @@ def kernels_are_loaded() -> bool:
     return bool(kernel.continue_rides.signatures)
 
 
-def _group_by_ground(starts: Sequence[RideStart]) -> list[list[int]]:
+def group_by_ground(starts: Sequence[OnGround]) -> list[list[int]]:
     """Return the indices of starts whose grounds have the same height function, with any parameters, group by group."""
     groups: dict[Any, list[int]] = {}
     for i, start in enumerate(starts):

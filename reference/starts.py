@@ -9,20 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from .bicycle import Bicycle
 from .circular import CircularMotion
+from .fall import fall_criterion
 from .inputs import NO_INPUTS, Inputs
+from .kernels.integrate import SIZE
 from .kernels.reduced import VARIABLES
 from .kernels.start import StartRequests, fill_starts
 from .kinematics import REAR_ANGLE
-from .simulate import ride_setups
+from .simulate import group_by_ground, ride_setups
 from .surface import Surface
 
-_STATE = 24  # coordinates, rates and contact parameters
 _NO_CHANGE = (0.0,) * 7
 
 
@@ -88,12 +88,8 @@ def compute_starts(requests: Sequence[StartRequest]) -> list[StartState | None]:
         In the order of the requests. None where something may be wrong with a start. A start has the same bits whatever
         the other ones and their order are.
     """
-    groups: dict[Any, list[int]] = {}
-    for i, request in enumerate(requests):
-        surface = request.surface
-        groups.setdefault((surface.function.real, surface.parameters.size), []).append(i)
     found: dict[int, StartState | None] = {}
-    for indices in groups.values():
+    for indices in group_by_ground(requests):
         found |= zip(indices, _compute_group([requests[i] for i in indices]), strict=True)
     return [found[i] for i in range(len(requests))]
 
@@ -102,11 +98,11 @@ def _compute_group(requests: Sequence[StartRequest]) -> list[StartState | None]:
     """Compute starts on grounds with the same height function."""
     n = len(requests)
     states = np.array([_initial_state(request) for request in requests])
-    undisturbed, jacobians, certain = np.empty((n, _STATE)), np.empty((n, VARIABLES, VARIABLES)), np.empty(n, bool)
+    undisturbed, jacobians, certain = np.empty((n, SIZE)), np.empty((n, VARIABLES, VARIABLES)), np.empty(n, bool)
     function = requests[0].surface.function
     try:
         fill_starts(
-            ride_setups(requests, np.zeros((n, 4))),
+            ride_setups(requests, np.array([fall_criterion(request.bicycle) for request in requests], float)),
             _pack(requests),
             function.real,
             function.complex,
@@ -132,7 +128,7 @@ def _compute_group(requests: Sequence[StartRequest]) -> list[StartState | None]:
 
 def _initial_state(request: StartRequest) -> np.ndarray:
     """Return the state (24,) that compiled code starts from."""
-    y = np.zeros(_STATE)
+    y = np.zeros(SIZE)
     if request.motion is None:
         y[:2], y[9 + REAR_ANGLE] = request.place, request.rear_rate
     else:
@@ -142,15 +138,8 @@ def _initial_state(request: StartRequest) -> np.ndarray:
 
 
 def _pack(requests: Sequence[StartRequest]) -> StartRequests:
-    bicycles = [request.bicycle for request in requests]
     return StartRequests(
         upright=np.array([request.motion is None for request in requests]),
         disturbed=np.array([request.change is not None for request in requests]),
         changes=np.array([request.change or _NO_CHANGE for request in requests]),
-        centres=np.array([_rear_centre(bicycle) for bicycle in bicycles]),
     )
-
-
-def _rear_centre(bicycle: Bicycle) -> np.ndarray:
-    """Return x and z of the rear frame's centre of mass from D, shape (2,) [m]."""
-    return (bicycle.centre("rear_frame") - bicycle.reference_point)[[0, 2]]

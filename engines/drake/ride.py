@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from ...reference.bicycle import BODIES
-from ...reference.fall import Ending, Fall, FallWatch, fall_criterion
+from ...reference.fall import Ending, Fall, FallWatch, find_first_ending
 from ...reference.rim import RimWatch
-from ...reference.surface import evaluate
 from ..coordinates import coordinates_from_bodies, start_on_turn
 from ..engine import EngineError, Problem, Progress
 from .tree import BodyMotions, DrakeTree, read_body_motions, read_wheel_motions
@@ -114,8 +113,7 @@ class RideWatch:
 
     def look(self, time: float) -> Ending | None:
         """Return when and why the ride ends at a time [s], None if it goes on."""
-        found = (self._look_at_rims(time), self._look_at_fall(time))
-        return min((one for one in found if one is not None), key=lambda ending: ending.time, default=None)
+        return find_first_ending(self._look_at_rims(time), self._look_at_fall(time))
 
     def _look_at_rims(self, time: float) -> Ending | None:
         if not self._rims.needed:
@@ -130,9 +128,7 @@ class RideWatch:
             return None
         motion = BodyMotions.empty(len(BODIES))
         read_body_motions(self._rig.tree, self._rig.context, motion)
-        x, y, z = motion.position[0]
-        height = float(z - evaluate(self._problem.surface, x, y)[0] - fall_criterion(self._problem.bicycle).limit)
-        return self._fall.look(time, height, motion)
+        return self._fall.look(time, self._fall.measure_height(motion.position[0]), motion)
 
     def _convert(self, times: np.ndarray, states: tuple[BodyMotions, BodyMotions]) -> tuple[np.ndarray, np.ndarray]:
         return convert_motions(self._problem, times, BodyMotions.stack(states))

@@ -8,12 +8,11 @@ import exudyn as exu
 import numpy as np
 
 from ...reference.bicycle import BODIES
-from ...reference.fall import Ending, FallWatch, fall_criterion
+from ...reference.fall import Ending, FallWatch, find_first_ending
 from ...reference.rim import RimWatch
-from ...reference.surface import evaluate
-from ..coordinates import coordinates_from_bodies, start_on_turn
 from ..engine import EngineError, Problem
-from .model import Model
+from .model import BodyMotion, Model
+from .results import read_coordinates
 
 # Coordinates of the system and their rates.
 _State = tuple[list[float], list[float]]
@@ -33,12 +32,7 @@ def make_looks(model: Model, problem: Problem) -> Look:
     looks = [_look_at_rims(model, problem)]
     if not problem.beyond_fall:
         looks.append(_look_at_fall(model, problem))
-
-    def look(time: float) -> Ending | None:
-        found = [ending for one in looks if (ending := one(time)) is not None]
-        return min(found, key=lambda ending: ending.time, default=None)
-
-    return look
+    return lambda time: find_first_ending(*(look(time) for look in looks))
 
 
 def _look_at_rims(model: Model, problem: Problem) -> Look:
@@ -60,7 +54,7 @@ def _look_at_rims(model: Model, problem: Problem) -> Look:
 
 
 def _look_at_fall(model: Model, problem: Problem) -> Look:
-    system, limit = model.system, fall_criterion(problem.bicycle).limit
+    system, data = model.system, model.system.systemData
 
     def convert(times: np.ndarray, states: tuple[_State, _State]) -> tuple[np.ndarray, np.ndarray]:
         return _read_coordinates_at(model, problem, times, states)
@@ -70,9 +64,7 @@ def _look_at_fall(model: Model, problem: Problem) -> Look:
     def look(time: float) -> Ending | None:
         if not watch.is_due(time):
             return None
-        x, y, z = system.GetNodeOutput(model.nodes[0], exu.OutputVariableType.Position)
-        height = float(z - evaluate(problem.surface, x, y)[0] - limit)
-        data = system.systemData
+        height = watch.measure_height(system.GetNodeOutput(model.nodes[0], exu.OutputVariableType.Position))
         return watch.look(time, height, (data.GetODE2Coordinates(), data.GetODE2Coordinates_t()))
 
     return look
@@ -94,5 +86,4 @@ def _read_coordinates_at(
             velocity[k, body] = system.GetNodeOutput(node, kinds.Velocity)
             rotation[k, body] = np.reshape(system.GetNodeOutput(node, kinds.RotationMatrix), (3, 3))
             spin[k, body] = system.GetNodeOutput(node, kinds.AngularVelocity)
-    q, qd = coordinates_from_bodies(problem.bicycle, times, position[:, 0], velocity[:, 0], rotation, spin)
-    return start_on_turn(q, problem.q), qd
+    return read_coordinates(problem, BodyMotion(times, position, velocity, rotation, spin))

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from mujoco import mjx
 
-from ...reference.fall import Fall, describe_fall, heights_above_fallen, solve_fall
+from ...reference.fall import Fall, count_standing, describe_fall, heights_above_fallen, solve_fall
 from ...reference.kinematics import WHEELS
 from ..engine import EngineError, Problem, Progress
 from ..mujoco.convergence import share
@@ -277,13 +277,7 @@ def _count_standing(problem: Problem, recording: Recording, first: int, samples:
     """Return the number of samples before the first, from ``first`` on, in which the bicycle has fallen."""
     part = slice(first, samples)
     q, qd = from_mujoco(recording.time[part], recording.qpos[part], recording.qvel[part], problem.q)
-    return first + _find_lying(problem, q, qd)
-
-
-def _find_lying(problem: Problem, q: np.ndarray, qd: np.ndarray) -> int:
-    """Return the index of the first state in which the bicycle has fallen; the number of states if there is none."""
-    low = np.flatnonzero(heights_above_fallen(problem.bicycle, problem.surface, q, qd)[0] <= 0)
-    return int(low[0]) if len(low) else len(q)
+    return first + count_standing(problem.bicycle, problem.surface, q, qd)
 
 
 def _narrow_fall(
@@ -315,7 +309,7 @@ def _narrow_fall(
         _, found = ride_again(counts)
         going, _ = _find_first_ending(found, begun, len(counts), step)
         q, qd = from_mujoco(counts[:going] * step, found["qpos"][:going], found["qvel"][:going], problem.q)
-        k = _find_lying(problem, q, qd)
+        k = count_standing(problem.bicycle, problem.surface, q, qd)
         if k in (0, len(counts)):
             return None
         if counts[k] - counts[k - 1] == 1:

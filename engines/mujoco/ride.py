@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 
 from ...reference.bicycle import BODIES, Bicycle
-from ...reference.fall import LOOK_INTERVAL, Ending, Fall, FallWatch, fall_criterion
+from ...reference.fall import LOOK_INTERVAL, Ending, Fall, FallWatch, fall_criterion, find_first_ending
 from ...reference.kinematics import WHEELS, constants
 from ...reference.rim import RimWatch, bicycle_rim_search
 from ..engine import EngineError, Problem, Progress
@@ -118,8 +118,7 @@ class RideLook:
 
     def __call__(self, time: float) -> Ending | None:
         """Return when and why the ride ends at a time [s], None if it goes on."""
-        found = [self.rims(time), None if self.height is None else self.height(time)]
-        return min((one for one in found if one is not None), key=lambda ending: ending.time, default=None)
+        return find_first_ending(self.rims(time), None if self.height is None else self.height(time))
 
     @property
     def near(self) -> bool:

@@ -14,10 +14,9 @@ import numpy as np
 import pinocchio as pin
 
 from ...reference.bicycle import BODIES
-from ...reference.fall import Ending, Fall, FallWatch, fall_criterion
+from ...reference.fall import Ending, Fall, FallWatch, find_first_ending
 from ...reference.rim import RimWatch
 from ...reference.simulate import steps_per_output
-from ...reference.surface import evaluate
 from ..coordinates import start_on_turn
 from ..engine import EngineError, Problem, Progress
 from .dynamics import ConstrainedBicycle, NoAccelerationError
@@ -212,8 +211,7 @@ class PinocchioRide:
 
     def look(self) -> Ending | None:
         """Look at both rims and at the height; return when and why the ride ends, None if it goes on."""
-        found = (self._look_at_rims(), self._look_at_fall())
-        return min((one for one in found if one is not None), key=lambda ending: ending.time, default=None)
+        return find_first_ending(self._look_at_rims(), self._look_at_fall())
 
     def _look_at_rims(self) -> Ending | None:
         if not self._rims.needed:
@@ -226,10 +224,7 @@ class PinocchioRide:
             return None
         here = PinocchioRecording.empty(1)
         self.record(here, 0)
-        bicycle, surface = self._problem.bicycle, self._problem.surface
-        x, y, z = here.position[0, 0]
-        height = float(z - evaluate(surface, x, y)[0] - fall_criterion(bicycle).limit)
-        return self._fall.look(self.time, height, here)
+        return self._fall.look(self.time, self._fall.measure_height(here.position[0, 0]), here)
 
     def _convert_states(
         self, times: np.ndarray, states: tuple[PinocchioRecording, PinocchioRecording]

@@ -38,14 +38,11 @@ class StartRequests(NamedTuple):
         Whether a change is applied.
     changes : ndarray, shape (n, 7)
         Added to x, y, lean, steer, lean rate, steer rate and rear rate.
-    centres : ndarray, shape (n, 2)
-        x and z of the rear frame's centre of mass from D, in its own axes [m].
     """
 
     upright: Any
     disturbed: Any
     changes: Any
-    centres: Any
 
 
 @jit
@@ -225,7 +222,7 @@ def fill_starts(setups, requests, function, complex_function, undisturbed, state
         elif ground.curved and not are_rims_clear(y, ground, function, parameters, c):
             continue
         if _linearise(y, function, complex_function, parameters, c, jacobians[i]):
-            change, centre = requests.changes[i], requests.centres[i]
+            change, centre = requests.changes[i], setups.falls[i]
             certain[i] = _finish(
                 y, undisturbed[i], requests.disturbed[i], change, centre, ground, function, parameters, c
             )

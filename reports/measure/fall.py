@@ -7,11 +7,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from ...engines.engine import Trajectory
 from ...reference.bicycle import Bicycle
-from ...reference.fall import heights_above_fallen, solve_fall
+from ...reference.fall import count_standing, heights_above_fallen, solve_fall
 from ...reference.surface import Surface
 
 
@@ -21,8 +19,8 @@ def fell_at(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> float
     The time is solved between the two states around the fall: those that the engine gives, or two samples of an engine
     that rode on. The height is the cubic polynomial with their heights and rates.
     """
-    first = _first_fallen(trajectory, bicycle, surface)
-    if first is None:
+    first = count_standing(bicycle, surface, trajectory.q, trajectory.qd)
+    if first == len(trajectory.time):
         fall = trajectory.fall
         if fall is None:
             return None
@@ -36,18 +34,11 @@ def fell_at(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> float
 
 def until_fall(trajectory: Trajectory, bicycle: Bicycle, surface: Surface, beyond: int = 0) -> Trajectory:
     """Return the ride up to its fall and ``beyond`` samples more: at least one sample, and all if it does not fall."""
-    first = _first_fallen(trajectory, bicycle, surface)
-    return trajectory if first is None else trajectory.first(max(1, first + beyond))
+    standing = count_standing(bicycle, surface, trajectory.q, trajectory.qd)
+    return trajectory if standing == len(trajectory.time) else trajectory.first(max(1, standing + beyond))
 
 
 def cut_at_fall(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> Trajectory:
     """Return the ride up to its fall and one further sample, which is not measured and shows the fallen bicycle."""
     cut = until_fall(trajectory, bicycle, surface, 1)
     return cut if len(cut.time) == len(trajectory.time) else replace(cut, ended="the bicycle fell")
-
-
-def _first_fallen(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> int | None:
-    """Return the index of the first sample in which the bicycle has fallen; None if there is none."""
-    height, _ = heights_above_fallen(bicycle, surface, trajectory.q, trajectory.qd)
-    low = np.flatnonzero(height < 0)
-    return int(low[0]) if len(low) else None

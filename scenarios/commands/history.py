@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +15,7 @@ from .options import (
     JsonOption,
     TracebackOption,
     answering_missing_motion,
+    count_cores,
     ending_with,
     print_json,
     show_written,
@@ -102,7 +102,7 @@ def history_command(
         plan = plan_history(releases, scenario or (), engine or (), wheel or (), cache=environments, children=children)
         where = HISTORIES / plan.package if out is None else out
         folder = HistoryFolder(where, resume)
-        options = HistoryOptions(environments, workers or min(2, len(os.sched_getaffinity(0))), time_limit, bisect)
+        options = HistoryOptions(environments, workers or min(2, count_cores()), time_limit, bisect)
         for line in plan.remarks:
             progress.note(line)
         counter = HistoryCounter(progress, plan, bisect)

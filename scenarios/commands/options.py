@@ -232,6 +232,11 @@ def print_json(document: Mapping[str, Any]) -> None:
     print(json.dumps(versioned(document), indent=1, allow_nan=False))
 
 
+def count_cores() -> int:
+    """Return the number of CPU cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 @contextmanager
 def ending_with(status: int) -> Iterator[None]:
     """Run the body, which prints a command's result, and end the command with its exit status.

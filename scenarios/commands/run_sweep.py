@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,7 +24,7 @@ from ..sweep import (
     write_sweep_figures,
     write_sweep_page,
 )
-from .options import ending_with, print_json, show_written
+from .options import count_cores, ending_with, print_json, show_written
 from .present_sweep import SweepCounter, show_summary
 from .progress import ProgressBars
 from .terminal import make_console
@@ -159,7 +158,7 @@ def draw_sweep_command(
 
 def _choose_work(scheduler: str | None, workers: int | None) -> Work:
     if scheduler is None:
-        return locally(workers or len(os.sched_getaffinity(0)))
+        return locally(workers or count_cores())
     # Imported here, since loading Dask takes half a second.
     from ..sweep import on_cluster
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
-from .options import JsonOption, ending_with, print_json
+from .options import JsonOption, count_cores, ending_with, print_json
 
 # Short uses of what needs kernels, which compile what longer ones need. Those that start together need different ones:
 # a ride on waves starts at given angles, with no circular motion. The output of runs goes to the folder `runs`.
@@ -53,7 +53,7 @@ def warm_up_command(
         failures: dict[str, str] = {}
         with (
             TemporaryDirectory(prefix="velodrome-warm-up-") as work,
-            ThreadPoolExecutor(processes or _count_cores()) as pool,
+            ThreadPoolExecutor(processes or count_cores()) as pool,
         ):
             uses = {pool.submit(_use, arguments, Path(work), quiet): arguments for arguments in _USES}
             pending = set(uses)
@@ -75,11 +75,6 @@ def warm_up_command(
             print_json(found)
         else:
             _show(found)
-
-
-def _count_cores() -> int:
-    """Return the number of CPU cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _use(arguments: Sequence[str], work: Path, environment: Mapping[str, str]) -> str | None:

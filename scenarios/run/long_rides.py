@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...engines.disk_arrays import is_long, slice_blocks, write_disk_arrays
-from ...engines.engine import SHAPES, Trajectory
+from ...engines.engine import Trajectory
 from ...reference.bicycle import Bicycle
 from ...reference.surface import Surface
 from ...reports.measure import evaluate_ride
@@ -36,13 +36,7 @@ def evaluate_stored_ride(trajectory: Trajectory, bicycle: Bicycle, surface: Surf
 
     def evaluate_blocks() -> Iterator[dict[str, np.ndarray]]:
         for rows in slice_blocks(len(trajectory.time)):
-            part = evaluate_ride(_take_samples(trajectory, rows), bicycle, surface)
+            part = evaluate_ride(trajectory.part(rows), bicycle, surface)
             yield {name: getattr(part, name) for name in _EVALUATED}
 
     return replace(trajectory, **write_disk_arrays(evaluate_blocks(), len(trajectory.time), folder))
-
-
-def _take_samples(trajectory: Trajectory, rows: slice) -> Trajectory:
-    return replace(
-        trajectory, **{name: value[rows] for name in SHAPES if (value := getattr(trajectory, name)) is not None}
-    )

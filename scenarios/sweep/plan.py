@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -45,8 +46,26 @@ class Task:
     changes: dict[str, Any]
 
 
-class TaskSequence(Sequence[Task]):
-    """The tasks of a sweep, each made when it is asked for.
+class LazyTasks(Sequence[Task], ABC):
+    """Tasks each of which is made when it is asked for."""
+
+    @abstractmethod
+    def make_task(self, place: int) -> Task:
+        """Make the task at a place, from 0 up to ``len``, exclusive."""
+
+    @overload
+    def __getitem__(self, index: int) -> Task: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Task]: ...
+
+    def __getitem__(self, index: int | slice) -> Task | list[Task]:
+        places = range(len(self))[index]
+        return self.make_task(places) if isinstance(places, int) else [self.make_task(place) for place in places]
+
+
+class TaskSequence(LazyTasks):
+    """The tasks of a sweep.
 
     Parameters
     ----------
@@ -63,20 +82,12 @@ class TaskSequence(Sequence[Task]):
     def __len__(self) -> int:
         return len(self.points)
 
-    @overload
-    def __getitem__(self, index: int) -> Task: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> list[Task]: ...
-
-    def __getitem__(self, index: int | slice) -> Task | list[Task]:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
-        number = range(len(self))[index]
-        engine, changes = self.points.at(number)
+    def make_task(self, place: int) -> Task:
+        """Make a task from its index in the sweep."""
+        engine, changes = self.points.at(place)
         digest = self._digest.copy()
         digest.update(canonical_text([engine, changes]).encode())
-        return Task(number, f"{number:0{self._width}d}-{digest.hexdigest()[:12]}", engine, changes)
+        return Task(place, f"{place:0{self._width}d}-{digest.hexdigest()[:12]}", engine, changes)
 
     def find_engine_of(self, index: int) -> str:
         """Return the engine of a task, which takes less time than the task."""

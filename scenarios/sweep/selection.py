@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import overload
-
 import numpy as np
 
-from .plan import Task, TaskSequence
+from .plan import LazyTasks, Task, TaskSequence
 
 
-class SelectedTasks(Sequence[Task]):
-    """Tasks of a sweep, each made when it is asked for; memory grows with the number of gaps, not of tasks.
+class SelectedTasks(LazyTasks):
+    """Some tasks of a sweep; memory grows with the number of gaps, not of tasks.
 
     Parameters
     ----------
@@ -29,16 +26,8 @@ class SelectedTasks(Sequence[Task]):
     def __len__(self) -> int:
         return int(self._ends[-1]) if len(self._ends) else 0
 
-    @overload
-    def __getitem__(self, index: int) -> Task: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> list[Task]: ...
-
-    def __getitem__(self, index: int | slice) -> Task | list[Task]:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
-        number = range(len(self))[index]
-        k = int(np.searchsorted(self._ends, number, side="right"))
+    def make_task(self, place: int) -> Task:
+        """Make the task at a place among those chosen."""
+        k = int(np.searchsorted(self._ends, place, side="right"))
         before = int(self._ends[k - 1]) if k else 0
-        return self._tasks[int(self._starts[k]) + number - before]
+        return self._tasks[int(self._starts[k]) + place - before]

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from ...engines.admission import ride_engine
-from ...engines.batch import ride_many, rides_in_batches
 from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, why_failed
 from ...engines.guard import call_engine
+from ...engines.many import ride_in_batches
 from ...reports.measure import flatten_metrics
 from ..error import ScenarioError
 from ..run import claimed_noise, configure_engine, measure_one
@@ -127,8 +127,6 @@ class Tasks:
                 ready = _failed_row(error)
             if not isinstance(ready, _Prepared):
                 found[i] = _row_and_timing(ready, {}, time.process_time() - begin)
-            elif not rides_in_batches(ready.engine, ready.settings):
-                found[i] = self._do_one(REFERENCE, changes)
             else:
                 text = canonical_text(ready.scenario.engines.get(REFERENCE, {}))
                 batches.setdefault(text, {})[i] = (ready, time.process_time() - begin)
@@ -145,8 +143,10 @@ class Tasks:
         """Return rows and timings by index of the point; ``batch`` has the tasks with their time so far [s]."""
         indices, found = list(batch), dict[int, tuple[dict[str, Any], dict[str, Any]]]()
         first, _ = batch[indices[0]]
-        rides = ride_many(first.engine, [batch[i][0].start.problem for i in indices], first.settings)
-        for k, ride in rides:
+        problems = [batch[i][0].start.problem for i in indices]
+        for k, ride in ride_in_batches(first.engine, problems, first.settings):
+            if isinstance(ride, MemoryError):
+                raise ride
             (ready, spent), begin = batch[indices[k]], time.process_time()
             timing: dict[str, Any] = {}
             if isinstance(ride, Trajectory):

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from velodrome.engines import batch
+from velodrome.engines import many
 from velodrome.engines.admission import ride_engine
 from velodrome.engines.engine import REFERENCE
 from velodrome.engines.registry import load_engine
@@ -62,7 +62,7 @@ def test_rows_of_a_batch_are_those_of_single_tasks(alone: list[str], seed: int) 
 
 
 def test_a_small_batch_holds_few_samples_and_changes_no_row(alone: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(batch, "_SAMPLES_A_CALL", 45)  # two rides of 21 samples
+    monkeypatch.setattr(many, "_SAMPLES_A_CALL", 45)  # two rides of 21 samples
     done = Tasks(DATA).do_many(REFERENCE, POINTS)
     assert [text_of(row) for row, _ in done] == alone
 
@@ -80,7 +80,7 @@ def test_a_ride_of_a_batch_is_that_of_the_engine() -> None:
     engine = load_engine(REFERENCE)
     settings = engine.settings()
     problems = [make_start(BASE.model_copy(update={"perturbation": table})).problem for table in _perturbations()]
-    for i, ride in batch.ride_many(engine, problems, settings):
+    for i, ride in many.ride_in_batches(engine, problems, settings):
         assert not isinstance(ride, Exception)
         expected = ride_engine(engine, problems[i], settings, lambda _: None)
         assert ride.q.tobytes() == expected.q.tobytes()
