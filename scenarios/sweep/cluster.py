@@ -10,6 +10,7 @@ pickles: connect only to a scheduler that you trust.
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 import uuid
 from collections.abc import Generator, Iterator, Sequence
@@ -29,6 +30,9 @@ from .selection import SelectedTasks
 from .worker import Setup
 
 _IN_FLIGHT = 3  # batches per thread: one being done, one at its worker, one at the scheduler
+# [s] between messages to the scheduler: batches that are sent and received together cost a third of single ones. Less
+# than two of the shortest batches, which wait meanwhile.
+_PAUSE = 0.1
 _GATHERED = 32  # batches whose rows the client holds at most, some megabytes
 _LOOK = 1.0  # [s] between questions to the scheduler how many threads there are
 _PATIENCE = 30  # seconds to wait for a scheduler to answer and for a first worker to connect
@@ -106,7 +110,7 @@ class _Sending:
         self._at_work: dict[Any, Ranges] = {}
         self._arriving = as_completed(loop=client.loop)
         self._names = (f"batch-{uuid.uuid4().hex}", count())
-        self._threads, self._looked = 1, 0.0
+        self._threads, self._looked, self._submitted = 1, -math.inf, -math.inf
 
     def run(self) -> Generator[Done]:
         """Do the tasks and yield the result of each once.
@@ -126,7 +130,7 @@ class _Sending:
         self._client.set_metadata(sweep, pack_sweep(self._setup, self._tasks.sweep))
         self._submit(sweep)
         while self._at_work:
-            ready = self._arriving.next_batch()
+            ready = self._await_some()
             for first in range(0, len(ready), _GATHERED):
                 # A list: new batches are sent before the rows of these are read.
                 found = list(self._receive(ready[first : first + _GATHERED]))
@@ -134,6 +138,15 @@ class _Sending:
                 for rows in found:
                     yield from rows
         held.release()
+
+    def _await_some(self) -> list[Any]:
+        """Return the futures of batches that have ended, at least one."""
+        ready = self._arriving.next_batch()
+        pause = self._submitted + _PAUSE - time.monotonic()
+        if pause > 0:
+            time.sleep(pause)
+            ready += self._arriving.next_batch(block=False)
+        return ready
 
     def _submit(self, sweep: str) -> None:
         """Send as many batches as the workers need to be busy until the next ones."""
@@ -159,6 +172,7 @@ class _Sending:
             key=[(name, next(numbers)) for _ in batches],
             pure=False,
         )
+        self._submitted = time.monotonic()
         self._at_work.update(zip(futures, batches, strict=True))
         self._arriving.update(futures)
 

@@ -17,16 +17,19 @@ _COMMAND = """
 import sys
 from pathlib import Path
 from velodrome.scenarios.commands.run_sweep import run_sweep_command
-path, out, resume = sys.argv[1:]
-sys.exit(run_sweep_command(Path(path), None, 2, Path(out), resume == "resume", False))
+path, out, resume, scheduler = sys.argv[1:]
+workers = None if scheduler else 2
+sys.exit(run_sweep_command(Path(path), scheduler or None, workers, Path(out), resume == "resume", False))
 """
 
 
-def started(path: Path, out: Path, resume: bool, largest: int | None = None) -> subprocess.Popen[str]:
-    """Run a sweep file on two workers; no file of it may become larger than so many bytes."""
+def started(
+    path: Path, out: Path, resume: bool, largest: int | None = None, scheduler: str = ""
+) -> subprocess.Popen[str]:
+    """Run a sweep file on two workers or a cluster; no file of it may become larger than so many bytes."""
     limit = None if largest is None else lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
     return subprocess.Popen(
-        [sys.executable, "-c", _COMMAND, str(path), str(out), "resume" if resume else ""],
+        [sys.executable, "-c", _COMMAND, str(path), str(out), "resume" if resume else "", scheduler],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
