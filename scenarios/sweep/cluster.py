@@ -15,6 +15,7 @@ import time
 import uuid
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import CancelledError
+from importlib.metadata import PackageNotFoundError, version
 from itertools import count
 from typing import Any
 
@@ -29,6 +30,7 @@ from .run import Work
 from .selection import SelectedTasks
 from .worker import Setup
 
+_PACKAGE = "velodrome"
 _IN_FLIGHT = 3  # batches per thread: one being done, one at its worker, one at the scheduler
 # [s] between messages to the scheduler: batches that are sent and received together cost a third of single ones. Less
 # than two of the shortest batches, which wait meanwhile.
@@ -110,6 +112,7 @@ class _Sending:
         self._at_work: dict[Any, Ranges] = {}
         self._arriving = as_completed(loop=client.loop)
         self._names = (f"batch-{uuid.uuid4().hex}", count())
+        self._known: set[str] = set()
         self._threads, self._looked, self._submitted = 1, -math.inf, -math.inf
 
     def run(self) -> Generator[Done]:
@@ -151,8 +154,7 @@ class _Sending:
     def _submit(self, sweep: str) -> None:
         """Send as many batches as the workers need to be busy until the next ones."""
         if time.monotonic() - self._looked > _LOOK:
-            self._threads = max(1, sum(self._client.nthreads().values()))
-            self._looked = time.monotonic()
+            self._look_at_workers()
         batches: list[Ranges] = []
         while len(self._at_work) + len(batches) < _IN_FLIGHT * self._threads:
             batch = self._batches.next(self._threads, idle=not (self._at_work or batches))
@@ -175,6 +177,26 @@ class _Sending:
         self._submitted = time.monotonic()
         self._at_work.update(zip(futures, batches, strict=True))
         self._arriving.update(futures)
+
+    def _look_at_workers(self) -> None:
+        """Count the threads of all workers, and refuse new workers with another velodrome.
+
+        A worker without the module of a batch's function cannot even read the message that it is in: it loses its
+        connection, as if the batch had ended it.
+        """
+        threads = self._client.nthreads()
+        fresh = [address for address in threads if address not in self._known]
+        if fresh:
+            own = version(_PACKAGE)
+            for found in self._client.run(version, _PACKAGE, workers=fresh, on_error="return").values():
+                if isinstance(found, PackageNotFoundError):
+                    raise WorkersBroken(f"a Dask worker has no {_PACKAGE}, this sweep is of {own}")
+                # Another error: the worker is lost again.
+                if isinstance(found, str) and found != own:
+                    raise WorkersBroken(f"a Dask worker has {_PACKAGE} {found}, this sweep is of {own}")
+        self._known = set(threads)
+        self._threads = max(1, sum(threads.values()))
+        self._looked = time.monotonic()
 
     def _receive(self, futures: Sequence[Any]) -> Iterator[Iterator[Done]]:
         """Yield the rows of batches that have ended."""
