@@ -226,6 +226,8 @@ class _Sending:
                 results.append(future.result())
             except KilledWorker:
                 results.append(None)
-            except OSError as error:
-                raise WorkersBroken(f"a Dask worker, or the connection to it, failed: {error}") from error
+            except WorkersBroken:
+                raise
+            except (ImportError, OSError, RuntimeError) as error:  # RuntimeError: the scheduler cannot read a batch
+                raise WorkersBroken(f"a Dask worker, the scheduler or a connection failed: {error}") from error
         return results
