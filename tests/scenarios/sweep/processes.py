@@ -29,7 +29,7 @@ sys.exit(run_sweep_command(Path(path), scheduler or None, workers, Path(out), re
 def started(
     path: Path, out: Path, resume: bool, largest: int | None = None, scheduler: str = ""
 ) -> subprocess.Popen[str]:
-    """Run a sweep file on two workers or a cluster, in blocks of 100 rows; ``largest`` is the limit of a file [bytes]."""
+    """Run a sweep file, in blocks of 100 rows, on two workers or a cluster; no file may exceed so many bytes."""
     limit = None if largest is None else lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
     return subprocess.Popen(
         [sys.executable, "-c", _COMMAND, str(path), str(out), "resume" if resume else "", scheduler],
