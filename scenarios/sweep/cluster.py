@@ -35,7 +35,7 @@ _IN_FLIGHT = 3  # batches per thread: one being done, one at its worker, one at 
 # [s] between messages to the scheduler: batches that are sent and received together cost a third of single ones. Less
 # than two of the shortest batches, which wait meanwhile.
 _PAUSE = 0.1
-_GATHERED = 32  # batches whose rows the client holds at most, some megabytes
+_GATHERED = 32  # batches whose rows the client holds at most: 10 MB, or 30 MB if all have as many as they may
 _LOOK = 1.0  # [s] between questions to the scheduler how many threads there are
 _PATIENCE = 30  # seconds to wait for a scheduler to answer and for a first worker to connect
 
@@ -65,9 +65,9 @@ def on_cluster(address: str) -> Work:
         raise ScenarioError(_describe_silence(address)) from error
 
     def work(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
-        if not isinstance(tasks, SelectedTasks):
-            raise TypeError("a cluster does tasks of a sweep that are chosen by their indices")
         try:
+            if not isinstance(tasks, SelectedTasks):
+                raise TypeError("a cluster does tasks of a sweep that are chosen by their indices")
             if tasks:
                 yield from _Sending(client, setup, tasks).run()
         except (CancelledError, OSError) as error:
