@@ -29,6 +29,8 @@ from velodrome.scenarios.run.machine import describe_machine
 from velodrome.scenarios.scenario.schema import Scenario
 from velodrome.scenarios.sweep.file import Hypercube, SweepFile
 
+pytestmark = pytest.mark.once  # names and keys, which are the suite's own
+
 FACES = (
     "velodrome",
     "velodrome.engines.coordinates",
