@@ -115,7 +115,6 @@ class KernelCache:
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled code for a signature; None where there is none, and it is then locked."""
-        target_context.refresh()
         key = self._key(sig, target_context.codegen())
         name = self._file_name(key)
         folders = find_folders(self._chosen)

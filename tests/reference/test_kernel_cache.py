@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numba as nb
+import numpy as np
 import pytest
 from numba.core import config, event
 from numba.core.errors import TypingError
@@ -33,6 +34,15 @@ with event.install_recorder("numba:compile") as recorder:
 # numba also compiles the parts that it puts into them.
 print(sum(kept.is_start and kept.data["dispatcher"] in (dot, scale) for _, kept in recorder.buffer))
 """
+# Calls one kernel and prints what it returns and which of the modules that numba needs only for compilation are loaded.
+LOADING = """\
+import sys
+from tests.reference import test_kernel_cache
+from velodrome.reference.kernels.compilation import jit
+
+print(jit(getattr(test_kernel_cache, sys.argv[1]))(*eval(sys.argv[2])))
+print(*sorted({"numba.np.linalg", "numba.cpython.unicode", "scipy.linalg"} & set(sys.modules)))
+"""
 
 
 @pytest.fixture
@@ -45,6 +55,14 @@ def folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
 
 def double(x: Any) -> Any:
     return 2 * x
+
+
+def find_hash(text: str) -> int:
+    return hash(text)
+
+
+def add_squares(vector: Any) -> Any:
+    return np.dot(vector, vector)
 
 
 def count_compilations(work: Callable[[], object]) -> int:
@@ -123,6 +141,30 @@ def test_loaded_kernel_is_compiled_into_others(folder: Path) -> None:
     assert loaded.library._shared_module is not None
     assert quadruple(1.5) == 6.0
     assert inner(1.5) == 3.0
+
+
+@pytest.mark.parametrize(
+    ("kernel", "argument", "needs"),
+    [
+        ("double", "(1.5,)", set()),
+        # It calls a function in C that imports SciPy itself.
+        ("add_squares", "(__import__('numpy').array([3.0, 4.0]),)", {"scipy.linalg"}),
+        # It reads a variable that only one of the modules makes known.
+        ("find_hash", "('a longer text',)", {"numba.cpython.unicode", "numba.np.linalg", "scipy.linalg"}),
+    ],
+)
+def test_loaded_kernel_needs_no_compiler(tmp_path: Path, kernel: str, argument: str, needs: set[str]) -> None:
+    """What numba imports before it compiles is imported for the kernels that need it only."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONHASHSEED": "1"}
+
+    def call() -> list[str]:
+        process = [sys.executable, "-c", LOADING, kernel, argument]
+        return subprocess.run(process, env=environment, text=True, check=True, capture_output=True).stdout.splitlines()
+
+    compiled, loaded = call(), call()
+    assert loaded[0] == compiled[0]
+    assert set(compiled[1].split()) == {"numba.cpython.unicode", "numba.np.linalg", "scipy.linalg"}
+    assert set(loaded[1].split()) == needs
 
 
 def test_damaged_file_is_compiled_anew(folder: Path) -> None:
