@@ -7,7 +7,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any
@@ -42,6 +41,8 @@ def warm_up_command(
 
     What is compiled already is not compiled again. The exit status is 1 if a part of it fails.
     """
+    from concurrent.futures import ThreadPoolExecutor, wait
+
     from .progress import SILENCE, ProgressBars
 
     begin = time.perf_counter()
