@@ -125,22 +125,47 @@ def test_compiled_code_is_found_again(folder: Path) -> None:
     assert count_compilations(lambda: jit(double)(1.5j)) == 1
 
 
-def test_loaded_kernel_is_compiled_into_others(folder: Path) -> None:
-    """Its bitcode is parsed then, and not before."""
-    jit(double)(1.5)
+def test_kernel_is_compiled_into_others(folder: Path) -> None:
+    """For others it is compiled to bitcode, which is kept as well and parsed when it is needed."""
+
+    def call_through_another(kernel: Any) -> tuple[int, float]:
+        @nb.njit
+        def quadruple(x: Any) -> Any:
+            return kernel(kernel(x))
+
+        found: list[float] = []
+        return count_compilations(lambda: found.append(quadruple(1.5))), found[0]
+
+    assert call_through_another(jit(double)) == (2, 6.0)
     inner = jit(double)
-
-    @nb.njit
-    def quadruple(x: Any) -> Any:
-        return inner(inner(x))
-
-    assert count_compilations(lambda: inner(1.5)) == 0
-    (loaded,) = inner.overloads.values()
+    assert count_compilations(lambda: inner.part.compile((nb.float64,))) == 0
+    (loaded,) = inner.part.overloads.values()
     assert loaded.library._shared_module is None
-    assert count_compilations(lambda: quadruple(1.5)) == 1
+    assert call_through_another(inner) == (1, 6.0)
     assert loaded.library._shared_module is not None
-    assert quadruple(1.5) == 6.0
+    assert inner.overloads == {}
     assert inner(1.5) == 3.0
+    assert count_compilations(lambda: jit(double)(1.5)) == 0
+
+
+def fail(x: Any) -> Any:
+    raise ValueError(f"not {x}")
+
+
+def test_error_of_an_inner_kernel_is_raised(folder: Path) -> None:
+    """Its text is made of objects in an environment that the machine code of the outer kernel has to find."""
+    for _ in range(2):
+        inner = jit(fail)
+        outer = jit(call_failing(inner))
+        with pytest.raises(ValueError, match="not 2"):
+            outer(2)
+
+
+def call_failing(inner: Any) -> Callable[[Any], Any]:
+    def call(x: Any) -> Any:
+        return inner(x)
+
+    return call
 
 
 @pytest.mark.parametrize(
