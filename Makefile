@@ -20,10 +20,14 @@ TESTING := hypothesis pytest pytest-xdist
 # Run the tests in two processes, each file in one of them, so that fixtures of a file are computed once.
 PYTEST := -m pytest -n 2 --dist loadfile
 
-.PHONY: run test test-all test-engines test-packages test-lowest test-machines test-machines-short test-pages test-wheel lint check docs
+.PHONY: run warm-up test test-all test-engines test-packages test-lowest test-machines test-machines-short test-pages test-wheel lint check docs
 
 run: $(STAMP)
 	$(BIN)/velodrome run q2-plus
+
+# Compile the kernels ahead, on all cores, as for an image.
+warm-up: $(STAMP)
+	$(BIN)/velodrome warm-up
 
 test: $(STAMP)
 	$(BIN)/python $(PYTEST)

@@ -101,7 +101,7 @@ def _use(arguments: Sequence[str], work: Path, environment: Mapping[str, str]) -
 def _show(found: dict[str, Any]) -> None:
     from .terminal import make_console
 
-    # Each kernel counts once for every set of argument types.
+    # Each kernel counts once for every set of argument types, and apart as Python calls it and as others do.
     lines = [f"compiled: {found['compiled']} of {found['kernels']} kernels in {found['seconds']:.1f} s"]
     if found["folder"] is None:
         lines.append("no folder can be written to: set NUMBA_CACHE_DIR to one that can")
