@@ -216,7 +216,7 @@ class Trajectory:
 
     def first(self, samples: int) -> Self:
         """Return the first samples of the trajectory; steps and CPU time remain those of the whole."""
-        return self.part(slice(samples))
+        return self if samples >= len(self.time) else self.part(slice(samples))
 
     def part(self, rows: slice) -> Self:
         """Return some samples of the trajectory; steps and CPU time remain those of the whole."""

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -46,6 +46,7 @@ _VISITS = 3  # so many different motions between two nodes make the nodes worth 
 _MOST_VISITS = 4096
 # Nodes lie a sixteenth of an octave of alpha + _FINEST apart: a bowl changes most, relatively, near the plane.
 _FINEST, _NODES_AN_OCTAVE = 2.0**-8, 16
+_SMALLEST = 2.0**-9  # width of a cell, relative to its alpha, below which it is not halved
 _SAME = 1e-6  # below this, motions on two branches are the same
 
 
@@ -153,6 +154,15 @@ def _search_cell(cell: _Cell, requests: dict[int, MotionRequest]) -> Iterator[tu
     charts = [_follow_branches(cell.bicycle, node, cell.family, cell.every) for node in cell.nodes]  # type: ignore[arg-type]
     if any(chart is None for chart in charts):
         return
+    halves = _halve_cell(cell) if _list_kinds(charts[0]) != _list_kinds(charts[1]) else None  # type: ignore[arg-type]
+    if halves is not None:
+        for half in halves:
+            inside = {
+                i: request for i, request in requests.items() if 0 <= _share_between(half.nodes, request.surface) < 1
+            }
+            if inside:
+                yield from _search_cell(half, inside)
+        return
     pairs = list(zip(*charts, strict=False))  # type: ignore[arg-type]
     by_branch: dict[tuple[int, bool], list[int]] = {}
     for i, request in requests.items():
@@ -164,6 +174,24 @@ def _search_cell(cell: _Cell, requests: dict[int, MotionRequest]) -> Iterator[tu
         first, second = pairs[k]
         for i, motion in _carry(cell, first, second, {i: requests[i] for i in indices}):
             yield i, mirror_motion(motion) if mirrored else motion
+
+
+def _list_kinds(chart: Sequence[_Branch]) -> list[tuple[tuple[int, bool], float]]:
+    return [(branch.kind, branch.sign) for branch in chart]
+
+
+def _halve_cell(cell: _Cell) -> tuple[_Cell, _Cell] | None:
+    """Return both halves of a cell in which a curve changes its branches; None for a small one.
+
+    The change lies in one of them, so that the full search is left with fewer motions.
+    """
+    low, high = cell.nodes
+    if not (
+        isinstance(low, Paraboloid) and isinstance(high, Paraboloid) and high.alpha - low.alpha > _SMALLEST * high.alpha
+    ):
+        return None
+    middle = Paraboloid(0.5 * (low.alpha + high.alpha))
+    return replace(cell, nodes=(low, middle)), replace(cell, nodes=(middle, high))
 
 
 def _carry(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -63,6 +64,7 @@ def find_first_ending(*endings: Ending | None) -> Ending | None:
     return min((one for one in endings if one is not None), key=lambda ending: ending.time, default=None)
 
 
+@lru_cache(maxsize=64)
 def fall_criterion(bicycle: Bicycle, watched: bool = True) -> FallCriterion:
     """Return the criterion of a bicycle for kernels; a ride ends at its fall if ``watched``."""
     x, _, z = bicycle.centre(BODIES[0]) - bicycle.reference_point

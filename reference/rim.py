@@ -127,13 +127,16 @@ def require_clear_rims(
         return
     if contact is None:
         contact = contact_parameters(bicycle, surface, q)
+    clear_rims = rim_clearances(bicycle, surface, q, contact) > 0
+    if may_sink and clear_rims.all():
+        return
     deepest = [_find_deepest(bicycle, surface, q, k) for k in (0, 1)]
     distance, k, point = min(deepest)
     # A contact computed anew may itself lie inside the ground if the start has settled on another place of the rim.
     if not may_sink and distance < -TOUCHING:
         place = _format_xy(point)
         raise ValueError(f"the {WHEELS[k]} rim lies {-1e3 * distance:.3g} mm inside the ground at {place}")
-    for (depth, k, point), clear in zip(deepest, rim_clearances(bicycle, surface, q, contact) > 0, strict=True):
+    for (depth, k, point), clear in zip(deepest, clear_rims, strict=True):
         if not clear and depth < -TOUCHING:
             raise ValueError(f"the {WHEELS[k]} rim lies {-1e3 * depth:.3g} mm inside the ground at {_format_xy(point)}")
         if not clear:

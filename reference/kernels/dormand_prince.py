@@ -121,8 +121,7 @@ def fill_step(y, h, k, out):
 def error_norm(y, new, h, k, tolerance, squares3, squares5):
     """Return the error norm of a step in units of the tolerance, which is relative above 1 and absolute below.
 
-    It is not a number where the derivative at the end of the step is not. ``squares3`` and ``squares5`` (24,) are
-    overwritten.
+    ``squares3`` and ``squares5`` (24,) are overwritten.
     """
     for i in range(SIZE):
         before, after = abs(y[i]), abs(new[i])
@@ -147,7 +146,7 @@ def error_norm(y, new, h, k, tolerance, squares3, squares5):
             + _E5[6] * k[10 * SIZE + i]
             + _E5[7] * k[11 * SIZE + i]
         ) / unit
-        squares3[i], squares5[i] = error3 * error3, error5 * error5 + 0.0 * k[12 * SIZE + i]
+        squares3[i], squares5[i] = error3 * error3, error5 * error5
     norm3 = norm5 = 0.0
     for i in range(SIZE):
         norm3 += squares3[i]

@@ -42,7 +42,8 @@ def _eighth_root(x):
 
 @jit
 def _complete_dense_output(y, new, h, stages, k, function, parameters, bicycle, work, out):
-    """Fill ``out`` (7, 24), the coefficients of the dense output, and the three extra rows of ``stages``."""
+    """Fill ``out`` (7, 24), the coefficients of the dense output, and the last four rows of ``stages``."""
+    derivative(new, function, parameters, bicycle, stages[12])
     for s in range(13, 16):
         fill_extra_stage(s, y, h, k, work)
         derivative(work, function, parameters, bicycle, stages[s])
@@ -197,6 +198,7 @@ def dop853(y, times, index, t, h, tolerance, most_steps, ground, fall, function,
     stages, coefficients = np.empty((16, SIZE)), np.empty((7, SIZE))
     k = stages.reshape(-1)  # the same numbers
     new, work, work2 = np.empty(SIZE), np.empty(SIZE), np.empty(SIZE)
+    ahead, ahead_derivative = np.empty(SIZE), np.empty(SIZE)
     derivative(y, function, parameters, bicycle, stages[0])
     steps, evaluations, rejected = 0, 1, False
     bounds = _rim_bounds(y, ground, function, parameters, c) if ground.curved else (1.0, 1.0)
@@ -208,9 +210,17 @@ def dop853(y, times, index, t, h, tolerance, most_steps, ground, fall, function,
             fill_stage(s, y, h, k, work)
             derivative(work, function, parameters, bicycle, stages[s])
         fill_step(y, h, k, new)
-        derivative(new, function, parameters, bicycle, stages[12])
-        evaluations += 12
-        error = error_norm(y, new, h, k, tolerance, work, work2)
+        evaluations += 11
+        error, reached = error_norm(y, new, h, k, tolerance, work, work2), False
+        if error < 1:
+            for i in range(SIZE):
+                ahead[i] = new[i]
+            reached = project(ahead, function, parameters, c, bicycle)
+            if reached:
+                derivative(ahead, function, parameters, bicycle, ahead_derivative)
+                evaluations += 1
+                for i in range(SIZE):  # a step to where the equations are singular is too long
+                    error += 0.0 * ahead_derivative[i]
         if not error < 1:  # also if it is not a number
             h *= max(0.2, 0.9 / _eighth_root(error)) if error < 1e300 else 0.2
             rejected = True
@@ -221,7 +231,7 @@ def dop853(y, times, index, t, h, tolerance, most_steps, ground, fall, function,
         end, status, before, after = t + h, MORE, 2.0, 2.0
         if times[index] <= end or not clear or not standing:
             _complete_dense_output(y, new, h, stages, k, function, parameters, bicycle, work, coefficients)
-            evaluations += 3
+            evaluations += 4
             if not clear:
                 touch, wheel = _second_touch(y, new, coefficients, ground, function, parameters, c, work)
                 if touch <= 1:
@@ -245,12 +255,10 @@ def dop853(y, times, index, t, h, tolerance, most_steps, ground, fall, function,
                 # What happens after the last time is not part of this motion.
                 return (DONE if index == times.size else status), index, end, h, steps + 1, evaluations
         factor = 10.0 if error == 0 else min(10.0, 0.9 / _eighth_root(error))
-        for i in range(SIZE):
-            y[i] = new[i]
-        if not project(y, function, parameters, c, bicycle):
+        if not reached:
             return FAILED, index, t, h, steps, evaluations
-        derivative(y, function, parameters, bicycle, stages[0])
-        evaluations += 1
+        for i in range(SIZE):
+            y[i], stages[0, i] = ahead[i], ahead_derivative[i]
         t += h
         h *= min(1.0, factor) if rejected else factor
         steps, rejected, bounds, height = steps + 1, False, next_bounds, next_height

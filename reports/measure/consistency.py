@@ -20,7 +20,7 @@ interval, since velocities have this error. A fault smaller than this tolerance 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -32,7 +32,7 @@ from ...reference.contact import observe
 from ...reference.kinematics import COORDINATES, FRONT_ANGLE, REAR_ANGLE, WHEELS, YAW, body_positions, body_quaternions
 from ...reference.surface import Surface
 from .kernels.quadrature import integrate_samples
-from .kernels.worst import find_worst
+from .kernels.worst import find_worst, find_worst_vector
 from .limits import START_ERROR
 
 # Largest ratio of two errors of one computation. A method of order 1 leaves in its first steps as much between rates
@@ -41,6 +41,7 @@ ROOM = 4.0
 # Largest step noise that an engine may claim.
 LARGEST_NOISE = 1e-6
 _SAMPLES = 6  # samples per polynomial; the quadrature's error is of seventh order in the output interval
+_EPS = float(np.finfo(float).eps)
 _FEWEST = 4  # least number of samples of a ride that shows the quadrature's error
 
 _WHEELS = tuple(f"{wheel}_wheel" for wheel in WHEELS)
@@ -160,8 +161,7 @@ def find_mismatches(
         error = np.full(samples, 0.0 if reported.engine == REFERENCE else np.inf)
     error[0] = 0.0
     noise = START_ERROR + min(step_noise, LARGEST_NOISE)
-    reports = _compare_reports(reported, followed, noise + ROOM * error, size)
-    found = [_find_worst(report, reported.time) for report in reports]
+    found = list(_compare_reports(reported, followed, noise + ROOM * error, size))
     if exact is None or samples < _FEWEST:
         return found
     return [*found, _compare_rates(reported, exact.first(samples), (noise + ROOM * error[1:, None]) * sizes)]
@@ -182,77 +182,48 @@ def _remove_turns(differences: np.ndarray) -> np.ndarray:
     return differences
 
 
-@dataclass(frozen=True)
-class Report:
-    """Differences of one reported quantity from the coordinates.
-
-    Attributes
-    ----------
-    quantity : str
-    parts : tuple of str
-        Names of the quantity's k parts.
-    unit : str
-    difference : ndarray, shape (n, k)
-        Of n samples, in ``unit``.
-    limit : ndarray
-        In ``unit``; its shape broadcasts to that of the difference.
-    """
-
-    quantity: str
-    parts: tuple[str, ...]
-    unit: str
-    difference: np.ndarray
-    limit: np.ndarray
-
-
-def _compare_reports(reported: Trajectory, followed: Trajectory, room: np.ndarray, size: float) -> Iterator[Report]:
-    """Yield the differences of the given reports, with limits from the relative ``room`` (n,) of each sample."""
-    room = room[:, None]
+def _compare_reports(reported: Trajectory, followed: Trajectory, room: np.ndarray, size: float) -> Iterator[Mismatch]:
+    """Yield the mismatch of each given report, with limits from the relative ``room`` (n,) of each sample."""
     speed = largest_speed(followed)
     # Velocities have the error of the coordinates times the motion's fastest rate.
     speed_scale = speed + size * float(np.abs(followed.qd[:, YAW:]).max())
-    parts = (followed.kinetic_energy, followed.potential_energy)
-    energy = np.sum([np.abs(part) for part in parts if part is not None], axis=0)[:, None]
-    signed = (_lengths(reported.body_quaternion + sign * followed.body_quaternion) for sign in (-1, 1))
-    rotation = np.minimum(*signed)
     # Round-off: a few units in the last place of a position, and of the largest angle for an orientation.
-    round_off = 16 * np.finfo(float).eps * (np.abs(followed.q).max() + size)
-    position = _lengths(reported.body_position - followed.body_position)
-    yield Report("body_position", BODIES, "m", position, size * room + round_off)
-    yield Report("body_quaternion", BODIES, "1", rotation, room + round_off)
-    for name, unit, scale in (("contact_point", "m", size), ("gap", "m", size), ("slip", "m/s", speed_scale)):
-        given, expected = getattr(reported, name), getattr(followed, name)
-        if given is not None:
-            difference = np.abs(given - expected) if name == "gap" else _lengths(given - expected)
-            yield Report(name, _WHEELS, unit, difference, scale * room + round_off)
+    round_off = 16 * _EPS * (float(np.abs(followed.q).max()) + size)
     # Kinetic energy is quadratic in the speeds.
     energy_scale = 2 * speed_scale / speed if speed > 0 else 2.0
-    for name, scale in (("kinetic_energy", energy_scale * energy), ("potential_energy", energy)):
+    energy = room * sum(
+        np.abs(part) for part in (followed.kinetic_energy, followed.potential_energy) if part is not None
+    )
+    for name, parts, unit, limit in (
+        ("body_position", BODIES, "m", (room, size, round_off)),
+        ("body_quaternion", BODIES, "1", (room, 1.0, round_off)),
+        ("contact_point", _WHEELS, "m", (room, size, round_off)),
+        ("gap", _WHEELS, "m", (room, size, round_off)),
+        ("slip", _WHEELS, "m/s", (room, speed_scale, round_off)),
+        ("kinetic_energy", ("",), "J", (energy, energy_scale, 0.0)),
+        ("potential_energy", ("",), "J", (energy, 1.0, 0.0)),
+    ):
         given = getattr(reported, name)
         if given is not None:
-            difference = np.abs(given - getattr(followed, name))[:, None]
-            yield Report(name, ("",), "J", difference, scale * room)
+            shape = (len(given), len(parts), -1)
+            pair = (np.ascontiguousarray(values, float).reshape(shape) for values in (given, getattr(followed, name)))
+            worst = find_worst_vector(*pair, name == "body_quaternion", *limit)
+            yield _describe_worst(name, parts, unit, reported.time, worst)
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:
     return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
 
 
-def _find_worst(report: Report, time: np.ndarray) -> Mismatch:
-    """Return the sample and part with the largest difference relative to its limit.
+def _describe_worst(
+    quantity: str, parts: Sequence[str], unit: str, time: np.ndarray, worst: tuple[int, int, float, float]
+) -> Mismatch:
+    """Return the mismatch of the sample and part with the largest difference relative to its limit.
 
     Values that are not finite are reported elsewhere: NaN counts as no difference here.
     """
-    limits = np.ascontiguousarray(np.broadcast_to(report.limit, report.difference.shape))
-    sample, part, difference, limit = find_worst(np.ascontiguousarray(report.difference), limits)
-    return Mismatch(
-        quantity=report.quantity,
-        part=report.parts[part],
-        difference=difference,
-        limit=limit,
-        unit=report.unit,
-        time=float(time[sample]),
-    )
+    sample, part, difference, limit = worst
+    return Mismatch(quantity, parts[part], difference, limit, unit, float(time[sample]))
 
 
 def _compare_rates(reported: Trajectory, exact: Trajectory, room: np.ndarray) -> Mismatch:
@@ -268,12 +239,12 @@ def _compare_rates(reported: Trajectory, exact: Trajectory, room: np.ndarray) ->
     # Rates whose integrals overflow are the derivatives of no coordinates.
     overflowed = ~np.isfinite(quadrature_error + rest)
     quadrature_error, rest = np.where(overflowed, 0.0, quadrature_error), np.where(overflowed, np.inf, rest)
-    round_off = 16 * np.finfo(float).eps * np.abs(reported.q).max(axis=0)
+    round_off = 16 * _EPS * np.abs(reported.q).max(axis=0)
     interval = np.diff(time)[:, None]
     room = room * (1 + float(np.abs(reported.qd[:, YAW:]).max()) * interval)
-    report = Report("qd", COORDINATES, "rad/s", rest / interval, (room + round_off + quadrature_error) / interval)
-    worst = _find_worst(report, time[1:])
-    return replace(worst, unit="m/s") if worst.part in COORDINATES[:3] else worst
+    worst = find_worst(rest / interval, (room + round_off + quadrature_error) / interval)
+    unit = "m/s" if worst[1] < 3 else "rad/s"
+    return _describe_worst("qd", COORDINATES, unit, time[1:], worst)
 
 
 def _integrate_samples(time: np.ndarray, values: np.ndarray, samples: int) -> np.ndarray:

@@ -13,13 +13,14 @@ from ...reference.fall import count_standing, heights_above_fallen, solve_fall
 from ...reference.surface import Surface
 
 
-def fell_at(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> float | None:
+def fell_at(trajectory: Trajectory, bicycle: Bicycle, surface: Surface, standing: int | None = None) -> float | None:
     """Return the time at which the rear frame's centre of mass is nearly on the ground [s]; None if it never is.
 
     The time is solved between the two states around the fall: those that the engine gives, or two samples of an engine
-    that rode on. The height is the cubic polynomial with their heights and rates.
+    that rode on. The height is the cubic polynomial with their heights and rates. ``standing`` is the number of samples
+    before the fall, if it is known (`velodrome.reference.fall.count_standing`).
     """
-    first = count_standing(bicycle, surface, trajectory.q, trajectory.qd)
+    first = count_standing(bicycle, surface, trajectory.q, trajectory.qd) if standing is None else standing
     if first == len(trajectory.time):
         fall = trajectory.fall
         if fall is None:
@@ -32,9 +33,15 @@ def fell_at(trajectory: Trajectory, bicycle: Bicycle, surface: Surface) -> float
     return solve_fall(trajectory.time[around], *heights)
 
 
-def until_fall(trajectory: Trajectory, bicycle: Bicycle, surface: Surface, beyond: int = 0) -> Trajectory:
-    """Return the ride up to its fall and ``beyond`` samples more: at least one sample, and all if it does not fall."""
-    standing = count_standing(bicycle, surface, trajectory.q, trajectory.qd)
+def until_fall(
+    trajectory: Trajectory, bicycle: Bicycle, surface: Surface, beyond: int = 0, standing: int | None = None
+) -> Trajectory:
+    """Return the ride up to its fall and ``beyond`` samples more: at least one sample, and all if it does not fall.
+
+    ``standing`` is as in `fell_at`.
+    """
+    if standing is None:
+        standing = count_standing(bicycle, surface, trajectory.q, trajectory.qd)
     return trajectory if standing == len(trajectory.time) else trajectory.first(max(1, standing + beyond))
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from ...engines.engine import Trajectory
 from ...engines.releases import list_stated_adaptations
 from ...reference.bicycle import Bicycle
+from ...reference.fall import count_standing
 from ...reference.inputs import NO_INPUTS, Inputs
 from ...reference.kinematics import REAR_ANGLE, YAW
 from ...reference.surface import Surface
@@ -54,8 +55,8 @@ def compute_metrics(
         Largest real part of the motion's eigenvalues that symmetry does not fix [1/s].
     size : float
         Radius of the circle, or the wheelbase for a straight motion [m].
-    Whether the motion circles the z axis, so that radius and phase are defined.
-        Whether the motion circles the z axis, so that radius and phase mean something.
+    circular : bool
+        Whether the motion circles the z axis, so that radius and phase are defined.
     inputs : Inputs
         Those of the ride, whose work is no drift of the energy.
     step_noise : float
@@ -72,8 +73,9 @@ def compute_metrics(
     reported = trajectory
     simulated = float(reported.time[-1] - reported.time[0])
     trajectory = evaluate_ride(reported, bicycle, surface) if followed is None else followed
-    fall = fell_at(trajectory, bicycle, surface)
-    trajectory = until_fall(trajectory, bicycle, surface)
+    standing = count_standing(bicycle, surface, trajectory.q, trajectory.qd)
+    fall = fell_at(trajectory, bicycle, surface, standing)
+    trajectory = until_fall(trajectory, bicycle, surface, standing=standing)
     reported = reported.first(len(trajectory.time))
     reference = None if reference is None else until_fall(reference, bicycle, surface)
     result = _error_metrics(trajectory, reference)

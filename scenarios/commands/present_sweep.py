@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
@@ -20,6 +20,7 @@ ROW_STYLES = dict.fromkeys(COMPUTED, "cyan") | {"done": "green", REFUSED: "yello
 _DIGITS = 3
 _REASONS = 4  # of failures that are shown below the bar
 _RECENT = 500  # rows over which the rate is computed
+_PICTURE = 0.1  # [s] between two pictures
 
 
 class SweepCounter:
@@ -30,28 +31,40 @@ class SweepCounter:
     progress : ProgressBars
     name : str
         The sweep's name.
-    total : int
-        Number of rows.
+    tasks : sequence of Task
     """
 
-    def __init__(self, progress: ProgressBars, name: str, total: int) -> None:
-        self._progress, self._name, self._total, self._rows = progress, name, total, 0
+    def __init__(self, progress: ProgressBars, name: str, tasks: Sequence[Task]) -> None:
+        self._progress, self._name, self._tasks, self._rows = progress, name, tasks, 0
         self._counts: Counter[str] = Counter()
         self._reasons: deque[Text] = deque(maxlen=_REASONS)
         self._arrivals = deque([time.monotonic()], maxlen=_RECENT)
+        self._next_picture = 0.0
         progress.say("starting the workers")
 
-    def watch(self, task: Task, done: Done, fresh: bool) -> None:
-        """Count a row; a row of an earlier session does not count for the rate."""
+    def recall(self, counts: Mapping[str, int]) -> None:
+        """Count rows of earlier sessions, which do not count for the rate."""
+        self._counts.update(counts)
+        self._rows += sum(counts.values())
+
+    def watch(self, done: Done) -> None:
+        """Count a row."""
         status = done.row["status"]
         self._rows += 1
         self._counts[status] += 1
-        if fresh:
-            self._arrivals.append(time.monotonic())
-            self._progress.watch(self._name, self._rows, self._total, "rows")
         if status in BROKEN:
+            task = self._tasks[done.index]
             text = f"{task.key} {task.engine} {status}: {done.row['reason']}"
             self._reasons.append(Text(text, style="red", no_wrap=True, overflow="ellipsis"))
+        # A picture takes a tenth of a millisecond, which rows that come by the thousand do not need.
+        now = time.monotonic()
+        self._arrivals.append(now)
+        if now > self._next_picture or self._rows == len(self._tasks):
+            self._next_picture = now + _PICTURE
+            self._show()
+
+    def _show(self) -> None:
+        self._progress.watch(self._name, self._rows, len(self._tasks), "rows")
         counts = [Text(f"{name} {n}", ROW_STYLES[name]) for name, n in sorted(self._counts.items())]
         self._progress.show_below([Text("  ").join([*counts, *self._describe_rate()]), *self._reasons])
 

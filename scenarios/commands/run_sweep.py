@@ -91,8 +91,9 @@ def run_sweep_command(
         plan = plan_sweep(path)
         check_plots(wanted, plan)
         work = _choose_work(scheduler, workers)
-        counter = SweepCounter(progress, plan.name, len(plan.tasks))
-        outcome = run_sweep(plan, FOLDER / plan.name if out is None else out, work, resume, counter.watch, retry)
+        counter = SweepCounter(progress, plan.name, plan.tasks)
+        folder = FOLDER / plan.name if out is None else out
+        outcome = run_sweep(plan, folder, work, resume, counter.watch, retry, counter.recall)
     document = summarise_sweep(plan, outcome)
     if document["complete"]:
         write_sweep_page(plan, outcome, document)

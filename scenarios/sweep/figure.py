@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -21,7 +22,7 @@ from ..run import read_json
 from ..scenario import find_unit, show_value
 from .map_figure import MapPlot, select_map_runs
 from .plan import SweepPlan
-from .rows import METRICS, ROW_FACTS, TIMING
+from .rows import DONE, METRICS, ROW_FACTS, TIMING, has_status
 from .store import MANIFEST, SWEEP_VERSION, TIMINGS, part_of
 
 if TYPE_CHECKING:
@@ -152,12 +153,12 @@ def write_sweep_figures(folder: Path, plots: Sequence[SweepPlot | MapPlot], outp
 
     manifest = read_sweep_folder(folder)
     title = str(manifest.get("title") or folder.resolve().name)
-    tables = _read_tables(folder, manifest["engines"])
-    known = {column for table in tables.values() for column in table.column_names}
+    known = {*_TIMES, *(column for engine in manifest["engines"] for column in _list_columns(folder, engine))}
+    for column in (column for plot in plots for column in plot.columns):
+        _check_column(column, known)
     written: list[Path] = []
     for plot in plots:
-        for column in plot.columns:
-            _check_column(column, known)
+        tables = {engine: _read_table(folder, engine, plot) for engine in manifest["engines"]}
         drawings = _prepare_maps(tables, plot) if isinstance(plot, MapPlot) else {plot.name: _prepare(tables, plot)}
         make_folder(folder / FIGURES)
         for name, draw in drawings.items():
@@ -203,23 +204,47 @@ def _describe_map(plot: MapPlot, tables: Mapping[str, pa.Table]) -> SweepMap:
     return SweepMap(_make_axis(plot.x, tables, ()), _make_axis(plot.y, tables, ()), value, plot.share)
 
 
-def _read_tables(folder: Path, engines: Iterable[str]) -> dict[str, pa.Table]:
-    """Read the rows of each engine with their times, in the order of the sweep's file.
+def _list_columns(folder: Path, engine: str) -> list[str]:
+    """Return the columns of an engine's rows.
+
+    Raises
+    ------
+    ScenarioError
+        If the file is missing or cannot be read.
+    """
+    with _reading(folder):
+        return pq.read_schema(part_of(folder, engine)).names
+
+
+def _read_table(folder: Path, engine: str, plot: SweepPlot | MapPlot) -> pa.Table:
+    """Read what a figure shows of an engine's rows, in the order of the tasks.
+
+    Of a data set of millions of rows these are a few columns; times are read only for a figure of them.
 
     Raises
     ------
     ScenarioError
         If a file is missing or cannot be read.
     """
-    found = {}
+    there = _list_columns(folder, engine)
+    wanted = {"index", "status", "growth_rate", *(name.replace("*", engine) for name in plot.columns)}
+    if isinstance(plot, SweepPlot):  # runs on a line have the fields in common that the figure does not show
+        wanted |= {*there} - {*ROW_FACTS, *METRICS}
+    with _reading(folder):
+        table = pq.ParquetFile(part_of(folder, engine)).read(columns=[name for name in there if name in wanted])
+        if wanted.isdisjoint(_TIMES):
+            return table
+        times = pq.read_table(folder / TIMINGS, columns=["index", *_TIMES], filters=[("engine", "=", engine)])
+        return table.join(times, "index").sort_by("index")
+
+
+@contextmanager
+def _reading(folder: Path) -> Iterator[None]:
+    """Turn errors of reading a data set into one line."""
     try:
-        times = pq.ParquetFile(folder / TIMINGS).read(columns=["key", *_TIMES])
-        for engine in engines:
-            table = pq.ParquetFile(part_of(folder, engine)).read()
-            found[engine] = table.join(times, "key").sort_by("index")
+        yield
     except (OSError, pa.ArrowException, KeyError) as error:
         raise ScenarioError(f"{folder}: its data set cannot be read: {show_value(str(error))}") from error
-    return found
 
 
 def _select_runs(
@@ -236,7 +261,7 @@ def _select_runs(
         engine: SweepRuns(
             x=x[k],
             y=y[k],
-            whole=np.array([status == "done" for status in table.column("status").to_pylist()], bool),
+            whole=has_status(table, DONE),
             lines=_name_lines(table, varied[engine]),
         )
         for k, (engine, table) in enumerate(tables.items())

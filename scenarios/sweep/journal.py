@@ -1,8 +1,9 @@
-"""The journal of a sweep: finished rows, one per line, each written before it is reported.
+"""The journal of a sweep: the rows that are not yet in a block of the data set, one per line.
 
-A line is a checksum, the task's index and JSON, which names the sweep and the task that the row belongs to. A line cut
-short by a crash or a full disk is ignored, and for a damaged line it is as if its task had not run. Of two lines of
-one task the later one holds: the task was tried again. Only one process writes at a time.
+Each row is written before it is reported. A line is a checksum, the task's index and JSON, which names the sweep that
+the row belongs to; the index says which task it is. A line cut short by a crash or a full disk is ignored, and for a
+damaged line it is as if its task had not run. Of two lines of one task the later one holds: the task was tried again.
+Only one process writes at a time.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from ..error import ScenarioError
 from ..locks import open_locked
@@ -30,22 +31,19 @@ class JournalLine:
     ----------
     sweep : str
         Key of the sweep that it belongs to; see `store.open_folder`.
-    key : str
-        The task's key, with a digest of all that determines its row.
     index : int
         The task's index in the sweep.
     row, timing : dict
     """
 
     sweep: str
-    key: str
     index: int
     row: dict[str, Any]
     timing: dict[str, Any]
 
     def encode(self) -> bytes:
         """Return the line as it is written to the journal."""
-        found = {"sweep": self.sweep, "key": self.key, "row": self.row, "timing": self.timing}
+        found = {"sweep": self.sweep, "row": self.row, "timing": self.timing}
         body = f"{self.index} {json.dumps(found, separators=(',', ':'), allow_nan=False)}".encode()
         return b"%08x %b\n" % (zlib.crc32(body), body)
 
@@ -64,9 +62,7 @@ def parse_lines(line: bytes) -> JournalLine | None:
     index, _, text = body.partition(b" ")
     try:
         found = json.loads(text)
-        return JournalLine(
-            str(found["sweep"]), str(found["key"]), int(index), dict(found["row"]), dict(found["timing"])
-        )
+        return JournalLine(str(found["sweep"]), int(index), dict(found["row"]), dict(found["timing"]))
     except (KeyError, TypeError, ValueError) as error:
         raise ForeignLine("a line of another journal format") from error
 
@@ -103,6 +99,10 @@ class Journal:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file, which another process may then open."""
         os.close(self._file)  # this also releases the lock
 
     def append(self, line: JournalLine) -> None:
@@ -134,14 +134,26 @@ class Journal:
         os.lseek(self._file, self._end, os.SEEK_SET)
         self._partial_line_removed = True
 
+    def clear(self) -> None:
+        """Remove all lines; their rows are in blocks that are on the disk.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be changed; the lines then stay.
+        """
+        self._end = 0
+        self._remove_partial_line()
+        self.sync()
+
     def sync(self) -> None:
         """Write everything to the disk, so that a power failure loses nothing."""
         os.fsync(self._file)
         self._unsynced, self._synced_at = 0, time.monotonic()
 
 
-def finished_rows(path: Path) -> Iterator[tuple[int, JournalLine]]:
-    """Read the complete lines of a journal in order, each with its offset.
+def finished_rows(path: Path) -> Iterator[JournalLine]:
+    """Read the complete lines of a journal in order.
 
     Raises
     ------
@@ -151,21 +163,10 @@ def finished_rows(path: Path) -> Iterator[tuple[int, JournalLine]]:
     if not path.exists():
         return
     with path.open("rb") as file:
-        offset = 0
         for line in file:
             found = parse_lines(line)
             if found is not None:
-                yield offset, found
-            offset += len(line)
-
-
-def line_at(file: BinaryIO, offset: int) -> JournalLine:
-    """Read the line that begins at an offset."""
-    file.seek(offset)
-    found = parse_lines(file.readline())
-    if found is None:
-        raise OSError(f"{file.name}: changed while it was being read")
-    return found
+                yield found
 
 
 def _length_of_whole_lines(path: Path) -> int:

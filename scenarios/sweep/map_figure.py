@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from ..error import ScenarioError
 from ..scenario import show_value
-from .rows import COMPUTED, STATUSES
+from .rows import COMPUTED, STATUSES, has_status
 
 if TYPE_CHECKING:
     from ...reports.figures import MapRuns
@@ -71,12 +69,11 @@ def select_map_runs(table: pa.Table, plot: MapPlot) -> MapRuns | None:
     from ...reports.figures import MapRuns
 
     x, y = _read_numbers(table, plot.x), _read_numbers(table, plot.y)
-    status = table.column("status")
-    computed = _is_one_of(status, COMPUTED)
+    computed = has_status(table, *COMPUTED)
     if plot.share:
-        value = np.where(computed, _is_one_of(status, (plot.value,)), np.nan)
+        value = np.where(computed, has_status(table, plot.value), np.nan)
         if plot.value not in COMPUTED:  # of runs that broke or were refused, the share among all
-            value = _is_one_of(status, (plot.value,)).astype(float)
+            value = has_status(table, plot.value).astype(float)
     else:
         value = _read_numbers(table, plot.value)
     growth = _read_numbers(table, "growth_rate")
@@ -85,11 +82,6 @@ def select_map_runs(table: pa.Table, plot: MapPlot) -> MapRuns | None:
     if not np.isfinite(value[chosen]).any():
         return None
     return MapRuns(x[chosen], y[chosen], value[chosen], stable[chosen])
-
-
-def _is_one_of(status: pa.ChunkedArray, names: Collection[str]) -> np.ndarray:
-    found = pc.is_in(status, value_set=pa.array(list(names)))  # pyright: ignore[reportAttributeAccessIssue]
-    return np.asarray(found.to_numpy(), bool)
 
 
 def _read_numbers(table: pa.Table, name: str) -> np.ndarray:

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from ..files import write_text
 from ..run import library_versions
 from .plan import SweepPlan
-from .rows import row_schema
+from .rows import DONE, has_status, row_schema
 from .run import SweepOutcome
 from .store import part_of
 
@@ -46,7 +46,7 @@ def write_sweep_page(plan: SweepPlan, outcome: SweepOutcome, document: Mapping[s
 
 def _collect_errors(plan: SweepPlan, outcome: SweepOutcome) -> dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]:
     """Return values and median errors by parameter and engine, for parameters of numbers."""
-    columns = row_schema(plan.parameters)
+    columns = row_schema(plan.parameters, {})
     numbers = [
         key
         for key in plan.parameters
@@ -55,7 +55,7 @@ def _collect_errors(plan: SweepPlan, outcome: SweepOutcome) -> dict[str, dict[st
     found: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = {key: {} for key in numbers}
     for engine in plan.file.engines:
         table = pq.ParquetFile(part_of(outcome.folder, engine)).read(columns=["status", "position_error_max", *numbers])
-        done = np.array(table.column("status").to_pylist()) == "done"
+        done = has_status(table, DONE)
         errors = np.array(table.column("position_error_max").to_numpy(), float)
         for key in numbers:
             values = np.array(table.column(key).to_numpy(), float)

@@ -26,7 +26,7 @@ ONE_THREAD = dict.fromkeys(
 )
 ATTEMPTS = 3  # a worker may be killed for other reasons; the third time its task is taken to be the cause
 _AHEAD = 2  # groups sent to a worker, so that the next one is there before the last one's rows are read
-_GROUP = 32  # largest number of the reference's tasks in a group, which ride in one call of compiled code
+_GROUP = 64  # largest number of the reference's tasks in a group, which ride in one call of compiled code
 _CHUNK = 64  # largest number of neighbouring tasks, which share a start, that go to one worker
 _LONGEST_QUEUE = 10_000  # with fewer tasks waiting, as many more are made
 _STARTING = 600.0  # [s] for a worker to load and compile everything; half a minute on an idle machine

@@ -6,7 +6,9 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from ...engines.storage import versioned_metadata
 from .plan import Task
@@ -66,17 +68,24 @@ TIMING: dict[str, pa.DataType] = {
 }
 
 
-def row_schema(parameters: Mapping[str, set[type]]) -> pa.Schema:
+def row_schema(parameters: Mapping[str, set[type]], facts: Mapping[str, Any]) -> pa.Schema:
     """Return the columns of the data set except the engine, which is the partition: facts, parameters, metrics.
 
     Parameters
     ----------
     parameters : mapping
         Types of the values of each parameter; see `SweepPlan.parameters`.
+    facts : mapping
+        For the metadata.
     """
     kinds = {key: _column_type(found) for key, found in parameters.items()}
     fields = [*ROW_FACTS.items(), *kinds.items(), *METRICS.items()]
-    return pa.schema([pa.field(name, kind) for name, kind in fields], metadata=versioned_metadata({}))
+    return pa.schema([pa.field(name, kind) for name, kind in fields], metadata=versioned_metadata(facts))
+
+
+def timing_schema(facts: Mapping[str, Any]) -> pa.Schema:
+    """Return the columns of the timings; ``facts`` are for the metadata."""
+    return pa.schema(list(TIMING.items()), metadata=versioned_metadata(facts))
 
 
 def _column_type(kinds: set[type]) -> pa.DataType:
@@ -96,6 +105,12 @@ def make_record(task: Task, row: Mapping[str, Any], columns: pa.Schema) -> dict[
         text = columns.field(key).type == pa.string() and not isinstance(value, str)
         values[key] = json.dumps(value) if text else value
     return values
+
+
+def has_status(table: pa.Table, *statuses: str) -> np.ndarray:
+    """Return which rows have one of some statuses, shape (n,) of bool."""
+    found = pc.is_in(table.column("status"), value_set=pa.array(statuses))  # pyright: ignore[reportAttributeAccessIssue]
+    return np.asarray(found.to_numpy(), bool)
 
 
 def reason_line(text: str) -> str:

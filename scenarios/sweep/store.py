@@ -1,33 +1,33 @@
-"""The folder of a sweep: ``sweep.json``, the journal, and the data set made from it when all tasks are done."""
+"""The folder of a sweep: ``sweep.json``, the journal, and the tables of the data set."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Iterator, Mapping
+import json
+import shutil
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from itertools import islice
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
-from ...engines.files import write_whole
 from ...engines.format_version import VERSION_KEY, read_version
-from ...engines.storage import versioned_metadata
+from ...engines.storage import METADATA_KEY
 from ..error import ScenarioError
 from ..files import make_folder, write_json
 from ..run import read_json
+from .blocks import BlockTable
 from .check import canonical_text
-from .journal import finished_rows, line_at
 from .plan import SweepPlan
-from .rows import TIMING, make_record, row_schema
+from .rows import row_schema, timing_schema
 
 MANIFEST, JOURNAL, RESULTS, TIMINGS = "sweep.json", "journal.txt", "results", "timing.parquet"
-_BLOCK = 20_000  # rows of a row group
-SWEEP_VERSION = 3  # of the manifest, the journal and the data set; earlier, "format" says it
+_TIMING_BLOCKS = "timing"  # folder of the timings' blocks
+STAGING = ".staging"  # folder in which files are prepared
+_SWEEP = "sweep"  # in the metadata of every table: the key of the sweep
+SWEEP_VERSION = 4  # of the manifest, the journal and the data set; earlier, "format" says it
 
 
 @dataclass(frozen=True)
@@ -146,42 +146,33 @@ def part_of(out: Path, engine: str) -> Path:
     return out / RESULTS / f"engine={quote(engine, safe='')}" / "part-0.parquet"
 
 
-def write_results(out: Path, plan: SweepPlan, opened: Opened) -> None:
-    """Write the data set of a complete journal, sorted by key, one part per engine, and mark the sweep complete.
+def make_tables(out: Path, plan: SweepPlan, opened: Opened) -> dict[str, BlockTable]:
+    """Return the tables of a sweep's rows by engine."""
+    columns = row_schema(plan.parameters, {_SWEEP: opened.key})
+    return {
+        engine: BlockTable(part_of(out, engine).parent, part_of(out, engine), out / STAGING, columns)
+        for engine in plan.file.engines
+    }
 
-    Raises
-    ------
-    OSError
-        If the disk is full or another error occurs; the journal stays, and no incomplete file looks complete.
-    """
-    offsets = np.full(len(plan.tasks), -1)  # an array: eight bytes a row
-    for offset, line in finished_rows(out / JOURNAL):
-        offsets[line.index] = offset
-    columns = row_schema(plan.parameters)
-    engines = {engine: k for k, engine in enumerate(plan.file.engines)}
-    owners = np.fromiter((engines[plan.tasks.find_engine_of(i)] for i in range(len(offsets))), np.int8, len(offsets))
-    with (out / JOURNAL).open("rb") as journal:
-        done = np.flatnonzero(offsets >= 0)
-        for engine, version in opened.facts["engines"].items():
-            part = part_of(out, engine)
-            part.parent.mkdir(parents=True, exist_ok=True)
-            own = (
-                (plan.tasks[i], line_at(journal, int(offsets[i])))
-                for i in done[owners[done] == engines[engine]].tolist()
-            )
-            # A run that was killed could not report its version.
-            found = ({"version": version} | make_record(task, line.row, columns) for task, line in own)
-            _write(part, columns, found)
-        every = ((plan.tasks[i], line_at(journal, offsets[i])) for i in done.tolist())
-        clocks = ({"key": task.key, "index": task.index, "engine": task.engine, **line.timing} for task, line in every)
-        _write(out / TIMINGS, pa.schema(list(TIMING.items()), metadata=versioned_metadata({})), clocks)
+
+def make_timing_table(out: Path, opened: Opened) -> BlockTable:
+    """Return the table of the rows' timings."""
+    return BlockTable(out / _TIMING_BLOCKS, out / TIMINGS, out / STAGING, timing_schema({_SWEEP: opened.key}))
+
+
+def read_key(columns: pa.Schema) -> str | None:
+    """Return the key of the sweep that a table belongs to; None if it does not say."""
+    try:
+        return json.loads((columns.metadata or {})[METADATA_KEY]).get(_SWEEP)
+    except (KeyError, ValueError, AttributeError):
+        return None
+
+
+def remove_staging(out: Path) -> None:
+    """Remove the folder in which files are prepared."""
+    shutil.rmtree(out / STAGING, ignore_errors=True)
+
+
+def mark_complete(out: Path, plan: SweepPlan, opened: Opened) -> None:
+    """Write that all rows are there, under the limits of the file."""
     write_sweep_manifest(out, plan, replace(opened, limits=_limits(plan)), complete=True)
-
-
-def _write(path: Path, columns: pa.Schema, records: Iterator[dict[str, Any]]) -> None:
-    """Write records as Parquet, completely or not at all, without holding all of them in memory."""
-    with write_whole(path) as partial, pq.ParquetWriter(partial, columns, compression="zstd") as writer:
-        block = list(islice(records, _BLOCK))
-        while block:
-            writer.write_table(pa.Table.from_pylist(block, schema=columns))
-            block = list(islice(records, _BLOCK))

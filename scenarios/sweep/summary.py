@@ -58,11 +58,12 @@ def _summarise_results(outcome: SweepOutcome, engine: str) -> dict[str, Any]:
     error = {"median": float(np.median(errors)), "worst": float(errors.max())} if len(errors) else None
     timing = pq.read_table(outcome.folder / TIMINGS, filters=[("engine", "=", engine)], columns=["task_time"])
     seconds = timing.column("task_time").drop_null().to_numpy()
-    broken = [row for row in table.select(columns[:2]).to_pylist() if row["status"] in (*BROKEN, REFUSED)]
+    broken = table.select(columns[:2]).filter(pc.field("status").isin([*BROKEN, REFUSED]))
+    reasons = broken.group_by(columns[:2], use_threads=False).aggregate([])
     return {
         "position_error": error,
         "rows_per_second": float(len(seconds) / seconds.sum()) if seconds.sum() > 0 else None,
-        "reasons": list(dict.fromkeys(f"{row['status']}: {row['reason']}" for row in broken))[:_REASONS],
+        "reasons": [f"{row['status']}: {row['reason']}" for row in reasons.slice(0, _REASONS).to_pylist()],
     }
 
 

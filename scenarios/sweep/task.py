@@ -19,6 +19,7 @@ from ...engines.admission import ride_engine
 from ...engines.engine import REFERENCE, Engine, Settings, Trajectory, UnsuitableProblem, why_failed
 from ...engines.guard import call_engine
 from ...engines.many import ride_in_batches
+from ...reference.bicycle import Bicycle
 from ...reports.measure import flatten_metrics
 from ..error import ScenarioError
 from ..run import claimed_noise, configure_engine, measure_one
@@ -38,6 +39,8 @@ class _Prepared:
     ----------
     engine : Engine
     settings : Settings
+    step_noise : float
+        See `velodrome.scenarios.run.claimed_noise`.
     scenario : Scenario
     start : Start
     facts : dict
@@ -46,6 +49,7 @@ class _Prepared:
 
     engine: Engine
     settings: Settings
+    step_noise: float
     scenario: Scenario
     start: Start
     facts: dict[str, Any]
@@ -178,7 +182,8 @@ class Tasks:
         """Return a task ready to ride, or its row where there is nothing to ride; ``scenario`` if it is known."""
         try:
             scenario = self._apply(name, changes) if scenario is None else scenario
-            engine, version, settings = _load_configured_engine(name, canonical_text(scenario.engines.get(name, {})))
+            text = canonical_text(scenario.engines.get(name, {}))
+            engine, version, settings, noise = _load_configured_engine(name, text)
         except ScenarioError as error:  # values that contradict one another, or a drawn one out of range
             return {"status": REFUSED, "reason": reason_line(str(error).removeprefix(f"{_SOURCE}: "))}
         facts: dict[str, Any] = {"version": version}
@@ -186,14 +191,14 @@ class Tasks:
         if isinstance(start, str):
             return facts | {"status": "no-motion", "reason": reason_line(start)}
         facts |= {"family": start.family, "growth_rate": start.growth_rate, "size": start.size}
-        facts["warnings"] = "; ".join(start.problem.bicycle.warnings()) or None
+        facts["warnings"] = _list_warnings(start.problem.bicycle)
         try:
             engine.check(start.problem, settings)
         except UnsuitableProblem:
             raise
         except ValueError as error:  # a step that does not divide the output interval, and the like
             return facts | {"status": REFUSED, "reason": reason_line(f"engines.{name}: {error}")}
-        return _Prepared(engine, settings, scenario, start, facts)
+        return _Prepared(engine, settings, noise, scenario, start, facts)
 
     def _run_engine(self, name: str, changes: Mapping[str, Any], timing: dict[str, Any]) -> dict[str, Any]:
         ready = self._prepare(name, changes)
@@ -219,7 +224,7 @@ class Tasks:
         chosen = canonical_text(ready.scenario.engines.get(REFERENCE, {}))
         text = f"{_start_text(changes)} {chosen}"
         if text not in self._references:
-            engine, _, settings = _load_configured_engine(REFERENCE, chosen)
+            engine, _, settings, _ = _load_configured_engine(REFERENCE, chosen)
             try:
                 engine.check(ready.start.problem, settings)
                 ride: Trajectory | Exception = ride_engine(engine, ready.start.problem, settings, lambda _: None)
@@ -274,8 +279,7 @@ def _measured_row(
             return facts | {"status": "failed", "reason": reason_line(why_failed(ride))}
         return facts | _failed_row(ride)
     known = None if isinstance(reference, str) else reference
-    noise = claimed_noise(ready.engine, ready.settings)
-    measured = flatten_metrics(measure_one(ready.start, ride, known, step_noise=noise))
+    measured = flatten_metrics(measure_one(ready.start, ride, known, step_noise=ready.step_noise))
     timing |= {key: measured.get(key) for key in ("cpu_time", "real_time_factor")}
     row = facts | {key: measured.get(key) for key in METRICS if key not in facts}
     reason = f"nothing to compare with: the reference: {reference}" if isinstance(reference, str) else None
@@ -292,10 +296,16 @@ def _row_and_timing(
 
 
 @lru_cache(maxsize=1024)
-def _load_configured_engine(name: str, settings: str) -> tuple[Engine, str, Settings]:
-    """Return an engine, its version and its settings; looking them up takes longer than a short ride."""
+def _load_configured_engine(name: str, settings: str) -> tuple[Engine, str, Settings, float]:
+    """Return an engine, its version, settings and step noise; looking them up takes longer than a short ride."""
     engine, chosen = configure_engine(name, json.loads(settings))
-    return engine, engine.version, chosen
+    return engine, engine.version, chosen, claimed_noise(engine, chosen)
+
+
+@lru_cache(maxsize=64)
+def _list_warnings(bicycle: Bicycle) -> str | None:
+    """Return the warnings about a bicycle as one text."""
+    return "; ".join(bicycle.warnings()) or None
 
 
 def _describe_outcome(measured: Mapping[str, Any], reason: str | None) -> dict[str, Any]:

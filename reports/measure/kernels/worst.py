@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ....reference.kernels.compilation import jit
 
 _LARGEST = 1.7976931348623157e308  # the largest double
@@ -30,3 +32,24 @@ def find_worst(difference, limit):
         value = difference[0, 0]
         found = min(value, _LARGEST) if value == value else 0.0
     return sample, part, found, limit[sample, part]
+
+
+@jit
+def find_worst_vector(given, expected, either_sign, room, scale, round_off):
+    """Return (sample, part, difference, limit) where vectors (n, k, m) differ most relative to their limits.
+
+    The limit of sample n is ``scale room[n] + round_off``. With ``either_sign`` a vector and its opposite are the same,
+    as quaternions are. Everything else is as in `find_worst`.
+    """
+    samples, parts, size = given.shape
+    difference, limit = np.empty((samples, parts)), np.empty((samples, parts))
+    for n in range(samples):
+        for k in range(parts):
+            apart, opposite = 0.0, 0.0
+            for m in range(size):
+                apart += (given[n, k, m] - expected[n, k, m]) ** 2
+                opposite += (given[n, k, m] + expected[n, k, m]) ** 2
+            if either_sign:
+                apart = min(apart, opposite)
+            difference[n, k], limit[n, k] = math.sqrt(apart), scale * room[n] + round_off
+    return find_worst(difference, limit)

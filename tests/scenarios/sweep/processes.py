@@ -11,19 +11,22 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from velodrome.scenarios.sweep.store import JOURNAL
+import pyarrow as pa
+from sweeping import stored
 
 _COMMAND = """
 import sys
 from pathlib import Path
 from velodrome.scenarios.commands.run_sweep import run_sweep_command
+from velodrome.scenarios.sweep import results
+results._BLOCK_ROWS = 100
 path, out, resume = sys.argv[1:]
 sys.exit(run_sweep_command(Path(path), None, 2, Path(out), resume == "resume", False))
 """
 
 
 def started(path: Path, out: Path, resume: bool, largest: int | None = None) -> subprocess.Popen[str]:
-    """Run a sweep file on two workers; no file of it may become larger than so many bytes."""
+    """Run a sweep file on two workers, in blocks of 100 rows; no file may become larger than so many bytes."""
     limit = None if largest is None else lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
     return subprocess.Popen(
         [sys.executable, "-c", _COMMAND, str(path), str(out), "resume" if resume else ""],
@@ -67,6 +70,7 @@ def killed(pid: int) -> None:
 
 
 def lines(out: Path) -> int:
-    """Rows in the journal so far."""
-    journal = out / JOURNAL
-    return journal.read_bytes().count(b"\n") if journal.exists() else 0
+    """Return the number of rows so far."""
+    with suppress(OSError, pa.ArrowException):  # a block may vanish between its listing and its reading
+        return len(stored(out))
+    return 0

@@ -8,10 +8,11 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
+from velodrome.scenarios.sweep.journal import finished_rows
 from velodrome.scenarios.sweep.plan import SweepPlan, Task, plan_sweep
 from velodrome.scenarios.sweep.pool import Done
 from velodrome.scenarios.sweep.run import SweepOutcome, Work, locally, run_sweep
-from velodrome.scenarios.sweep.store import RESULTS
+from velodrome.scenarios.sweep.store import JOURNAL, RESULTS, STAGING
 from velodrome.scenarios.sweep.task import Tasks
 from velodrome.scenarios.sweep.worker import Setup
 
@@ -43,11 +44,23 @@ def here(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
 
 
 def swept(plan: SweepPlan, out: Path, work: Work | int = here, resume: bool = False) -> SweepOutcome:
-    return run_sweep(plan, out, locally(work) if isinstance(work, int) else work, resume, lambda *_: None)
+    return run_sweep(plan, out, locally(work) if isinstance(work, int) else work, resume, lambda _: None)
 
 
 def rows(out: Path, engine: str = "reference") -> list[dict[str, Any]]:
     return pq.ParquetFile(out / RESULTS / f"engine={engine}" / "part-0.parquet").read().to_pylist()
+
+
+def stored(out: Path) -> list[int]:
+    """Return the tasks that have a row, in the journal or the tables; a task of which both have one stands once."""
+    journal = {line.index for line in finished_rows(out / JOURNAL)}
+    tables: list[int] = []
+    for folder in (out / RESULTS).glob("*"):
+        # A sorted file that is complete stands for all others, even before it is in its place.
+        staged = out / STAGING / f"{folder.name}.parquet"
+        for path in [staged] if staged.exists() else sorted(folder.glob("*.parquet")):
+            tables += pq.ParquetFile(path).read(columns=["index"]).column("index").to_pylist()
+    return [*tables, *(journal - set(tables))]
 
 
 def data_set(out: Path) -> dict[str, bytes]:

@@ -6,7 +6,6 @@ import logging
 import socket
 import subprocess
 import sys
-from collections import Counter
 from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,8 +13,8 @@ from typing import Any
 import planted
 import pytest
 from processes import killed
-from sweeping import UPRIGHT, data_set, here, planned, swept
-from test_kills import MANY, indices
+from sweeping import UPRIGHT, data_set, here, planned, stored, swept
+from test_kills import MANY
 
 from velodrome.scenarios.sweep.plan import Task
 from velodrome.scenarios.sweep.pool import Done
@@ -66,7 +65,7 @@ def test_a_worker_that_is_lost_midway_loses_nothing(cluster: Any, tmp_path: Path
 
     outcome = swept(plan, tmp_path / "out", losing)
     assert outcome.missing == 0
-    assert indices(tmp_path / "out") == Counter(range(1500))
+    assert sorted(stored(tmp_path / "out")) == list(range(1500))
     swept(plan, tmp_path / "undisturbed", here)
     assert data_set(tmp_path / "out") == data_set(tmp_path / "undisturbed")
 
@@ -86,7 +85,7 @@ def test_a_scheduler_that_is_lost_stops_the_sweep_and_it_goes_on_elsewhere(clust
     assert first.missing < 1500
     assert status_of(first) == 1
     swept(plan, out, 2, resume=True)
-    assert indices(out) == Counter(range(1500))
+    assert sorted(stored(out)) == list(range(1500))
     swept(plan, tmp_path / "undisturbed", here)
     assert data_set(out) == data_set(tmp_path / "undisturbed")
 

@@ -94,14 +94,14 @@ def test_progress_counts_and_says_what_failed_and_why(tmp_path: Path, monkeypatc
     monkeypatch.setattr(progress, "make_console", lambda stderr: screen)
     monkeypatch.delenv(progress.SILENCE)
     with progress.ProgressBars() as bars:
-        counter = SweepCounter(bars, "small", 10)
-        counter.watch(tasks[0], Done(0, {"status": "done", "reason": None}, {}), fresh=False)
-        counter.watch(tasks[1], Done(1, {"status": "failed", "reason": "[bold]it diverged"}, {}), fresh=True)
+        counter = SweepCounter(bars, "small", tasks)
+        counter.recall({"done": 2})
+        counter.watch(Done(1, {"status": "failed", "reason": "[bold]it diverged"}, {}))
     assert isinstance(screen.file, io.StringIO)
     text = screen.file.getvalue()
     assert "small" in text
-    assert "2 of 10 rows" in text
-    assert "done 1  failed 1  " in text
+    assert "3 of 3 rows" in text
+    assert "done 2  failed 1  " in text
     assert "rows/s" in text
     assert f"{tasks[1].key} reference failed: [bold]it diverged" in text
 

@@ -15,13 +15,13 @@ from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.sweep.journal import ForeignLine, Journal, JournalLine, finished_rows, parse_lines
 
 ROWS = [
-    JournalLine("0123abcd", "0000003-aa", 3, {"status": "done", "x": 0.1 + 0.2}, {}),
-    JournalLine("0123abcd", "0000001-bb", 1, {"status": "fell", "reason": "é\n"}, {"cpu_time": 1e-300}),
+    JournalLine("0123abcd", 3, {"status": "done", "x": 0.1 + 0.2}, {}),
+    JournalLine("0123abcd", 1, {"status": "fell", "reason": "é\n"}, {"cpu_time": 1e-300}),
 ]
 
 
 def kept(path: Path) -> list[JournalLine]:
-    return [line for _, line in finished_rows(path)]
+    return list(finished_rows(path))
 
 
 def test_rows_come_back_to_the_bit(tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def test_nothing_is_cut_off_before_there_is_something_to_write(tmp_path: Path) -
     assert path.read_bytes() == ROWS[0].encode()[:40]
 
 
-@pytest.mark.parametrize("text", ['{"row":{},"timing":{}}', "3", "[]", "x", '{"sweep":1,"key":2,"row":3,"timing":4}'])
+@pytest.mark.parametrize("text", ['{"row":{},"timing":{}}', "3", "[]", "x", '{"sweep":1,"row":3,"timing":4}'])
 def test_a_whole_line_of_another_kind_is_told_from_a_damaged_one(text: str) -> None:
     body = f"3 {text}".encode()
     with pytest.raises(ForeignLine):
@@ -77,6 +77,16 @@ def test_no_altered_line_is_taken_for_a_row(data: st.DataObject) -> None:
 def test_a_damaged_line_costs_that_row_only(tmp_path: Path) -> None:
     path = tmp_path / "journal"
     path.write_bytes(ROWS[0].encode().replace(b"done", b"gone") + ROWS[1].encode())
+    assert kept(path) == [ROWS[1]]
+
+
+def test_a_cleared_journal_takes_further_rows(tmp_path: Path) -> None:
+    path = tmp_path / "journal"
+    with Journal(path) as journal:
+        journal.append(ROWS[0])
+        journal.clear()
+        assert path.read_bytes() == b""
+        journal.append(ROWS[1])
     assert kept(path) == [ROWS[1]]
 
 

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from PIL import Image
 from sweeping import UPRIGHT, here, planned, swept, written
@@ -37,9 +38,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place / "out"
 
 
+def read_tables(folder: Path, plot: SweepPlot | MapPlot) -> dict[str, pa.Table]:
+    return {name: figure_module._read_table(folder, name, plot) for name in ("reference", "mujoco-native")}
+
+
 def test_values_are_those_of_the_data_set(folder: Path) -> None:
-    tables = figure_module._read_tables(folder, ["reference", "mujoco-native"])
     plot = SweepPlot("position_error_max", "perturbation.lean_rate")
+    tables = read_tables(folder, plot)
     x_axis, y_axis, runs, joined = figure_module._select_runs(tables, plot)
     assert (x_axis.title, x_axis.given) == ("perturbation.lean_rate [rad/s]", True)
     assert (y_axis.title, y_axis.given) == ("largest position error [m]", False)
@@ -56,8 +61,8 @@ def test_values_are_those_of_the_data_set(folder: Path) -> None:
 
 
 def test_a_setting_of_each_engines_own_is_one_field(folder: Path) -> None:
-    tables = figure_module._read_tables(folder, ["reference", "mujoco-native"])
-    x_axis, y_axis, runs, joined = figure_module._select_runs(tables, SweepPlot("cpu_time", "engines.*.step"))
+    plot = SweepPlot("cpu_time", "engines.*.step")
+    x_axis, y_axis, runs, joined = figure_module._select_runs(read_tables(folder, plot), plot)
     assert (x_axis.title, y_axis.title) == ("step [s]", "cpu time [s]")
     assert np.isnan(runs["reference"].x).all()
     assert sorted(set(runs["mujoco-native"].x)) == [0.003, 0.005]
@@ -112,7 +117,7 @@ def test_a_map_of_a_finished_sweep_has_a_figure_for_each_engine(folder: Path) ->
     written = write_sweep_figures(folder, [plot], FigureOutput())
     stem = "fell-over-perturbation.lean_rate-and-simulation.duration"
     assert [path.name for path in written] == [f"{stem}-reference.png", f"{stem}-mujoco-native.png"]
-    tables = figure_module._read_tables(folder, ["reference", "mujoco-native"])
+    tables = read_tables(folder, plot)
     assert isinstance(plot, MapPlot)
     runs = select_map_runs(tables["mujoco-native"], plot)
     assert runs is not None

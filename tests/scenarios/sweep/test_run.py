@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 
@@ -22,8 +22,7 @@ from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.run.runner import claimed_noise, measure_one, plan_run
 from velodrome.scenarios.scenario.schema import load_scenario
 from velodrome.scenarios.sweep import rows as columns
-from velodrome.scenarios.sweep.journal import finished_rows
-from velodrome.scenarios.sweep.plan import Task, plan_sweep
+from velodrome.scenarios.sweep.plan import SweepPlan, Task, plan_sweep
 from velodrome.scenarios.sweep.pool import Done
 from velodrome.scenarios.sweep.run import Work, run_sweep
 from velodrome.scenarios.sweep.store import JOURNAL, MANIFEST, RESULTS, TIMINGS, part_of
@@ -133,7 +132,7 @@ def test_what_is_done_is_kept_and_not_done_again(tmp_path: Path, error: BaseExce
     assert json.loads((out / MANIFEST).read_text())["complete"] is True
     swept(plan, tmp_path / "undisturbed")
     assert data_set(out) == data_set(tmp_path / "undisturbed")
-    assert len(list(finished_rows(out / JOURNAL))) == 4
+    assert (out / JOURNAL).read_bytes() == b""
 
 
 def test_a_disk_that_fills_while_the_data_set_is_written_leaves_no_part_of_it(
@@ -177,15 +176,16 @@ def test_a_damaged_manifest_is_said(tmp_path: Path, text: str) -> None:
         swept(plan, tmp_path, resume=True)
 
 
-def without_its_manifest(out: Path) -> bytes:
+def stopped_without_its_manifest(plan: SweepPlan, out: Path) -> bytes:
+    """Make a folder with the rows of a stopped sweep and without its manifest; return its journal."""
+    assert swept(plan, out, breaking_off(3, KeyboardInterrupt())).missing == 1
     (out / MANIFEST).unlink()
     return (out / JOURNAL).read_bytes()
 
 
 def test_a_journal_without_its_manifest_is_not_adopted(tmp_path: Path) -> None:
     plan, out = planned(tmp_path, LEANING), tmp_path / "out"
-    swept(plan, out)
-    journal = without_its_manifest(out)
+    journal = stopped_without_its_manifest(plan, out)
     other = planned(tmp_path, LEANING.replace("0.3", "0.4"))
     for one in (other, plan):
         with pytest.raises(ScenarioError, match=r"out: holds the journal\.txt of a sweep without its sweep\.json"):
@@ -196,19 +196,25 @@ def test_a_journal_without_its_manifest_is_not_adopted(tmp_path: Path) -> None:
 
 def test_rows_of_another_sweep_are_refused_and_kept(tmp_path: Path) -> None:
     plan, out = planned(tmp_path, LEANING), tmp_path / "out"
-    swept(plan, out)
-    journal = without_its_manifest(out)
-    # Another sweep's manifest beside them: one of the four runs is another, so three keys are the same.
+    journal = stopped_without_its_manifest(plan, out)
+    # Another sweep's manifest beside them: one of the four runs is another.
     other = planned(tmp_path, LEANING.replace("0.3", "0.4"))
     swept(other, tmp_path / "other")
     (out / MANIFEST).write_bytes((tmp_path / "other" / MANIFEST).read_bytes())
-    with pytest.raises(ScenarioError, match=r"journal\.txt: has the row 000000\d-.*, which is not of this sweep"):
+    with pytest.raises(ScenarioError, match=r"journal\.txt: has the row \d, which is not of this sweep"):
         swept(other, out, resume=True)
     assert (out / JOURNAL).read_bytes() == journal
     # And one line among its own.
     with (tmp_path / "other" / JOURNAL).open("ab") as file:
         file.write(journal.splitlines(keepends=True)[0])
     with pytest.raises(ScenarioError, match="which is not of this sweep"):
+        swept(other, tmp_path / "other", resume=True)
+    # And a block.
+    (tmp_path / "other" / JOURNAL).write_bytes(b"")
+    swept(plan, tmp_path / "third")
+    block = part_of(tmp_path / "other", "reference").with_name("block-00000000.parquet")
+    block.write_bytes(part_of(tmp_path / "third", "reference").read_bytes())
+    with pytest.raises(ScenarioError, match=r"block-00000000\.parquet: is not of this sweep"):
         swept(other, tmp_path / "other", resume=True)
 
 
@@ -217,21 +223,21 @@ def test_every_part_of_the_data_set_says_its_format(tmp_path: Path) -> None:
     swept(plan, out)
     for path in (part_of(out, "reference"), out / TIMINGS):
         found = json.loads((pq.read_schema(path).metadata or {})[METADATA_KEY])
-        assert found == {"schema_version": 1}
+        assert found == {"schema_version": 1, "sweep": json.loads((out / MANIFEST).read_text())["key"]}
 
 
 def test_a_sweep_of_an_earlier_version_is_refused_with_what_to_do(tmp_path: Path) -> None:
     plan, out = planned(tmp_path, LEANING), tmp_path / "out"
     swept(plan, out)
     manifest = json.loads((out / MANIFEST).read_text())
-    assert manifest.pop("schema_version") == 3
+    assert manifest.pop("schema_version") == 4
     # As it was called before.
-    (out / MANIFEST).write_text(json.dumps(manifest | {"format": 3}))
+    (out / MANIFEST).write_text(json.dumps(manifest | {"format": 4}))
     assert swept(plan, out, resume=True).missing == 0
-    (out / MANIFEST).write_text(json.dumps(manifest | {"schema_version": 4}))
-    with pytest.raises(ScenarioError, match="its schema_version is 4, and this velodrome reads up to 3"):
+    (out / MANIFEST).write_text(json.dumps(manifest | {"schema_version": 5}))
+    with pytest.raises(ScenarioError, match="its schema_version is 5, and this velodrome reads up to 4"):
         swept(plan, out, resume=True)
-    for earlier in ({"schema_version": 2}, {}):
+    for earlier in ({"schema_version": 3}, {}):
         (out / MANIFEST).write_text(json.dumps(manifest | earlier))
         with pytest.raises(ScenarioError, match=r"begun by another version of velodrome.* in another folder by --out"):
             swept(plan, out, resume=True)
@@ -256,11 +262,12 @@ def test_rows_that_timed_out_are_tried_again_when_asked(tmp_path: Path) -> None:
     stopped = run_sweep(plan, out, breaking_off(1, KeyboardInterrupt()), True, lambda *_: None, ["timeout"])
     assert (stopped.counts, stopped.missing) == ({"reference": {"done": 2, "timeout": 2}}, 2)
     assert json.loads((out / MANIFEST).read_text())["complete"] is False
-    seen: list[tuple[int, bool]] = []
-    last = run_sweep(plan, out, here, True, lambda task, _, fresh: seen.append((task.index, fresh)), ["timeout"])
+    seen: list[int] = []
+    earlier: list[Mapping[str, int]] = []
+    last = run_sweep(plan, out, here, True, lambda done: seen.append(done.index), ["timeout"], earlier.append)
     assert (last.counts, last.missing, status_of(last)) == ({"reference": {"done": 4}}, 0, 0)
-    assert [fresh for _, fresh in seen] == [False, False, True, True]
-    assert sorted(index for index, _ in seen) == [0, 1, 2, 3]
+    assert earlier == [{"done": 2}]
+    assert len(set(seen)) == len(seen) == 2
     swept(plan, tmp_path / "undisturbed")
     assert data_set(out) == data_set(tmp_path / "undisturbed")
 
@@ -324,7 +331,7 @@ def test_parameters_keep_their_types_and_tables_become_json(tmp_path: Path) -> N
     text = 'scenario = "q2"\ngrid.simulation.duration = [1, 0.5]\ngrid.motion.family = [2]\ngrid.title = ["x"]\n'
     text += "grid.motion.near = [{ lean = 0.74, steer = 2.84 }]"
     plan = planned(tmp_path, text)
-    schema = columns.row_schema(plan.parameters)
+    schema = columns.row_schema(plan.parameters, {})
     assert schema.field("simulation.duration").type == pa.float64()
     assert schema.field("motion.family").type == pa.int64()
     row = columns.make_record(plan.tasks[0], {}, schema)
