@@ -58,6 +58,8 @@ class _Common(NamedTuple):
     signature : numba signature
     preparations : tuple of callable
         To be called before the code is used.
+    environments : tuple of numba Environment
+        Those that the code refers to, of functions that were compiled into it too.
     """
 
     name: str
@@ -65,6 +67,7 @@ class _Common(NamedTuple):
     environment: Any
     signature: Any
     preparations: tuple[Callable[[], object], ...]
+    environments: tuple[Any, ...]
 
 
 class MachineCode(NamedTuple):
@@ -79,15 +82,12 @@ class MachineCode(NamedTuple):
         Names of the functions that the machine code defines.
     needed : tuple of str
         Names of the functions and variables that it needs and does not define.
-    environments : tuple of numba Environment
-        Those that it refers to.
     """
 
     common: _Common
     code: bytes
     defined: tuple[str, ...]
     needed: tuple[str, ...]
-    environments: tuple[Any, ...]
 
     @classmethod
     def take(cls, result: Any) -> MachineCode:
@@ -103,7 +103,6 @@ class MachineCode(NamedTuple):
                 for value in (*functions, *module.global_variables)
                 if value.is_declaration and not value.name.startswith("llvm.")
             ),
-            environments=find_environments(result),
         )
 
     def load(self, target: Any) -> Any:
@@ -121,9 +120,9 @@ class MachineCode(NamedTuple):
         library._finalize_final_module()
         engine._defined_symbols.update(self.defined)
         entry_point = target.get_executable(library, self.common.description, self.common.environment)
-        for environment in self.environments:
+        for environment in self.common.environments:
             codegen.set_env(environment.env_name, environment)
-        return _restore(target, self.common, library, entry_point, self.environments)
+        return _restore(target, self.common, library, entry_point)
 
 
 class Part(NamedTuple):
@@ -149,14 +148,15 @@ class Part(NamedTuple):
         library.bitcode = self.bitcode
         library._finalized = True
         library._reload_init.update(self.common.preparations)
-        return _restore(target, self.common, library, object(), ())
+        return _restore(target, self.common, library, object())
 
 
 def find_environments(result: Any) -> tuple[Any, ...]:
-    """Return the environments that the machine code of a result of compilation refers to.
+    """Return the environments that the code of a result of compilation refers to.
 
     It declares those of all functions that were compiled into it as well, which mostly nothing uses.
     """
+    result.library._ensure_finalized()
     mentions = Counter(_ENVIRONMENT.findall(str(result.library._final_module)))
     return tuple(env for env in result._find_referenced_environments() if mentions[env.env_name] > 1)
 
@@ -164,10 +164,17 @@ def find_environments(result: Any) -> tuple[Any, ...]:
 def _take_common(result: Any) -> _Common:
     # For the compilation only, and not always possible to write to a file.
     result.fndesc.typemap = result.fndesc.calltypes = None
-    return _Common(result.library.name, result.fndesc, result.environment, result.signature, tuple(result.reload_init))
+    return _Common(
+        name=result.library.name,
+        description=result.fndesc,
+        environment=result.environment,
+        signature=result.signature,
+        preparations=tuple(result.reload_init),
+        environments=find_environments(result),
+    )
 
 
-def _restore(target: Any, common: _Common, library: Any, entry_point: Any, environments: tuple[Any, ...]) -> Any:
+def _restore(target: Any, common: _Common, library: Any, entry_point: Any) -> Any:
     return compile_result(
         target_context=target,
         typing_context=target.typing_context,
@@ -180,7 +187,7 @@ def _restore(target: Any, common: _Common, library: Any, entry_point: Any, envir
         objectmode=False,
         lifted=(),
         reload_init=list(common.preparations),
-        referenced_envs=environments,
+        referenced_envs=common.environments,
     )
 
 
