@@ -19,7 +19,7 @@ from rich.table import Table
 
 from velodrome.scenarios.sweep.plan import SweepPlan, plan_sweep
 from velodrome.scenarios.sweep.run import Work, locally, run_sweep
-from velodrome.scenarios.sweep.store import JOURNAL, RESULTS, TIMINGS, open_folder, write_results
+from velodrome.scenarios.sweep.store import RESULTS, TIMINGS
 
 # A straight ride's start is computed in a millisecond: the cost besides the engine is the sweep's own.
 SWEEP = """
@@ -49,11 +49,10 @@ class Measured:
     others : float
         Cores kept busy by other processes of this machine: above about 0.1, rates are not meaningful.
     engine, task, parent : float
-        CPU time per row: in the engine, in the worker, in the process that distributes tasks and keeps rows [s].
-    journal, results, timing : float
+        CPU time per row: in the engine, in the worker, in the process that distributes tasks, keeps rows and writes
+        the data set [s].
+    results, timing : float
         Size per row [bytes].
-    finish : float
-        CPU time per row of making the data set from the journal [s].
     """
 
     rate: float
@@ -62,10 +61,8 @@ class Measured:
     engine: float
     task: float
     parent: float
-    journal: float
     results: float
     timing: float
-    finish: float
 
 
 def planned(folder: Path, engines: list[str], count: int, duration: float = 20.0) -> SweepPlan:
@@ -84,14 +81,10 @@ def measured(plan: SweepPlan, work: Work) -> Measured:
         elapsed, own = time.perf_counter() - begin, time.process_time() - own
         others = (busy() - with_children() - before) / elapsed
         assert outcome.stopped is None, outcome.stopped
-        opened = open_folder(out, plan, resume=True)
-        begin = time.process_time()
-        write_results(out, plan, opened)
-        finish = time.process_time() - begin
         timing = pq.read_table(out / TIMINGS)
         columns = {name: timing.column(name).to_numpy() for name in ("engine_time", "task_time", "finished")}
         results = sum(path.stat().st_size for path in (out / RESULTS).rglob("*.parquet"))
-        journal, clock = (out / JOURNAL).stat().st_size, (out / TIMINGS).stat().st_size
+        clock = (out / TIMINGS).stat().st_size
     rows = len(plan.tasks)
     return Measured(
         rate=(rows - 1) / float(np.ptp(columns["finished"])),
@@ -99,11 +92,9 @@ def measured(plan: SweepPlan, work: Work) -> Measured:
         others=others,
         engine=float(columns["engine_time"].mean()),
         task=float(columns["task_time"].mean()),
-        parent=(own - finish) / rows,
-        journal=journal / rows,
+        parent=own / rows,
         results=results / rows,
         timing=clock / rows,
-        finish=finish / rows,
     )
 
 
@@ -122,14 +113,14 @@ def with_children() -> float:
 def costs_table(folder: Path, engines: list[str], count: int) -> Table:
     """Measure the cost of a row, one engine at a time."""
     table = Table("engine", "rows", "rows/s", box=None, pad_edge=False)
-    for title in ("engine", "worker's own", "parent's own", "data set's"):
+    for title in ("engine", "worker's own", "parent's own"):
         table.add_column(f"{title}\nms a row", justify="right")
-    table.add_column("journal, data set,\ntiming: bytes a row", justify="right")
+    table.add_column("data set, timing:\nbytes a row", justify="right")
     for name in engines:
         rows = count if name == "reference" else max(20, count // 20)
         found = measured(planned(folder, [name], rows), locally(1))
-        times = (found.engine, found.task - found.engine, found.parent, found.finish)
-        sizes = f"{found.journal:.0f}, {found.results:.0f}, {found.timing:.0f}"
+        times = (found.engine, found.task - found.engine, found.parent)
+        sizes = f"{found.results:.0f}, {found.timing:.0f}"
         table.add_row(name, str(rows), f"{found.rate:.3g}", *(f"{1e3 * seconds:.2f}" for seconds in times), sizes)
     return table
 

@@ -18,6 +18,8 @@ from velodrome.scenarios.sweep.pool import Pool, WorkersBroken
 from velodrome.scenarios.sweep.summary import status_of
 from velodrome.scenarios.sweep.worker import Setup
 
+pytestmark = pytest.mark.once  # processes of the operating system; `test_run` rides in sweeps
+
 RAISE = 'raise RuntimeError("out of\\norder")'
 
 
