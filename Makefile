@@ -20,7 +20,8 @@ TESTING := hypothesis pytest pytest-xdist
 # Run the tests in two processes, each file in one of them, so that fixtures of a file are computed once.
 PYTEST := -m pytest -n 2 --dist loadfile
 
-.PHONY: run warm-up test test-all test-engines test-packages test-lowest test-machines test-machines-short test-pages test-wheel lint check docs
+.PHONY: run warm-up environments test test-all test-engines test-packages test-lowest test-machines test-machines-short
+.PHONY: test-pages test-wheel lint lint-style lint-pyright lint-mypy check docs
 
 run: $(STAMP)
 	$(BIN)/velodrome run q2-plus
@@ -28,6 +29,9 @@ run: $(STAMP)
 # Compile the kernels ahead, on all cores, as for an image.
 warm-up: $(STAMP)
 	$(BIN)/velodrome warm-up
+
+# What `.ci/run` needs, two at a time with `make -j 2`.
+environments: $(DOCS_STAMP) $(LOWEST_STAMP) $(ENGINES_STAMP)
 
 test: $(STAMP)
 	$(BIN)/python $(PYTEST)
@@ -45,8 +49,9 @@ test-packages: $(PACKAGES_STAMP) $(JIMINY_STAMP)
 	$(PACKAGES)/bin/python $(PYTEST) -m "" --import-mode importlib examples/velodrome-bullet examples/velodrome-dart tests/examples/test_bullet_defects.py tests/examples/test_dart_defects.py
 	$(JIMINY)/bin/python $(PYTEST) -m "" --import-mode importlib examples/velodrome-jiminy tests/examples/test_jiminy_defects.py
 
+# What the tests marked `once` show does not depend on the libraries' versions.
 test-lowest: $(LOWEST_STAMP)
-	$(LOWEST)/bin/python $(PYTEST)
+	$(LOWEST)/bin/python $(PYTEST) -m "not slow and not engines and not packages and not once"
 
 # Run the tests that are sensitive to round-off with the instructions of other CPUs.
 test-machines: $(STAMP)
@@ -65,12 +70,18 @@ test-wheel: $(STAMP)
 	$(BIN)/python -m tests.wheel
 
 # The linters read the documentation's extensions too, hence its packages.
-lint: $(DOCS_STAMP)
+lint: lint-style lint-pyright lint-mypy
+
+lint-style: $(DOCS_STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/pyright
-	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
+
+lint-pyright: $(DOCS_STAMP)
+	$(BIN)/pyright
+
+lint-mypy: $(DOCS_STAMP)
+	$(BIN)/mypy
 
 check: $(STAMP)
 	$(BIN)/velodrome check

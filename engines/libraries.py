@@ -7,6 +7,7 @@ needs anyway.
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.metadata import EntryPoint, PackageNotFoundError, version
 
 from packaging.requirements import Requirement
@@ -38,16 +39,23 @@ def list_extra_packages(point: EntryPoint) -> list[str]:
     return [canonicalize_name(found.name) for found in _list_extra_requirements(point)]
 
 
-def _list_extra_requirements(point: EntryPoint) -> list[Requirement]:
+def _list_extra_requirements(point: EntryPoint) -> tuple[Requirement, ...]:
+    lines = (point.dist.requires if point.dist is not None else None) or []
+    return _select_requirements(tuple(lines), tuple(point.extras))
+
+
+@cache  # reading requirements takes some milliseconds, and engines are listed for every scenario that is validated
+def _select_requirements(lines: tuple[str, ...], extras: tuple[str, ...]) -> tuple[Requirement, ...]:
+    """Read the requirements that are one of the extras' own."""
     found = []
-    for line in (point.dist.requires if point.dist is not None else None) or []:
+    for line in lines:
         requirement = Requirement(line)
         # Without an extra its marker is false; requirements without a marker are the package's own.
         if requirement.marker is None or requirement.marker.evaluate({"extra": ""}):
             continue
-        if any(requirement.marker.evaluate({"extra": extra}) for extra in point.extras):
+        if any(requirement.marker.evaluate({"extra": extra}) for extra in extras):
             found.append(requirement)
-    return found
+    return tuple(found)
 
 
 def install_command(point: EntryPoint) -> str:

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import re
 import reprlib
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from typing import cast
 
 from packaging.utils import canonicalize_name
 
+from .announcements import list_entry_points
 from .engine import REFERENCE, why_failed
 from .format_version import VERSION_KEY
 from .guard import GuardedEngine, call_engine, where_raised
@@ -38,7 +39,7 @@ def _find_entry_points() -> dict[str, EntryPoint]:
         If two packages announce the same name, since which of them is loaded would depend on the order of the path.
     """
     found: dict[str, EntryPoint] = {}
-    for point in entry_points(group=ENTRY_POINT_GROUP):
+    for point in list_entry_points(ENTRY_POINT_GROUP):
         if not _NAME.fullmatch(point.name) or point.name in RESERVED_NAMES:
             continue
         other = found.setdefault(point.name, point)

@@ -281,12 +281,23 @@ def crossings(
         for a, b in pairwise(nodes):
             fa, fb = condition(a).value, condition(b).value
             if abs(fa) < _FULFILLED:
-                yield newton(equations, a, condition, most=30)[0]
+                yield _refine(equations, a, condition)
             elif fa * fb < 0 and abs(fb) >= _FULFILLED:
                 yield newton(equations, a + (b - a) * fa / (fa - fb), condition, most=30)[0]
         last = second
     if last is not None and abs(condition(last.unknowns).value) < _FULFILLED:
-        yield newton(equations, last.unknowns, condition, most=30)[0]
+        yield _refine(equations, last.unknowns, condition)
+
+
+def _refine(equations: Steady, unknowns: np.ndarray, condition: Callable[[np.ndarray], Condition]) -> np.ndarray:
+    """Return the solution next to one (22,) that fulfils a condition but for round-off.
+
+    Newton's method has no step where the condition has no slope, as the squared rear rate at the pivoting motion. What
+    is solved for there may have a rear speed of exactly zero, or one that is round-off.
+    """
+    if not condition(unknowns).gradient.any():
+        return unknowns
+    return newton(equations, unknowns, condition, most=30)[0]
 
 
 def least_between(equations: Steady, first: Point, second: Point, function: Callable[[Point], float]) -> Point:

@@ -13,6 +13,8 @@ import pytest
 
 import velodrome
 
+pytestmark = pytest.mark.once  # names alone
+
 ROOT = Path(__file__).parents[1]
 FLOORS = ("reference", "engines", "reports", "scenarios")
 # Names that stand more than once, of things that mean the same.

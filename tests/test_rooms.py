@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.once  # imports alone
+
 ROOT = Path(__file__).parents[1]
 FLOORS = ("reference", "engines", "reports", "scenarios")
 ROOMS = {

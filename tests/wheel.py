@@ -97,7 +97,7 @@ def contents(wheel: Path) -> dict[str, int]:
 def build(work: Path) -> Path:
     """Build the sdist, the wheel from it and the wheel from the sources; the two must be the same."""
     tree = work / "tree"
-    left_out = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "dist", "runs", "sweeps")
+    left_out = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "dist", "made", "runs", "sweeps")
     shutil.copytree(ROOT, tree, symlinks=True, ignore=left_out)
     call(sys.executable, "-m", "build", "--outdir", work / "dist", folder=tree)
     call(sys.executable, "-m", "build", "--wheel", "--outdir", work / "direct", folder=tree)
@@ -133,7 +133,15 @@ def install(work: Path, wheel: Path) -> Path:
     # The command lies outside of site-packages.
     need(tops == ["..", "velodrome"], f"site-packages got {tops}")
     call(*pip, EXAMPLE, folder=work)
+    copy_kernels(Path(call(python, "-c", "import velodrome; print(velodrome.__path__[0])", folder=work).strip()))
     return python
+
+
+def copy_kernels(package: Path) -> None:
+    """Give an installed package what has been compiled of the same sources, whose digests are in the files' names."""
+    kernels = Path("reference", "kernels", "__pycache__", "kernels")
+    if (ROOT / kernels).is_dir():
+        shutil.copytree(ROOT / kernels, package / kernels)
 
 
 def use(work: Path, python: Path) -> None:

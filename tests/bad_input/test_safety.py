@@ -110,8 +110,8 @@ def test_a_scenarios_name_stays_inside_the_output_folder(stem: str, tmp_path: Pa
 )
 def test_an_engines_name_leads_no_file_elsewhere(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     bad = EntryPoint(name=name, value="velodrome.engines.lagrange:ENGINE", group=registry.ENTRY_POINT_GROUP)
-    here = registry.entry_points(group=registry.ENTRY_POINT_GROUP)
-    monkeypatch.setattr(registry, "entry_points", lambda group: [bad, *here])
+    here = registry.list_entry_points(registry.ENTRY_POINT_GROUP)
+    monkeypatch.setattr(registry, "list_entry_points", lambda group: [bad, *here])
     assert name not in registry.engine_names()
     with pytest.raises(ValueError, match="is not installed"):
         registry.load_engine(name)

@@ -13,6 +13,8 @@ import pytest
 from generated import fill_page
 from pages import DOCS, ROOT, source_pages
 
+pytestmark = pytest.mark.once  # text alone
+
 _LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 _INCLUDE = re.compile(r"^```\{include\} (\S+)\n```$", re.MULTILINE)
 

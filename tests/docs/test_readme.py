@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 from pages import ROOT, blocks
 
+pytestmark = pytest.mark.once  # figures of the newest libraries
+
 # Remarks and figures are those of the libraries that constraints.txt pins.
 PINNED = dict(line.split("==") for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines())
 PRINTED = next(block.text for block in blocks(ROOT / "README.md", "text"))

@@ -21,6 +21,8 @@ from velodrome.scenarios.gate import take_sample
 from velodrome.scenarios.history.problems import prepare_ride
 from velodrome.scenarios.run import configure_engine
 
+pytestmark = pytest.mark.once  # text and stored numbers alone
+
 PAGE = DOCS / "guides" / "release-history.md"
 PACKAGES = sorted(path.stem for path in HISTORIES.glob("*.json"))
 NAMES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}

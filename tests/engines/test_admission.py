@@ -194,6 +194,6 @@ def test_a_ride_ends_before_its_first_state_that_is_not_finite() -> None:
 )
 def test_what_is_announced_and_no_engine_is_refused(value: str, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
     point = EntryPoint("own", value, registry.ENTRY_POINT_GROUP)
-    monkeypatch.setattr(registry, "entry_points", lambda group: [point])
+    monkeypatch.setattr(registry, "list_entry_points", lambda group: [point])
     with pytest.raises(ValueError, match=f"engine 'own', announced as {value}, {words}"):
         load_engine("own")

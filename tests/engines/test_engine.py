@@ -64,8 +64,8 @@ def test_an_unknown_engine_is_refused_with_those_that_there_are() -> None:
 def test_an_engine_of_another_package_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lagrange, "OWN", type("Own", (lagrange.LagrangeEngine,), {"name": "aaa"})(), raising=False)
     own = EntryPoint("aaa", "velodrome.engines.lagrange:OWN", registry.ENTRY_POINT_GROUP)
-    here = registry.entry_points(group=registry.ENTRY_POINT_GROUP)
-    monkeypatch.setattr(registry, "entry_points", lambda group: [own, *here])
+    here = registry.list_entry_points(registry.ENTRY_POINT_GROUP)
+    monkeypatch.setattr(registry, "list_entry_points", lambda group: [own, *here])
     assert engine_names() == [REFERENCE, "aaa", *NAMES[1:]]
     assert load_engine("aaa").name == "aaa"
 
@@ -83,9 +83,9 @@ def test_two_packages_may_not_announce_one_name(monkeypatch: pytest.MonkeyPatch,
     # The second is the first once more, as an editable install puts it on the path.
     places = (("one.engine", "a"), ("one_engine", "b"), ("other-engine", "c"))
     points = [point for name, where in places for point in announced_by(name, tmp_path / where).entry_points]
-    monkeypatch.setattr(registry, "entry_points", lambda group: points[:2])
+    monkeypatch.setattr(registry, "list_entry_points", lambda group: points[:2])
     assert engine_names() == ["aaa"]
-    monkeypatch.setattr(registry, "entry_points", lambda group: points)
+    monkeypatch.setattr(registry, "list_entry_points", lambda group: points)
     for call in (engine_names, lambda: load_engine("aaa")):
         with pytest.raises(ValueError, match="'aaa' is announced by two packages, one-engine and other-engine"):
             call()

@@ -51,9 +51,9 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "ENGINE = Named('flywheel')\n" + "".join(f"{extra.upper()} = Named('flywheel-{extra}')\n" for extra in EXTRAS)
     )
     monkeypatch.syspath_prepend(tmp_path)
-    announced = registry.entry_points(group=registry.ENTRY_POINT_GROUP)
+    announced = registry.list_entry_points(registry.ENTRY_POINT_GROUP)
     own: list[EntryPoint] = list(Distribution.at(folder).entry_points)
-    monkeypatch.setattr(registry, "entry_points", lambda group: [*announced, *own])
+    monkeypatch.setattr(registry, "list_entry_points", lambda group: [*announced, *own])
 
 
 def test_engines_without_their_library_are_listed_with_the_command(package: None) -> None:

@@ -64,9 +64,9 @@ def own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> str:
     (tmp_path / "own_engine.py").write_text(blocks("python")[0], encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "own_engine", raising=False)
-    announced = registry.entry_points(group=registry.ENTRY_POINT_GROUP)
+    announced = registry.list_entry_points(registry.ENTRY_POINT_GROUP)
     point = EntryPoint("own", "own_engine:ENGINE", registry.ENTRY_POINT_GROUP)
-    monkeypatch.setattr(registry, "entry_points", lambda group: [*announced, point])
+    monkeypatch.setattr(registry, "list_entry_points", lambda group: [*announced, point])
     return "own"
 
 

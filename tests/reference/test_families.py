@@ -8,7 +8,7 @@ import pytest
 from tests.literature import published, rounds_to
 from velodrome.reference.anchors import anchor, static_equilibria
 from velodrome.reference.bicycle import Bicycle
-from velodrome.reference.circular import LEAN, REAR_SPEED, SIGMA, STEER, Steady
+from velodrome.reference.circular import LEAN, REAR_SPEED, SIGMA, STEER, Steady, rear_rate_condition
 from velodrome.reference.continuation import FARTHEST, LARGEST_LEAN, crossings, largest_sigma, root_between
 from velodrome.reference.families import FAMILIES, Family, find_motion, find_motions, front_rate_slope, trace, trace_all
 from velodrome.reference.modes import follow_modes
@@ -143,6 +143,16 @@ def test_a_further_curve_is_found_through_the_anchor_that_lies_on_it() -> None:
         for curve in (own, further)
     )
     assert (len(on_own), len(on_further)) == (0, 1)
+
+
+@pytest.mark.parametrize("number", [3, 4])
+def test_the_pivoting_motion_has_any_rear_rate_of_round_off(number: int) -> None:
+    """Its rear speed is exactly zero at a curve's end, where the squared rate has no slope."""
+    curve = family(0.005, number)
+    pivots = [point.unknowns for point in curve.points if point.unknowns[REAR_SPEED] == 0]
+    assert len(pivots) == 1
+    (found,) = crossings(curve.equations, curve.points, rear_rate_condition(1e-12))
+    np.testing.assert_array_equal(found, pivots[0])
 
 
 @pytest.mark.parametrize(

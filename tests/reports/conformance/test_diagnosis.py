@@ -29,6 +29,8 @@ from velodrome.reference.kinematics import COORDINATES
 from velodrome.reference.surface import Plane
 from velodrome.testing import ConformanceError, ConformanceReport, check_engine, examine_engine
 
+pytestmark = pytest.mark.once  # the examination's judgement; `test_conformance` examines every engine
+
 ENGINES = (REFERENCE, "exudyn")
 ANGLES = np.arange(9) >= 3
 

@@ -10,6 +10,8 @@ from planting import changed, plant
 
 from velodrome.testing import examine_engine
 
+pytestmark = pytest.mark.once  # the examination's judgement; `test_conformance` examines every engine
+
 FRONT = np.array([0.0, 1.0])[:, None]
 Z = np.array([0.0, 0.0, 1.0])
 

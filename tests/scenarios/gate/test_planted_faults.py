@@ -36,6 +36,8 @@ from velodrome.reference.surface import Paraboloid, Plane
 from velodrome.scenarios.gate import checks as gate
 from velodrome.scenarios.scenario import engine_settings
 
+pytestmark = pytest.mark.once  # the gate's judgement; `test_gate` rides with every engine
+
 GATED = gate.gated_names()
 
 

@@ -15,6 +15,8 @@ from mill import PACKAGE
 from velodrome.scenarios.history import Children
 from velodrome.scenarios.history.dates import find_release_dates, select_first_days
 
+pytestmark = pytest.mark.once  # an index and a cache
+
 VERSIONS = ["1.0", "1.1", "2.0"]
 FILES = [
     {"filename": f"{PACKAGE}-1.0-py3-none-any.whl", "upload-time": "2026-01-02T23:59:59.5Z"},

@@ -19,6 +19,8 @@ from velodrome.scenarios.history.environments import (
 )
 from velodrome.scenarios.history.releases import Release, read_wheel_releases
 
+pytestmark = pytest.mark.once  # pip and folders; `test_history_command` rides in environments
+
 HELPER = "wheelmill-helper"
 
 

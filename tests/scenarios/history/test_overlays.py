@@ -14,6 +14,8 @@ from numpy.random import _common
 
 from velodrome.scenarios.history.requirements import RequirementConflict, find_suite_packages, resolve_needs
 
+pytestmark = pytest.mark.once  # Python's own import system
+
 # Any small compiled library.
 COMPILED = _common.__file__
 _PROBE = """

@@ -16,6 +16,8 @@ from velodrome.scenarios.history.pip_calls import (
     select_pip_settings,
 )
 
+pytestmark = pytest.mark.once  # pip alone
+
 
 def test_only_where_pip_looks_and_how_it_gets_there_counts() -> None:
     listed = [

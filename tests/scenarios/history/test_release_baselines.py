@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 from mill import CIRCLE, FAULT, PACKAGE, install_mill, make_wheel, use_registry
 
+pytestmark = pytest.mark.once  # pip and folders; `test_history_command` rides in environments
+
 CHECK = ("check", "circle.toml", "--json", "--baseline-of")
 
 

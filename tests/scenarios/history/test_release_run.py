@@ -14,6 +14,8 @@ from mill import CIRCLE, PACKAGE, install_mill, make_wheel, use_registry
 
 from velodrome.engines.storage import read_trajectory
 
+pytestmark = pytest.mark.once  # pip and folders; `test_history_command` rides in environments
+
 RUN = ("run", "circle.toml", "--json", "--release")
 
 

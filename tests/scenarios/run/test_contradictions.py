@@ -159,9 +159,9 @@ ENGINE = Own()
 def test_the_command_refuses_to_update_and_says_which_report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "own_high.py").write_text(BROKEN, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
-    announced = registry.entry_points(group=registry.ENTRY_POINT_GROUP)
+    announced = registry.list_entry_points(registry.ENTRY_POINT_GROUP)
     point = EntryPoint(OWN, "own_high:ENGINE", registry.ENTRY_POINT_GROUP)
-    monkeypatch.setattr(registry, "entry_points", lambda group: [*announced, point])
+    monkeypatch.setattr(registry, "list_entry_points", lambda group: [*announced, point])
     baselines = tmp_path / "baselines"
     command = ["check", "q2", "--engine", OWN, "--engine", REFERENCE, "--baselines", str(baselines), "--update"]
     done = CliRunner().invoke(app, command)
