@@ -58,7 +58,7 @@ def find_missing_internals() -> list[str]:
     for module, functions in _PARAMETERS.items():
         for name, expected in functions.items():
             function = _find(module, name)
-            if function is None or tuple(signature(function).parameters) != expected:
+            if not callable(function) or tuple(signature(function).parameters) != expected:
                 missing.append(f"{module}.{name}({', '.join(expected)})")
     return missing
 
