@@ -22,19 +22,21 @@ import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numba as nb
 from numba.core import config
 from numba.core.serialize import dumps
 
-from .loading import MachineCode, Part
 from .locks import unlock, wait_for_lock
+
+if TYPE_CHECKING:
+    from .loading import MachineCode, Part
 
 _HERE = Path(__file__).parent
 _PACKAGE = _HERE.parents[1]
 # The kernels import one another as ``from .lean import derivative`` and ``from . import lean, rim``.
-_IMPORT = re.compile(r"^from \.(\w*) import (\([^)]*\)|.*)$", re.MULTILINE)
+_IMPORT = re.compile(r"^ *from \.(\w*) import (\([^)]*\)|.*)$", re.MULTILINE)
 
 
 class Folders(NamedTuple):

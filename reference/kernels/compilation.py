@@ -6,17 +6,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from weakref import WeakSet
 
-from numba.core import config, event, sigutils, types
-from numba.core.ccallback import CFunc
-from numba.extending import typeof_impl
+import numba as nb
+from numba.core import config, event
 
 from .cache import KernelCache, is_cacheable
-from .dispatchers import Kernel, KernelPart, connect_environments
-from .loading import MachineCode, Part
+from .internals import find_missing_internals
+
+# Whether code is compiled and kept by the suite's own dispatchers; otherwise numba does it all, with its own cache.
+OWN = not find_missing_internals()
+if OWN or TYPE_CHECKING:
+    from .keeping import compile_kept_callback, declare_kept_kernel
 
 
 class _CompilationCount(event.Listener):
@@ -40,11 +42,11 @@ class _CompilationCount(event.Listener):
         self.depth = 0
 
     def on_start(self, event: Any) -> None:
-        self.depth += isinstance(event.data["dispatcher"], Kernel | KernelPart)
+        self.depth += event.data["dispatcher"].py_func in self.kernels
 
     def on_end(self, event: Any) -> None:
         kernel = event.data["dispatcher"]
-        if isinstance(kernel, Kernel | KernelPart):
+        if kernel.py_func in self.kernels:
             self.depth -= 1
             self.compiled.add(kernel.py_func)
             if event.data["args"] not in kernel.overloads and isinstance(kernel._cache, KernelCache):
@@ -86,33 +88,17 @@ def jit_inline(function: Callable[..., Any]) -> Any:
     return _declare(function, forceinline=True)
 
 
-def _declare(function: Callable[..., Any], **options: bool) -> Any:
+def _declare(function: Callable[..., Any], **options: Any) -> Any:
     """Return a kernel, which counts as one that may be compiled and keeps its compiled code on disk."""
     if config.DISABLE_JIT:
         return function
-    kernel = Kernel(function, {}, {"nopython": True, "error_model": "numpy", **options})
-    if is_cacheable(function):
-        kernel._cache = KernelCache(function, MachineCode)
-        kernel.part._cache = KernelCache(function, Part)
+    options |= {"error_model": "numpy"}
+    if OWN:
+        kernel = declare_kept_kernel(function, options)
+    else:
+        kernel = nb.njit(cache=is_cacheable(function), **options)(function)
     _count.kernels.add(function)
     return kernel
-
-
-class _Callback(CFunc):
-    """A C callback that keeps its type as an argument of kernels, which numba would make anew for every call."""
-
-    def _compile_uncached(self) -> Any:
-        return connect_environments(super()._compile_uncached())
-
-    @cached_property
-    def numba_type(self) -> types.FunctionType:
-        """Type of the callback as a first-class function."""
-        return types.FunctionType(self._sig)
-
-
-@typeof_impl.register(_Callback)
-def _typeof_callback(callback: _Callback, context: Any) -> types.FunctionType:
-    return callback.numba_type
 
 
 def compile_callback(signature: Any, cache: bool = True, **options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -130,14 +116,8 @@ def compile_callback(signature: Any, cache: bool = True, **options: Any) -> Call
     """
 
     def compile_function(function: Callable[..., Any]) -> Any:
-        callback = _Callback(function, sigutils.normalize_signature(signature), locals={}, options=options)
-        if cache and is_cacheable(function):
-            callback._cache = KernelCache(function, MachineCode)
-        try:
-            callback.compile()
-        finally:
-            if isinstance(callback._cache, KernelCache):
-                callback._cache.release()
-        return callback
+        if OWN:
+            return compile_kept_callback(function, signature, cache, options)
+        return nb.cfunc(signature, cache=cache and is_cacheable(function), **options)(function)
 
     return compile_function

@@ -147,7 +147,8 @@ class Part(NamedTuple):
         library = PartLibrary(target.codegen(), self.common.name)
         library.bitcode = self.bitcode
         library._finalized = True
-        library._reload_init.update(self.common.preparations)
+        if hasattr(library, "_reload_init"):  # in numba 0.61, what calls a function does not prepare it
+            library._reload_init.update(self.common.preparations)
         return _restore(target, self.common, library, object())
 
 

@@ -18,6 +18,7 @@ from numba.core.errors import TypingError
 
 from velodrome.reference.kernels import cache
 from velodrome.reference.kernels.compilation import compile_callback, jit
+from velodrome.reference.kernels.internals import find_missing_internals
 
 KERNELS = Path(cache.__file__).parent
 # Compiles a kernel and the one that it calls for two types, and prints how many compilations it took.
@@ -217,6 +218,30 @@ def test_loaded_kernel_needs_no_compiler(tmp_path: Path, kernel: str, argument: 
     assert loaded[0] == compiled[0]
     assert set(compiled[1].split()) == {"numba.cpython.unicode", "numba.np.linalg", "scipy.linalg"}
     assert set(loaded[1].split()) == needs
+
+
+def test_this_numba_has_all_internals() -> None:
+    """Where it has not, everything works, but slower: new ones have to be found."""
+    assert find_missing_internals() == []
+
+
+def test_numba_with_other_internals_compiles_the_same(tmp_path: Path) -> None:
+    """Then its own dispatchers and its own cache serve."""
+    script = "import sys\nfrom velodrome.reference.kernels import internals\n"
+    script += "if sys.argv[1] == 'without': internals._NAMES['numba.core.dispatcher'] += ('Dispatcher.gone',)\n"
+    script += "from velodrome.reference.bicycle import Bicycle\nfrom velodrome.reference.kernels import vector\n"
+    script += "from velodrome.reference.surface import Plane, evaluate\n"
+    script += "print(type(vector.cross).__module__, evaluate(Plane(), 0.1, 0.2)[:1], "
+    script += "vector.cross((0.1, 0.2, 0.3), (0.7, 0.9, 1.1)), vector.cross((0.1j, 0.2, 0.3), (0.7, 0.9, 1.1)))"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", script, how], env=environment, text=True, check=True, capture_output=True
+        ).stdout.split(maxsplit=1)
+        for how in ("with", "without", "without")
+    ]
+    assert [module for module, _ in said] == ["velodrome.reference.kernels.dispatchers"] + ["numba.core.registry"] * 2
+    assert len({result for _, result in said}) == 1
 
 
 def test_damaged_file_is_compiled_anew(folder: Path) -> None:
