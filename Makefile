@@ -20,11 +20,15 @@ TESTING := hypothesis pytest pytest-xdist
 # Run the tests in two processes, each file in one of them, so that fixtures of a file are computed once.
 PYTEST := -m pytest -n 2 --dist loadfile
 
-.PHONY: run environments test test-all test-engines test-packages test-lowest test-machines test-machines-short test-pages test-wheel
-.PHONY: lint lint-style lint-pyright lint-mypy check docs
+.PHONY: run warm-up environments test test-all test-engines test-packages test-lowest test-machines test-machines-short
+.PHONY: test-pages test-wheel lint lint-style lint-pyright lint-mypy check docs
 
 run: $(STAMP)
 	$(BIN)/velodrome run q2-plus
+
+# Compile the kernels ahead, on all cores, as for an image.
+warm-up: $(STAMP)
+	$(BIN)/velodrome warm-up
 
 # What `.ci/run` needs, two at a time with `make -j 2`.
 environments: $(DOCS_STAMP) $(LOWEST_STAMP) $(ENGINES_STAMP)

@@ -1,19 +1,14 @@
 """The cost of a sweep besides its engines, and its speed-up with workers.
 
-python benchmarks/sweep.py                    # overhead, bytes and speed-up from 1 to 2 processes
-python benchmarks/sweep.py --cluster 2 4 8    # also Dask clusters of 2, 4 and 8 workers on this machine
+python benchmarks/sweep.py    # overhead, bytes and speed-up from 1 to 2 processes; clusters: benchmarks/cluster.py
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,7 +18,6 @@ from rich.console import Console
 from rich.table import Table
 
 from velodrome.scenarios.sweep.plan import SweepPlan, plan_sweep
-from velodrome.scenarios.sweep.pool import ONE_THREAD
 from velodrome.scenarios.sweep.run import Work, locally, run_sweep
 from velodrome.scenarios.sweep.store import JOURNAL, RESULTS, TIMINGS, open_folder, write_results
 
@@ -161,72 +155,12 @@ def speed_table(folder: Path, count: int, rounds: int) -> Table:
     return table
 
 
-def cluster_table(folder: Path, sizes: list[int], count: int) -> Table:
-    """Measure the rows per second of Dask clusters on this machine, and the CPU time of their scheduler and client."""
-    from velodrome.scenarios.sweep.cluster import on_cluster
-
-    table = Table("Dask workers", "rows/s", "worker", "client", "scheduler", box=None, pad_edge=False)
-    plan = planned(folder, ["reference"], count)
-    for workers in sizes:
-        with cluster(workers) as (address, scheduler):
-            work = on_cluster(address)
-            idle = idle_share(scheduler)
-            before = cpu_seconds(scheduler)
-            found = measured(plan, work)
-            # What the scheduler spends all the time, on heartbeats and the like, does not belong to the rows.
-            spent = (cpu_seconds(scheduler) - before - idle * found.elapsed) / len(plan.tasks)
-        times = (found.task, found.parent, spent)
-        table.add_row(str(workers), f"{found.rate:.4g}", *(f"{1e3 * seconds:.2f} ms" for seconds in times))
-    return table
-
-
-@contextmanager
-def cluster(workers: int) -> Iterator[tuple[str, int]]:
-    """Run a scheduler and its workers, one thread each; yield its address and process id."""
-    address = "tcp://127.0.0.1:18786"
-    # The module is called since its console script need not be on the path.
-    dask = [sys.executable, "-m", "dask"]
-    with tempfile.TemporaryDirectory() as folder:
-        quiet = {
-            "cwd": folder,
-            "stdout": subprocess.DEVNULL,
-            "stderr": subprocess.DEVNULL,
-            "env": os.environ | ONE_THREAD,
-        }
-        scheduler = subprocess.Popen(
-            [*dask, "scheduler", "--host", "127.0.0.1", "--port", "18786", "--no-dashboard"], **quiet
-        )
-        own = ["--nworkers", str(workers), "--nthreads", "1", "--host", "127.0.0.1", "--no-dashboard"]
-        members = subprocess.Popen([*dask, "worker", address, *own], **quiet)
-        try:
-            yield address, scheduler.pid
-        finally:
-            for process in (members, scheduler):
-                process.terminate()
-                process.wait()
-
-
-def idle_share(pid: int, seconds: float = 5.0) -> float:
-    """Return the CPU time per second of an idle process, after it has settled."""
-    time.sleep(seconds)
-    before = cpu_seconds(pid)
-    time.sleep(seconds)
-    return (cpu_seconds(pid) - before) / seconds
-
-
-def cpu_seconds(pid: int) -> float:
-    """Return the CPU time of a process [s]."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
 def main() -> None:
     """Measure and print the tables."""
     parser = argparse.ArgumentParser(description="The cost of a sweep besides its engines.")
     parser.add_argument("--rows", type=int, default=500, help="rows of the reference; slower engines get fewer")
     parser.add_argument("--rounds", type=int, default=2, help="repetitions of the speed-up")
     parser.add_argument("--engines", nargs="*", default=["reference", "mujoco-native", "exudyn"])
-    parser.add_argument("--cluster", type=int, nargs="*", default=[], help="numbers of Dask workers")
     options, console = parser.parse_args(), Console()
     console.print("load of this machine before: {:.1f} {:.1f} {:.1f}".format(*os.getloadavg()))
     with tempfile.TemporaryDirectory() as folder:
@@ -237,8 +171,6 @@ def main() -> None:
             console.print(costs_table(Path(folder), options.engines, options.rows))
         if options.rounds:
             console.print(speed_table(Path(folder), options.rows, options.rounds))
-        if options.cluster:
-            console.print(cluster_table(Path(folder), options.cluster, options.rows * 4))
 
 
 if __name__ == "__main__":

@@ -5,9 +5,10 @@ Compiled kernels, engines and plots take seconds to import. Each command therefo
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from itertools import pairwise
 from typing import Annotated, NoReturn
@@ -40,12 +41,6 @@ from .error import MissingMotionError, ScenarioError
 
 # Environment variable that the shell sets when it asks for completions.
 _COMPLETING = "_VELODROME_COMPLETE"
-app = typer.Typer(
-    name="velodrome",
-    help="Cross-validation of multibody engines on a bicycle that rides hands-free in circles inside a bowl.",
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
 
 
 def _print_versions(wanted: bool) -> None:
@@ -54,7 +49,6 @@ def _print_versions(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _take_options(
     version: Annotated[
         bool,
@@ -90,8 +84,27 @@ _COMMANDS: dict[Callable[..., None], str] = {
     check_command: "Hold the gated scenarios to baselines",
     warm_up_command: "Compile ahead what commands need",
 }
-for _command, _short_help in _COMMANDS.items():
-    app.command(_command.__name__.removesuffix("_command").replace("_", "-"), short_help=_short_help)(_command)
+
+
+def _name_command(command: Callable[..., None]) -> str:
+    return command.__name__.removesuffix("_command").replace("_", "-")
+
+
+def _make_app(commands: Iterable[Callable[..., None]]) -> typer.Typer:
+    """Make the application with some of the commands."""
+    made = typer.Typer(
+        name="velodrome",
+        help="Cross-validation of multibody engines on a bicycle that rides hands-free in circles inside a bowl.",
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+    )
+    made.callback()(_take_options)
+    for command in commands:
+        made.command(_name_command(command), short_help=_COMMANDS[command])(command)
+    return made
+
+
+app = _make_app(_COMMANDS)
 
 
 def supervised_main() -> NoReturn:
@@ -104,10 +117,17 @@ def main() -> NoReturn:
 
     A motion that is not there is no bad input: its line ends with exit status 1.
     """
+    # OpenBLAS starts its threads when numpy is imported, which takes tens of milliseconds of several cores. The suite's
+    # matrices are too small for them.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Nearly all objects that imports and compilation make live on. To look for cycles among them at Python's usual
+    # intervals takes a tenth of the time of both.
+    gc.set_threshold(10_000, 50, 100)
     status = 0
     try:
         _refuse_empty_out(sys.argv[1:])
-        status = app(sys.argv[1:] or ["--help"], standalone_mode=False)
+        arguments = sys.argv[1:] or ["--help"]
+        status = _choose_app(arguments)(arguments, standalone_mode=False)
     except MissingMotionError as error:
         _complain(str(error), status=1)
     except ScenarioError as error:
@@ -128,6 +148,15 @@ def main() -> NoReturn:
     except (OSError, UnicodeEncodeError) as error:  # the latter for a path that is not valid text
         _complain(f"cannot write: {error}")
     sys.exit(status or 0)
+
+
+def _choose_app(arguments: list[str]) -> typer.Typer:
+    """Return the application with the command that the arguments begin with only, or with all.
+
+    typer inspects the parameters of every command that it has, which takes longer than importing them.
+    """
+    commands = [command for command in _COMMANDS if arguments[0] == _name_command(command)]
+    return _make_app(commands) if commands and not _is_completion(arguments) else app
 
 
 def _refuse_empty_out(arguments: list[str]) -> None:

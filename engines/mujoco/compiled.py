@@ -43,6 +43,7 @@ from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 
 from ...reference.kernels import contact
+from ...reference.kernels.arrays import copy_array
 from ...reference.kernels.compilation import compile_callback, jit
 from ...reference.kernels.linear import factorise, solve_factorised
 from ...reference.kernels.rim import RimSearch, find_contact, level_axes
@@ -825,7 +826,7 @@ def solve_dependent_rows(schur, target, cost, share):
             for i in range(size):
                 share[1, i] = vectors[i, k] ** 2
     _reduce_forces(values, vectors, weight, cost, force)
-    target[:] = force
+    copy_array(force, target)
     return residual, dependence
 
 
@@ -902,7 +903,7 @@ def _take_back(board):
     for i in range(board.speeds):
         if passive[i] != after[i]:
             return
-    passive[:] = before
+    copy_array(before, passive)
 
 
 @jit
@@ -995,7 +996,7 @@ def _press(board, model, data):
     _acceleration(model, data)
     free, passive = _real_array(board.qacc_smooth, n), _real_array(board.qfrc_passive, n)
     before = _real_array(board.passive_before, n)
-    before[:] = passive
+    copy_array(passive, before)
     board.crowded += _read_integer(_address_of(data) + types.uintp(board.nefc_at)) > 0
     size = 0
     for k in range(board.wheels):

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...reference.kernels import contact
+from ...reference.kernels.arrays import copy_array
 from ...reference.kernels.compilation import jit
 from ...reference.kernels.dynamics import find_contacts, wheels
 from ...reference.kernels.fall import height_above_fallen
@@ -49,7 +50,7 @@ def wheel_poses(qpos, c, centre, axle):
 def find_height(qpos, fall, function, parameters):
     """Return the height of the bicycle at ``qpos`` (10,) above that of a fallen one."""
     y = np.zeros(18)
-    y[:9] = tangent_coordinates(qpos)
+    copy_array(tangent_coordinates(qpos), y[:9])
     height, _ = height_above_fallen(y, fall, function, parameters)
     return height
 

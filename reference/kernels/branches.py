@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .arrays import copy_array
 from .circle import COORDINATES, FULL
 from .compilation import jit
 from .curve import CHOSEN, REAR_SPEED, SIGMA, metric
@@ -117,7 +118,7 @@ def carry_motions(first, second, sign, squares, scales, shares, parameters, real
         motion_at(second, squares[n], other)
         for i in range(COORDINATES):
             guess[i] = (1 - shares[n]) * one[i] + shares[n] * other[i]
-        u[:] = guess
+        copy_array(guess, u)
         condition = PointCondition(REAR_RATE, squares[n], scales[n])
         iterations, here = solve_motion(u, condition, _MOST, real, function, parameters[n], a, c, full[n])
         if iterations == 0 or here != sign:

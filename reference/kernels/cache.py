@@ -1,4 +1,4 @@
-"""Compiled code on disk, one file for each kernel and set of argument types.
+"""Compiled code on disk, one file for each kernel, form and set of argument types.
 
 numba's own cache notices that the file of a function has changed, but not the file of a function that it calls; it
 keeps the names of its files in an index, which two processes that write at once can leave with the names exchanged;
@@ -28,7 +28,7 @@ import numba as nb
 from numba.core import config
 from numba.core.serialize import dumps
 
-from .loading import CompiledCode, load_code, take_code
+from .loading import MachineCode, Part
 from .locks import unlock, wait_for_lock
 
 _HERE = Path(__file__).parent
@@ -100,10 +100,13 @@ class KernelCache:
     ----------
     function : callable
         In a file that exists; see `is_cacheable`.
+    form : type
+        What of the code is kept.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], form: type[MachineCode | Part]) -> None:
         self._function = function
+        self._form = form
         self._chosen: str = config.CACHE_DIR  # type: ignore[attr-defined]
         self._locked: dict[str, Path] = {}
 
@@ -115,7 +118,6 @@ class KernelCache:
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled code for a signature; None where there is none, and it is then locked."""
-        target_context.refresh()
         key = self._key(sig, target_context.codegen())
         name = self._file_name(key)
         folders = find_folders(self._chosen)
@@ -126,7 +128,7 @@ class KernelCache:
             data = _read(folders.read, name, key)  # another process may have compiled it in the meantime
             if data is not None:
                 self.release()
-        return None if data is None else load_code(target_context, data)
+        return None if data is None else data.load(target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Write compiled code, and unlock it."""
@@ -134,7 +136,7 @@ class KernelCache:
             folder = find_folders(self._chosen).write
             if folder is not None and not data.lifted and not data.library.has_dynamic_globals:
                 key = self._key(sig, data.codegen)
-                _write(folder / self._file_name(key), dumps((key, take_code(data))))
+                _write(folder / self._file_name(key), dumps((key, self._form.take(data))))
         finally:
             self.release()
 
@@ -162,8 +164,8 @@ class KernelCache:
     def _file_name(self, key: tuple[Any, ...]) -> str:
         function = self._function
         path = Path(function.__code__.co_filename)
-        where = fingerprint(path), function.__qualname__, function.__code__.co_firstlineno
-        name = re.sub(r"\W+", "_", f"{path.stem}.{function.__qualname__}")
+        where = fingerprint(path), function.__qualname__, function.__code__.co_firstlineno, self._form.__name__
+        name = re.sub(r"\W+", "_", f"{path.stem}.{function.__qualname__}.{self._form.__name__}")
         return f"{name}-{_digest(repr((where, [str(part) for part in key])).encode())[:32]}.nbc"
 
 
@@ -203,7 +205,7 @@ def _find_imports(path: Path) -> frozenset[Path]:
     return frozenset(found)
 
 
-def _read(folders: tuple[Path, ...], name: str, key: tuple[Any, ...]) -> CompiledCode | None:
+def _read(folders: tuple[Path, ...], name: str, key: tuple[Any, ...]) -> MachineCode | Part | None:
     """Return the code in the first folder that has it under this name and key; None if none has."""
     for folder in folders:
         try:

@@ -10,13 +10,13 @@ from functools import cached_property
 from typing import Any
 from weakref import WeakSet
 
-import numba as nb
-from numba.core import event, sigutils, types
+from numba.core import config, event, sigutils, types
 from numba.core.ccallback import CFunc
-from numba.core.dispatcher import Dispatcher
 from numba.extending import typeof_impl
 
 from .cache import KernelCache, is_cacheable
+from .dispatchers import Kernel, KernelPart, connect_environments
+from .loading import MachineCode, Part
 
 
 class _CompilationCount(event.Listener):
@@ -27,7 +27,7 @@ class _CompilationCount(event.Listener):
     Attributes
     ----------
     kernels : WeakSet
-        All that have been declared.
+        The functions of all that have been declared.
     compiled : WeakSet
         Those compiled in this process, for one set of argument types at least.
     depth : int
@@ -40,15 +40,15 @@ class _CompilationCount(event.Listener):
         self.depth = 0
 
     def on_start(self, event: Any) -> None:
-        self.depth += event.data["dispatcher"] in self.kernels
+        self.depth += isinstance(event.data["dispatcher"], Kernel | KernelPart)
 
     def on_end(self, event: Any) -> None:
         kernel = event.data["dispatcher"]
-        if kernel in self.kernels:
+        if isinstance(kernel, Kernel | KernelPart):
             self.depth -= 1
-            self.compiled.add(kernel)
-            if event.data["args"] not in kernel.overloads:  # an error: there is nothing to save
-                kernel._cache.release()
+            self.compiled.add(kernel.py_func)
+            if event.data["args"] not in kernel.overloads and isinstance(kernel._cache, KernelCache):
+                kernel._cache.release()  # an error: there is nothing to save
 
 
 _count = _CompilationCount()
@@ -69,12 +69,12 @@ def find_compilation() -> tuple[int, int] | None:
 
 def jit(function: Callable[..., Any]) -> Any:
     """Compile a kernel on its first call for each set of argument types."""
-    return _declare(nb.njit(error_model="numpy")(function))
+    return _declare(function)
 
 
 def jit_released(function: Callable[..., Any]) -> Any:
     """Compile a kernel as `jit` does; it releases the interpreter's lock, so that threads can share its work."""
-    return _declare(nb.njit(error_model="numpy", nogil=True)(function))
+    return _declare(function, nogil=True)
 
 
 def jit_inline(function: Callable[..., Any]) -> Any:
@@ -83,19 +83,26 @@ def jit_inline(function: Callable[..., Any]) -> Any:
     For parts of one function that are separate only for readability: a call that passes a dozen tuples through
     memory costs as much as the arithmetic in it (measured: a quarter of the right-hand side).
     """
-    return _declare(nb.njit(error_model="numpy", forceinline=True)(function))
+    return _declare(function, forceinline=True)
 
 
-def _declare(kernel: Any) -> Any:
-    """Keep a kernel's compiled code on disk, count it as one that may be compiled, and return it."""
-    if isinstance(kernel, Dispatcher) and is_cacheable(kernel.py_func):  # no dispatcher with NUMBA_DISABLE_JIT
-        kernel._cache = KernelCache(kernel.py_func)
-    _count.kernels.add(kernel)
+def _declare(function: Callable[..., Any], **options: bool) -> Any:
+    """Return a kernel, which counts as one that may be compiled and keeps its compiled code on disk."""
+    if config.DISABLE_JIT:
+        return function
+    kernel = Kernel(function, {}, {"nopython": True, "error_model": "numpy", **options})
+    if is_cacheable(function):
+        kernel._cache = KernelCache(function, MachineCode)
+        kernel.part._cache = KernelCache(function, Part)
+    _count.kernels.add(function)
     return kernel
 
 
 class _Callback(CFunc):
     """A C callback that keeps its type as an argument of kernels, which numba would make anew for every call."""
+
+    def _compile_uncached(self) -> Any:
+        return connect_environments(super()._compile_uncached())
 
     @cached_property
     def numba_type(self) -> types.FunctionType:
@@ -125,7 +132,7 @@ def compile_callback(signature: Any, cache: bool = True, **options: Any) -> Call
     def compile_function(function: Callable[..., Any]) -> Any:
         callback = _Callback(function, sigutils.normalize_signature(signature), locals={}, options=options)
         if cache and is_cacheable(function):
-            callback._cache = KernelCache(function)
+            callback._cache = KernelCache(function, MachineCode)
         try:
             callback.compile()
         finally:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .arrays import copy_array
 from .circle import COORDINATES, FULL, ROWS, STEP, circle_and_unknowns, circle_jacobian, circle_residual, unfold
 from .compilation import jit
 from .linear import invert
@@ -78,7 +79,7 @@ def expanded(u, function, parameters, a, rows, jacobian, full, basis):
 def _invert_bordered(u, covector, function, parameters, a, inverse):
     """Fill the inverse (9, 9) of the Jacobian bordered by a covector; return the determinant's sign."""
     circle_jacobian(u, function, parameters, a, inverse[:ROWS])
-    inverse[ROWS] = covector
+    copy_array(covector, inverse[ROWS])
     return invert(inverse, COORDINATES)
 
 

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from . import lean
+from .arrays import copy_array
 from .compilation import jit
 from .dormand_prince import SIZE, error_norm, fill_dense_output, fill_extra_stage, fill_stage, fill_step
 from .dynamics import wheels
@@ -301,7 +302,7 @@ def modified_euler(y, step, count, stride, ground, fall, function, parameters, c
             at[0], at[1] = (n - 1) * step, n * step
             return FELL, rows, n * step
         if n % stride == 0:
-            out[rows] = y
+            copy_array(y, out[rows])
             rows += 1
     return DONE, rows, count * step
 

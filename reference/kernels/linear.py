@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .arrays import copy_array
 from .compilation import jit
 
 
@@ -103,5 +104,5 @@ def invert(a, n):
     for i in range(n):
         for k in range(n):
             row[order[k]] = a[i, k]
-        a[i] = row
+        copy_array(row, a[i])
     return sign

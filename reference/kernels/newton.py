@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .arrays import copy_array
 from .circle import COORDINATES, FULL, ROWS, circle_and_unknowns
 from .compilation import jit
 from .curve import REAR_SPEED, SIGMA, expanded
@@ -88,9 +89,8 @@ def _invert_here(u, condition, function, parameters, a, rows, full, inverse):
 
     Returns the condition's value and the determinant's sign.
     """
-    jacobian, basis = np.empty((ROWS, COORDINATES)), np.empty((FULL, COORDINATES))
-    expanded(u, function, parameters, a, rows, jacobian, full, basis)
-    inverse[:ROWS] = jacobian
+    basis = np.empty((FULL, COORDINATES))
+    expanded(u, function, parameters, a, rows, inverse[:ROWS], full, basis)
     _fill_gradient(condition, full, basis, inverse[ROWS])
     return condition_value(condition, full), invert(inverse, COORDINATES)
 
@@ -172,5 +172,6 @@ def canonical(u, condition, real, function, parameters, a, c, full):
     circle_and_unknowns(v, real, parameters, a, rows, new)
     if not is_solution(new, real, parameters, c):
         return UNSETTLED
-    u[:], full[:] = v, new
+    copy_array(v, u)
+    copy_array(new, full)
     return AMBIGUOUS if doubtful else CANONICAL

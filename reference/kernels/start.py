@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .arrays import copy_array
 from .compilation import jit
 from .dynamics import complete_velocity, find_contacts, guess_contacts, mass_and_bias, rolling, settle
 from .kinematics import frames
@@ -184,7 +185,7 @@ def _finish(y, undisturbed, disturbed, change, centre, ground, function, paramet
     """Check a state, disturb and check it again; return whether it is a start without any doubt."""
     if not has_inertia(y[:9], y[18:], function, parameters, c):
         return False
-    undisturbed[:] = y
+    copy_array(y, undisturbed)
     if disturbed:
         if not _disturb(y, change, centre, function, parameters, c):
             return False

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from . import contact
+from .arrays import copy_array
 from .compilation import jit
 from .dynamics import wheels
 from .rim import LIFTED, bound, deepest, find_contact, least_clearance, level_axes
@@ -134,7 +135,7 @@ def first_touch(times, q, qd, ground, function, parameters, c):
                 held[:], before[:] = False, np.nan
         for look in range(1, looks + 1):
             share, now = 1.0, times[n]
-            pose[:] = q[n]
+            copy_array(q[n], pose)
             if look < looks:
                 share = look / looks
                 now = times[n - 1] + share * (times[n] - times[n - 1])

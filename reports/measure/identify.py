@@ -16,7 +16,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import logm
 
 from ...engines.admission import ride_engine
 from ...engines.engine import Engine, EngineError, Problem, Settings
@@ -117,6 +116,9 @@ def jacobian_at(
     progress: Callable[[float], None] = lambda _: None,
 ) -> np.ndarray:
     """Return an engine's reduced Jacobian (7, 7) at the settings' own step from ``interval`` [s]; see `identify`."""
+    # Imported here because it takes a tenth of a second, and every run imports this module.
+    from scipy.linalg import logm
+
     flow = np.zeros((2, 7, 7))
     for j in range(7):
         for i, (multiple, weight) in enumerate(_STENCIL):

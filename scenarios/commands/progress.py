@@ -50,7 +50,7 @@ class ProgressBars:
         self._doing: str | None = doing
         self._latest: str | None = None  # what was counted last
         self._since = time.monotonic()
-        self._spinner = Spinner("dots")
+        self._spinner = Spinner("dots", Text())
         self._tasks: dict[str, bars.TaskID] = {}
         self._below: Sequence[Text] = ()
         self._bars = bars.Progress(

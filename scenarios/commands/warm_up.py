@@ -7,7 +7,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any
@@ -42,6 +41,8 @@ def warm_up_command(
 
     What is compiled already is not compiled again. The exit status is 1 if a part of it fails.
     """
+    from concurrent.futures import ThreadPoolExecutor, wait
+
     from .progress import SILENCE, ProgressBars
 
     begin = time.perf_counter()
@@ -100,7 +101,7 @@ def _use(arguments: Sequence[str], work: Path, environment: Mapping[str, str]) -
 def _show(found: dict[str, Any]) -> None:
     from .terminal import make_console
 
-    # Each kernel counts once for every set of argument types.
+    # Each kernel counts once for every set of argument types, and apart as Python calls it and as others do.
     lines = [f"compiled: {found['compiled']} of {found['kernels']} kernels in {found['seconds']:.1f} s"]
     if found["folder"] is None:
         lines.append("no folder can be written to: set NUMBA_CACHE_DIR to one that can")

@@ -2,33 +2,42 @@
 
 Each thread of a Dask worker keeps one worker process of `pool`, so limits, crashes and their rows are the same as
 on one machine, and no engine ends a Dask worker. If a Dask worker is lost for another reason, its batches are done
-elsewhere. Dask's protocol carries pickles: connect only to a scheduler that you trust.
+elsewhere. The sweep is sent once, to the scheduler; a batch is ranges of indices, and its rows come back as one block
+of bytes. What the client and the scheduler hold grows with the workers, not with the runs. Dask's protocol carries
+pickles: connect only to a scheduler that you trust.
 """
 
 from __future__ import annotations
 
 import asyncio
-import threading
-from collections import deque
-from collections.abc import Generator, Sequence
+import math
+import time
+import uuid
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import CancelledError
-from functools import cache
-from itertools import islice
+from importlib.metadata import PackageNotFoundError, version
+from itertools import count
 from typing import Any
 
 from ..error import ScenarioError
-from ..run import library_versions
 from ..scenario import show_value
+from .batches import Batches, Ranges, longest_batch
+from .cluster_worker import BatchResult, do_batch, pack_sweep, write_ranges
+from .packing import unpack_rows
 from .plan import Task
-from .pool import Done, Pool, WorkersBroken
+from .pool import Done, WorkersBroken
 from .run import Work
+from .selection import SelectedTasks
 from .worker import Setup
 
-_FIRST, _LARGEST, _SPAN = 4, 250, 1.0  # tasks in the first batches and at most; seconds that a batch should take
-_IN_FLIGHT = 3  # batches per thread: one being done, the next ones waiting
+_PACKAGE = "velodrome"
+_IN_FLIGHT = 3  # batches per thread: one being done, one at its worker, one at the scheduler
+# [s] between messages to the scheduler: batches that are sent and received together cost a third of single ones. Less
+# than two of the shortest batches, which wait meanwhile.
+_PAUSE = 0.1
+_GATHERED = 32  # batches whose rows the client holds at most: 10 MB, or 30 MB if all have as many as they may
+_LOOK = 1.0  # [s] between questions to the scheduler how many threads there are
 _PATIENCE = 30  # seconds to wait for a scheduler to answer and for a first worker to connect
-
-_thread_state = threading.local()
 
 
 def on_cluster(address: str) -> Work:
@@ -57,8 +66,10 @@ def on_cluster(address: str) -> Work:
 
     def work(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
         try:
+            if not isinstance(tasks, SelectedTasks):
+                raise TypeError("a cluster does tasks of a sweep that are chosen by their indices")
             if tasks:
-                yield from _run_batches(client, setup, tasks)
+                yield from _Sending(client, setup, tasks).run()
         except (CancelledError, OSError) as error:
             raise WorkersBroken(f"the scheduler at {address} is lost") from error
         finally:
@@ -83,109 +94,140 @@ def _describe_silence(address: str) -> str:
     )
 
 
-def _run_batches(client: Any, setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
-    from distributed import KilledWorker, as_completed
-
-    try:
-        client.wait_for_workers(1, timeout=_PATIENCE)
-    except TimeoutError as error:
-        raise WorkersBroken(f"no worker connected to the scheduler within {_PATIENCE} s") from error
-    batches, versions = _Batches(tasks, setup.time_limit), library_versions()
-    at_work: dict[Any, list[Task]] = {}
-    arriving = as_completed(loop=client.loop)
-
-    def submit() -> None:
-        threads = max(1, sum(client.nthreads().values()))
-        while len(at_work) < _IN_FLIGHT * threads and (batch := batches.next(threads)):
-            future = client.submit(do_batch, setup, batch, versions, pure=False)
-            at_work[future] = batch
-            arriving.add(future)
-
-    submit()
-    while at_work:
-        future = next(arriving)
-        batch = at_work.pop(future)
-        try:
-            found = future.result()
-        except OSError as error:
-            raise WorkersBroken(f"a Dask worker, or the connection to it, failed: {error}") from error
-        except KilledWorker:
-            found = batches.lost(batch)
-        else:
-            batches.learn(found)
-        future.release()
-        submit()
-        yield from found
-
-
-class _Batches:
-    """Tasks in batches that take about a second each: a batch costs the scheduler about ten milliseconds.
+class _Sending:
+    """Send the batches of a sweep and receive their rows.
 
     Parameters
     ----------
-    tasks : sequence of Task
-    time_limit : float
-        Time that an unfinished task counts for [s].
-    """
-
-    def __init__(self, tasks: Sequence[Task], time_limit: float) -> None:
-        self._waiting, self._left = iter(tasks), len(tasks)
-        self._singles: deque[Task] = deque()
-        self._time_limit = time_limit
-        self._rows, self._seconds = 0, 0.0
-
-    def next(self, threads: int) -> list[Task]:
-        """Return the next batch of neighbouring tasks, which share a start; empty when all are out."""
-        if self._singles:
-            return [self._singles.popleft()]
-        size = _FIRST if not self._rows else int(min(_LARGEST, _SPAN * self._rows / max(self._seconds, 1e-6)))
-        # The last batches are smaller, so that no worker waits long for another one.
-        size = min(self._left, max(1, min(size, self._left // (2 * threads))))
-        self._left -= size
-        return list(islice(self._waiting, size))
-
-    def learn(self, found: Sequence[Done]) -> None:
-        """Update the estimate of how long tasks take."""
-        self._rows += len(found)
-        self._seconds += sum(done.timing.get("task_time", self._time_limit) for done in found)
-
-    def lost(self, batch: list[Task]) -> list[Done]:
-        """Queue the tasks of a batch whose workers died repeatedly one by one; give up a batch of one task."""
-        if len(batch) > 1:
-            self._singles.extend(batch)
-            return []
-        reason = "the Dask workers that ran it were lost again and again"
-        return [Done(batch[0].index, {"status": "killed", "reason": reason}, {})]
-
-
-def do_batch(setup: Setup, tasks: Sequence[Task], libraries: dict[str, str]) -> list[Done]:
-    """Do tasks on a Dask worker.
-
-    Parameters
-    ----------
+    client : distributed.Client
     setup : Setup
-    tasks : sequence of Task
-    libraries : dict
-        Versions that the rows must come from.
-
-    Raises
-    ------
-    WorkersBroken
-        If other versions are installed here, or no worker process starts.
+    tasks : SelectedTasks
     """
-    here = _cached_versions()
-    for name in sorted({*libraries, *here}):
-        if libraries.get(name) != here.get(name):
-            raise WorkersBroken(f"a Dask worker has {name} {here.get(name)}, this sweep is of {libraries.get(name)}")
-    line = setup.line()
-    if getattr(_thread_state, "line", None) != line:
-        if hasattr(_thread_state, "pool"):
-            _thread_state.pool.close()
-        _thread_state.pool, _thread_state.line = Pool(setup, 1), line
-    return list(_thread_state.pool.run(tasks))
 
+    def __init__(self, client: Any, setup: Setup, tasks: SelectedTasks) -> None:
+        from distributed import as_completed
 
-@cache
-def _cached_versions() -> dict[str, str]:
-    """Return the versions of a Dask worker's libraries; looking them up takes as long as some rides."""
-    return library_versions()
+        self._client, self._setup, self._tasks = client, setup, tasks
+        self._batches = Batches(tasks)
+        self._at_work: dict[Any, Ranges] = {}
+        self._arriving = as_completed(loop=client.loop)
+        self._names = (f"batch-{uuid.uuid4().hex}", count())
+        self._known: set[str] = set()
+        self._threads, self._looked, self._submitted = 1, -math.inf, -math.inf
+
+    def run(self) -> Generator[Done]:
+        """Do the tasks and yield the result of each once.
+
+        Raises
+        ------
+        WorkersBroken
+            If no worker is there, or one cannot do any tasks.
+        """
+        try:
+            self._client.wait_for_workers(1, timeout=_PATIENCE)
+        except TimeoutError as error:
+            raise WorkersBroken(f"no worker connected to the scheduler within {_PATIENCE} s") from error
+        sweep = f"sweep-{uuid.uuid4().hex}"
+        # The scheduler keeps metadata as long as a task of the same name, hence until this client leaves or is lost.
+        held = self._client.submit(str, sweep, key=sweep)
+        self._client.set_metadata(sweep, pack_sweep(self._setup, self._tasks.sweep))
+        self._submit(sweep)
+        while self._at_work:
+            ready = self._await_some()
+            for first in range(0, len(ready), _GATHERED):
+                # A list: new batches are sent before the rows of these are read.
+                found = list(self._receive(ready[first : first + _GATHERED]))
+                self._submit(sweep)
+                for rows in found:
+                    yield from rows
+        held.release()
+
+    def _await_some(self) -> list[Any]:
+        """Return the futures of batches that have ended, at least one."""
+        ready = self._arriving.next_batch()
+        pause = self._submitted + _PAUSE - time.monotonic()
+        if pause > 0:
+            time.sleep(pause)
+            ready += self._arriving.next_batch(block=False)
+        return ready
+
+    def _submit(self, sweep: str) -> None:
+        """Send as many batches as the workers need to be busy until the next ones."""
+        if time.monotonic() - self._looked > _LOOK:
+            self._look_at_workers()
+        batches: list[Ranges] = []
+        while len(self._at_work) + len(batches) < _IN_FLIGHT * self._threads:
+            batch = self._batches.next(self._threads, idle=not (self._at_work or batches))
+            if not batch:
+                break
+            batches.append(batch)
+        if not batches:
+            return
+        # Keys with a common first part are a group of Dask's: of a large one, the scheduler gives each worker what it
+        # can begin, and keeps the rest.
+        name, numbers = self._names
+        futures = self._client.map(
+            do_batch,
+            [write_ranges(batch) for batch in batches],
+            sweep=sweep,
+            longest=longest_batch(self._threads),
+            key=[(name, next(numbers)) for _ in batches],
+            pure=False,
+        )
+        self._submitted = time.monotonic()
+        self._at_work.update(zip(futures, batches, strict=True))
+        self._arriving.update(futures)
+
+    def _look_at_workers(self) -> None:
+        """Count the threads of all workers, and refuse new workers with another velodrome.
+
+        A worker without the module of a batch's function cannot even read the message that it is in: it loses its
+        connection, as if the batch had ended it.
+        """
+        threads = self._client.nthreads()
+        fresh = [address for address in threads if address not in self._known]
+        if fresh:
+            own = version(_PACKAGE)
+            for found in self._client.run(version, _PACKAGE, workers=fresh, on_error="return").values():
+                if isinstance(found, PackageNotFoundError):
+                    raise WorkersBroken(f"a Dask worker has no {_PACKAGE}, this sweep is of {own}")
+                # Another error: the worker is lost again.
+                if isinstance(found, str) and found != own:
+                    raise WorkersBroken(f"a Dask worker has {_PACKAGE} {found}, this sweep is of {own}")
+        self._known = set(threads)
+        self._threads = max(1, sum(threads.values()))
+        self._looked = time.monotonic()
+
+    def _receive(self, futures: Sequence[Any]) -> Iterator[Iterator[Done]]:
+        """Yield the rows of batches that have ended."""
+        for future, result in zip(futures, self._gather(futures), strict=True):
+            batch = self._at_work.pop(future)
+            future.release()
+            if result is not None:
+                self._batches.learn(result.count, result.seconds, self._threads)
+                self._batches.return_undone(result.undone)
+                yield unpack_rows(result.rows)
+            elif (given_up := self._batches.lose(batch)) is not None:
+                reason = "the Dask workers that ran it were lost again and again"
+                yield iter([Done(given_up, {"status": "killed", "reason": reason}, {})])
+
+    def _gather(self, futures: Sequence[Any]) -> list[BatchResult | None]:
+        """Return results of batches that have ended; None for those whose workers were lost again and again."""
+        from distributed import KilledWorker
+
+        try:
+            if all(future.status == "finished" for future in futures):
+                return self._client.gather(list(futures))  # in one message
+        except KilledWorker:  # lost with its worker after it was finished, and again later
+            pass
+        results: list[BatchResult | None] = []
+        for future in futures:
+            try:
+                results.append(future.result())
+            except KilledWorker:
+                results.append(None)
+            except WorkersBroken:
+                raise
+            except (ImportError, OSError, RuntimeError) as error:  # RuntimeError: the scheduler cannot read a batch
+                raise WorkersBroken(f"a Dask worker, the scheduler or a connection failed: {error}") from error
+        return results

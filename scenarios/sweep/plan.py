@@ -76,11 +76,15 @@ class TaskSequence(LazyTasks):
 
     def __init__(self, points: Points, base: Mapping[str, Any]) -> None:
         self.points = points
+        self._base = base
         self._digest = hashlib.sha256(canonical_text(base).encode())
         self._width = max(7, len(str(len(points) - 1)))  # digits, so that keys are in the order of the tasks
 
     def __len__(self) -> int:
         return len(self.points)
+
+    def __reduce__(self) -> tuple[type[TaskSequence], tuple[Points, Mapping[str, Any]]]:
+        return TaskSequence, (self.points, self._base)  # a digest that is not finished cannot be pickled
 
     def make_task(self, place: int) -> Task:
         """Make a task from its index in the sweep."""

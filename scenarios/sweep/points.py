@@ -114,6 +114,12 @@ class Points:
         """Return the engine of a run."""
         return self._locate(index)[1]
 
+    def first_at_point(self, index: int) -> int:
+        """Return the first of the runs that differ from a run in the engine and its own settings only."""
+        g = bisect_right(self._ends, index)
+        first = self._ends[g - 1] if g else 0
+        return index - (index - first) % self._starts[g][-1]
+
     def _locate(self, index: int) -> tuple[int, str, int, int]:
         """Return the group of a run, its engine, its point in the group, and its number among the engine's there."""
         g = bisect_right(self._ends, index)

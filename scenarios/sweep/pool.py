@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import selectors
 import signal
@@ -26,7 +27,7 @@ ONE_THREAD = dict.fromkeys(
 )
 ATTEMPTS = 3  # a worker may be killed for other reasons; the third time its task is taken to be the cause
 _AHEAD = 2  # groups sent to a worker, so that the next one is there before the last one's rows are read
-_GROUP = 64  # largest number of the reference's tasks in a group, which ride in one call of compiled code
+GROUP = 64  # largest number of the reference's tasks in a group, which ride in one call of compiled code
 _CHUNK = 64  # largest number of neighbouring tasks, which share a start, that go to one worker
 _LONGEST_QUEUE = 10_000  # with fewer tasks waiting, as many more are made
 _STARTING = 600.0  # [s] for a worker to load and compile everything; half a minute on an idle machine
@@ -96,6 +97,9 @@ class Pool:
         self._failed_starts = 0
         self._queue: deque[Task] = deque()
         self._source: Iterator[Task] = iter(())  # of tasks that are not yet in the queue
+        self._left = 0  # tasks without a result
+        self._longest = math.inf
+        self._begun: float | None = None  # when the first task was sent
         self._workers = [self._start_worker() for _ in range(workers)]
 
     def __enter__(self) -> Pool:
@@ -111,8 +115,15 @@ class Pool:
         self._workers = []
         self._selector.close()
 
-    def run(self, tasks: Collection[Task]) -> Iterator[Done]:
+    def run(self, tasks: Collection[Task], longest: float = math.inf) -> Iterator[Done]:
         """Do tasks in any order and yield the result of each once.
+
+        Parameters
+        ----------
+        tasks : collection of Task
+        longest : float
+            Time from the first task after which no more are begun [s]. Those that remain have no result; at least one
+            task has.
 
         Raises
         ------
@@ -122,16 +133,31 @@ class Pool:
         self._source = iter(tasks)
         self._deaths.clear()
         self._alone.clear()
-        left = len(tasks)
+        self._left, self._longest, self._begun = len(tasks), longest, None
         for worker in self._workers:
             self._feed(worker)
-        while left:
+        while self._left:
             for done in self._receive():
-                left -= 1
+                self._left -= 1
                 yield done
             for done in self._check_deadlines():
-                left -= 1
+                self._left -= 1
                 yield done
+            if self.elapsed() > self._longest:
+                self._drop_waiting()
+
+    def elapsed(self) -> float:
+        """Return the time since the first task of the last `run` was sent [s]; 0 if none was."""
+        return 0.0 if self._begun is None else time.monotonic() - self._begun
+
+    def _drop_waiting(self) -> None:
+        """Drop tasks that are not begun, but for those that may have ended a process: that is found out here."""
+        self._source = iter(())
+        self._queue.clear()
+        suspects = self._alone.union(self._deaths)
+        for worker in self._workers:
+            worker.mine = deque(task for task in worker.mine if task.index in suspects)
+        self._left = sum(len(worker.mine) + sum(map(len, worker.sent)) for worker in self._workers)
 
     def _receive(self) -> Iterator[Done]:
         for chosen, _ in self._selector.select(_LOOK):
@@ -175,6 +201,7 @@ class Pool:
         while len(worker.sent) < _AHEAD and (worker.mine or self._give_share(worker)):
             group = self._take_group(worker.mine)
             worker.sent.append(group)
+            self._begun = time.monotonic() if self._begun is None else self._begun
             if len(worker.sent) == 1:
                 self._set_deadline(worker)
             points = [{"index": task.index, "changes": task.changes} for task in group]
@@ -183,7 +210,7 @@ class Pool:
     def _take_group(self, tasks: deque[Task]) -> deque[Task]:
         """Take the next task, and those after it that ride with it in one call."""
         group = deque([tasks.popleft()])
-        while tasks and len(group) < _GROUP and all(self._may_share(task) for task in (group[0], tasks[0])):
+        while tasks and len(group) < GROUP and all(self._may_share(task) for task in (group[0], tasks[0])):
             group.append(tasks.popleft())
         return group
 
@@ -200,7 +227,10 @@ class Pool:
         if len(self._queue) < _LONGEST_QUEUE:
             self._queue.extend(islice(self._source, _LONGEST_QUEUE))
         if self._queue:
-            size = max(1, min(_CHUNK, len(self._queue) // (4 * len(self._workers))))
+            # One worker alone need not leave anything to others, so that its groups are full.
+            others = len(self._workers) > 1
+            share = len(self._queue) // (4 * len(self._workers)) if others else len(self._queue)
+            size = max(1, min(_CHUNK, share))
             worker.mine.extend(self._queue.popleft() for _ in range(size))
             return True
         richest = max(self._workers, key=lambda other: len(other.mine))

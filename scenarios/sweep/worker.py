@@ -11,6 +11,7 @@ death asks for the next child. Standard output: ``{"pid": ...}`` when a child is
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import platform
@@ -60,7 +61,11 @@ def main() -> None:
             os.dup2(nothing.fileno(), standard)
     try:
         setup = Setup(**json.loads(next(_read_lines(tasks, at_a_time=1))))
+        # What is loaded lives on, so that there are no cycles to find among it, neither now nor in a child.
+        gc.disable()
         _warm_up()
+        gc.freeze()
+        gc.enable()
     except Exception as error:  # reported to the parent, since there is no other output
         _send(results, {"broken": f"{type(error).__name__}: {error}"})
         sys.exit(1)

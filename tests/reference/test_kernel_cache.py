@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numba as nb
+import numpy as np
 import pytest
 from numba.core import config, event
 from numba.core.errors import TypingError
@@ -33,6 +34,50 @@ with event.install_recorder("numba:compile") as recorder:
 # numba also compiles the parts that it puts into them.
 print(sum(kept.is_start and kept.data["dispatcher"] in (dot, scale) for _, kept in recorder.buffer))
 """
+# Calls one kernel and prints what it returns and which of the modules that numba needs only for compilation are loaded.
+LOADING = """\
+import sys
+from tests.reference import test_kernel_cache
+from velodrome.reference.kernels.compilation import jit
+
+print(jit(getattr(test_kernel_cache, sys.argv[1]))(*eval(sys.argv[2])))
+print(*sorted({"numba.np.linalg", "numba.cpython.unicode", "scipy.linalg"} & set(sys.modules)))
+"""
+
+# Kernels that call one another, with an error in the innermost.
+FAILING = """\
+import sys
+
+from velodrome.reference.kernels.compilation import jit
+
+
+@jit
+def fail(x):
+    if x > 1:
+        raise ValueError(f"not {x}")
+    return x
+
+
+@jit
+def middle(x):
+    return fail(x) + 1
+
+
+@jit
+def first(x):
+    return middle(x) + 1
+
+
+@jit
+def second(x):
+    return middle(x) + 2
+
+
+try:
+    globals()[sys.argv[1]](2)
+except ValueError as error:
+    print(error)
+"""
 
 
 @pytest.fixture
@@ -45,6 +90,14 @@ def folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
 
 def double(x: Any) -> Any:
     return 2 * x
+
+
+def find_hash(text: str) -> int:
+    return hash(text)
+
+
+def add_squares(vector: Any) -> Any:
+    return np.dot(vector, vector)
 
 
 def count_compilations(work: Callable[[], object]) -> int:
@@ -107,22 +160,63 @@ def test_compiled_code_is_found_again(folder: Path) -> None:
     assert count_compilations(lambda: jit(double)(1.5j)) == 1
 
 
-def test_loaded_kernel_is_compiled_into_others(folder: Path) -> None:
-    """Its bitcode is parsed then, and not before."""
-    jit(double)(1.5)
+def test_kernel_is_compiled_into_others(folder: Path) -> None:
+    """For others it is compiled to bitcode, which is kept as well and parsed when it is needed."""
+
+    def call_through_another(kernel: Any) -> tuple[int, float]:
+        @nb.njit
+        def quadruple(x: Any) -> Any:
+            return kernel(kernel(x))
+
+        found: list[float] = []
+        return count_compilations(lambda: found.append(quadruple(1.5))), found[0]
+
+    assert call_through_another(jit(double)) == (2, 6.0)
     inner = jit(double)
-
-    @nb.njit
-    def quadruple(x: Any) -> Any:
-        return inner(inner(x))
-
-    assert count_compilations(lambda: inner(1.5)) == 0
-    (loaded,) = inner.overloads.values()
+    assert count_compilations(lambda: inner.part.compile((nb.float64,))) == 0
+    (loaded,) = inner.part.overloads.values()
     assert loaded.library._shared_module is None
-    assert count_compilations(lambda: quadruple(1.5)) == 1
+    assert call_through_another(inner) == (1, 6.0)
     assert loaded.library._shared_module is not None
-    assert quadruple(1.5) == 6.0
+    assert inner.overloads == {}
     assert inner(1.5) == 3.0
+    assert count_compilations(lambda: jit(double)(1.5)) == 0
+
+
+def test_error_of_an_inner_kernel_is_raised(tmp_path: Path) -> None:
+    """Its text is made of objects in an environment that the machine code of the outer kernel has to find."""
+    (tmp_path / "failing.py").write_text(FAILING)
+    paths = os.pathsep.join([str(tmp_path), *sys.path])
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": paths}
+    # Compiled, loaded, and compiled from a part that was loaded and has the inner kernel compiled into it.
+    for outer in ("first", "first", "second"):
+        process = [sys.executable, str(tmp_path / "failing.py"), outer]
+        said = subprocess.run(process, env=environment, text=True, check=True, capture_output=True).stdout
+        assert said.strip() == "not 2"
+
+
+@pytest.mark.parametrize(
+    ("kernel", "argument", "needs"),
+    [
+        ("double", "(1.5,)", set()),
+        # It calls a function in C that imports SciPy itself.
+        ("add_squares", "(__import__('numpy').array([3.0, 4.0]),)", {"scipy.linalg"}),
+        # It reads a variable that only one of the modules makes known.
+        ("find_hash", "('a longer text',)", {"numba.cpython.unicode", "numba.np.linalg", "scipy.linalg"}),
+    ],
+)
+def test_loaded_kernel_needs_no_compiler(tmp_path: Path, kernel: str, argument: str, needs: set[str]) -> None:
+    """What numba imports before it compiles is imported for the kernels that need it only."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONHASHSEED": "1"}
+
+    def call() -> list[str]:
+        process = [sys.executable, "-c", LOADING, kernel, argument]
+        return subprocess.run(process, env=environment, text=True, check=True, capture_output=True).stdout.splitlines()
+
+    compiled, loaded = call(), call()
+    assert loaded[0] == compiled[0]
+    assert set(compiled[1].split()) == {"numba.cpython.unicode", "numba.np.linalg", "scipy.linalg"}
+    assert set(loaded[1].split()) == needs
 
 
 def test_damaged_file_is_compiled_anew(folder: Path) -> None:
@@ -132,7 +226,7 @@ def test_damaged_file_is_compiled_anew(folder: Path) -> None:
     for kept in (0, len(whole) // 2):
         path.write_bytes(whole[:kept])
         assert count_compilations(lambda: jit(double)(1.5)) == 1
-        assert len(path.read_bytes()) == len(whole)
+        assert count_compilations(lambda: jit(double)(1.5)) == 0
 
 
 @pytest.mark.parametrize("home_is_writable", [True, False])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ....reference.kernels.arrays import copy_array
 from ....reference.kernels.compilation import jit
 from ....reference.kernels.linear import solve
 
@@ -30,7 +31,7 @@ def integrate_samples(time, values, samples, out):
             same = same and abs(nodes[s] - known[s]) <= _SAME
         # On an even grid all stencils except those at the ends are the same.
         if not same:
-            known[:] = nodes
+            copy_array(nodes, known)
             for i in range(samples):
                 weights[i] = 1 / (i + 1)
                 for s in range(samples):

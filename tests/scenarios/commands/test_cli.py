@@ -27,7 +27,7 @@ from velodrome.engines.releases import LibraryReach
 from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.families import find_motion
 from velodrome.reference.surface import Paraboloid
-from velodrome.scenarios import gate
+from velodrome.scenarios import cli, gate
 from velodrome.scenarios.commands.present_motions import show_families
 from velodrome.scenarios.gate.verdict import Verdict, missing_verdict
 from velodrome.scenarios.run import runner
@@ -489,7 +489,7 @@ def test_families_refuses_a_shape_that_is_none(velodrome, tmp_path: Path) -> Non
             (
                 *("pyarrow", "matplotlib", "mujoco", "exudyn", "rerun", "scipy.optimize", "scipy.integrate"),
                 *("velodrome.reference.atlas", "velodrome.reference.critical", "velodrome.scenarios.motions.families"),
-                "velodrome.scenarios.commands.present_motions",
+                *("velodrome.scenarios.commands.present_motions", "scipy.linalg", "numba.np.linalg"),
             ),
         ),
     ],
@@ -501,3 +501,9 @@ def test_a_command_imports_only_what_it_needs(arguments: list[str], unwanted: tu
     script += f"    print([name for name in {unwanted!r} if name in sys.modules], file=sys.stderr)"
     result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert result.stderr.strip() == "[]"
+
+
+def test_the_parameters_of_the_command_that_runs_are_inspected_only() -> None:
+    assert [command.name for command in cli._choose_app(["circular", "--help"]).registered_commands] == ["circular"]
+    for arguments in (["--help"], ["circles"], ["--version"]):
+        assert cli._choose_app(arguments) is cli.app

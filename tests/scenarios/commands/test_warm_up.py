@@ -52,4 +52,8 @@ def test_after_it_nothing_is_compiled(tmp_path: Path) -> None:
     assert first["compiled"] == first["kernels"] == len(list(tmp_path.rglob("*.nbc"))) > 100
     assert json.loads(call("warm-up", "--json"))["compiled"] == 0
     call("run", "q2", "--duration", "0.1", "--no-recording", "--out", str(tmp_path / "runs"))
+    call("circular", "--alpha", "0.01", "--rear-rate", "20", "--family", "2", "--json")
+    sweep = tmp_path / "two.toml"
+    sweep.write_text('scenario = "q2"\n[grid]\nperturbation.lean_rate = [0.1, 0.2]\nsimulation.duration = [0.1]\n')
+    call("sweep", str(sweep), "--workers", "1", "--out", str(tmp_path / "sweep"))
     assert len(list(tmp_path.rglob("*.nbc"))) == first["kernels"]

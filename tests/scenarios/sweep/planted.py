@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -25,7 +26,7 @@ SWEEP = (
 
 
 class PlantedSettings(Settings):
-    fault: Literal["none", "crash", "abort", "hang", "hog", "raise", "exit", "leave"] = "none"
+    fault: Literal["none", "crash", "abort", "hang", "hog", "raise", "exit", "leave", "end-host"] = "none"
 
 
 class Planted:
@@ -59,6 +60,9 @@ class Planted:
             sys.exit(0)
         elif settings.fault == "leave":
             os._exit(0)
+        elif settings.fault == "end-host":  # the process that has the keeper of this one
+            status = Path(f"/proc/{os.getppid()}/stat").read_text().rpartition(")")[2].split()
+            os.kill(int(status[1]), signal.SIGKILL)
         ride = INNER.simulate(problem, INNER.settings(), progress)
         return replace(ride, engine=NAME, version=self.version, settings=settings.model_dump())
 

@@ -20,16 +20,19 @@ from pathlib import Path
 from velodrome.scenarios.commands.run_sweep import run_sweep_command
 from velodrome.scenarios.sweep import results
 results._BLOCK_ROWS = 100
-path, out, resume = sys.argv[1:]
-sys.exit(run_sweep_command(Path(path), None, 2, Path(out), resume == "resume", False))
+path, out, resume, scheduler = sys.argv[1:]
+workers = None if scheduler else 2
+sys.exit(run_sweep_command(Path(path), scheduler or None, workers, Path(out), resume == "resume", False))
 """
 
 
-def started(path: Path, out: Path, resume: bool, largest: int | None = None) -> subprocess.Popen[str]:
-    """Run a sweep file on two workers, in blocks of 100 rows; no file may become larger than so many bytes."""
+def started(
+    path: Path, out: Path, resume: bool, largest: int | None = None, scheduler: str = ""
+) -> subprocess.Popen[str]:
+    """Run a sweep file, in blocks of 100 rows, on two workers or a cluster; no file may exceed so many bytes."""
     limit = None if largest is None else lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
     return subprocess.Popen(
-        [sys.executable, "-c", _COMMAND, str(path), str(out), "resume" if resume else ""],
+        [sys.executable, "-c", _COMMAND, str(path), str(out), "resume" if resume else "", scheduler],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

@@ -89,6 +89,30 @@ def test_a_keeper_that_is_stopped_while_its_child_dies_is_replaced(
     assert not alive(worker.process.pid)
 
 
+def test_a_run_whose_time_is_over_leaves_the_rest_for_the_next(tmp_path: Path) -> None:
+    rates = ", ".join(str(k / 1000) for k in range(200))
+    plan = planned(tmp_path, UPRIGHT + f"perturbation.lean_rate = [{rates}]\n")
+    with Pool(Setup(plan.base, 60.0, None), 1) as workers:
+        first = [done.index for done in workers.run(plan.tasks, longest=0.0)]
+        # What was sent before the first row came: a worker alone gets whole groups, two at a time.
+        assert len(first) == 2 * pool.GROUP
+        assert workers.elapsed() > 0.0
+        rest = [task for task in plan.tasks if task.index not in first]
+        assert sorted(first + [done.index for done in workers.run(rest)]) == list(range(200))
+
+
+def test_a_task_that_ends_its_process_is_judged_even_when_the_time_is_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planted.announce(tmp_path / "site", monkeypatch)
+    faults = UPRIGHT + f'"engines.{planted.NAME}.fault" = ["none", "crash"]\nperturbation.lean_rate = [0.0, 0.1, 0.2]\n'
+    plan = planned(tmp_path, f'engines = ["{planted.NAME}"]\n' + faults)
+    with Pool(Setup(plan.base, 60.0, None), 1) as workers:
+        found = list(workers.run(plan.tasks, longest=0.0))
+    # Two tasks are sent at once; the second crashes three times, and the others are not begun.
+    assert [(done.index, done.row["status"]) for done in found] == [(0, "done"), (1, "killed")]
+
+
 @pytest.mark.slow
 def test_a_keeper_that_is_stopped_before_its_first_child_is_replaced(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
