@@ -6,12 +6,12 @@ first needs it, so workers may join at any time. Each thread keeps one worker pr
 
 from __future__ import annotations
 
-import pickle
+import json
 import threading
 import zlib
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from ..run import library_versions
@@ -54,7 +54,7 @@ def pack_sweep(setup: Setup, tasks: TaskSequence) -> dict[str, Any]:
     """Return what workers need to make and do tasks by their index; the versions can be read by any version."""
     return {
         "versions": library_versions(),
-        "sweep": zlib.compress(pickle.dumps((setup, tasks), pickle.HIGHEST_PROTOCOL)),
+        "sweep": zlib.compress(json.dumps({"setup": asdict(setup), "tasks": tasks.as_json()}).encode()),
     }
 
 
@@ -111,7 +111,8 @@ def _find_sweep(name: str) -> tuple[Setup, TaskSequence]:
             if found is None:
                 raise WorkersBroken("the sweep's client has left")
             _refuse_other_versions(found["versions"])
-            _sweeps[name] = pickle.loads(zlib.decompress(found["sweep"]))
+            data = json.loads(zlib.decompress(found["sweep"]))
+            _sweeps[name] = Setup(**data["setup"]), TaskSequence.from_json(data["tasks"])
         _sweeps.move_to_end(name)
         while len(_sweeps) > _KEPT:
             _sweeps.popitem(last=False)

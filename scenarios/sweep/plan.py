@@ -69,22 +69,29 @@ class TaskSequence(LazyTasks):
 
     Parameters
     ----------
-    points : Points
+    sweep : SweepFile
+        With the names of its engines, no patterns.
     base : mapping
-        The base scenario as resolved, without engines that do not ride.
+        The base scenario as resolved.
     """
 
-    def __init__(self, points: Points, base: Mapping[str, Any]) -> None:
-        self.points = points
-        self._base = base
-        self._digest = hashlib.sha256(canonical_text(base).encode())
-        self._width = max(7, len(str(len(points) - 1)))  # digits, so that keys are in the order of the tasks
+    def __init__(self, sweep: SweepFile, base: Mapping[str, Any]) -> None:
+        self._sweep, self._base = sweep, base
+        self.points = Points(sweep, base)
+        self._digest = hashlib.sha256(canonical_text(_select_riding(base, sweep)).encode())
+        self._width = max(7, len(str(len(self.points) - 1)))  # digits, so that keys are in the order of the tasks
+
+    def as_json(self) -> dict[str, Any]:
+        """Return JSON values from which `from_json` makes the same tasks."""
+        return {"sweep": self._sweep.model_dump(mode="json"), "base": dict(self._base)}
+
+    @classmethod
+    def from_json(cls, found: Mapping[str, Any]) -> TaskSequence:
+        """Return the tasks of a sweep from JSON values of `as_json`."""
+        return cls(SweepFile.model_validate(found["sweep"]), found["base"])
 
     def __len__(self) -> int:
         return len(self.points)
-
-    def __reduce__(self) -> tuple[type[TaskSequence], tuple[Points, Mapping[str, Any]]]:
-        return TaskSequence, (self.points, self._base)  # a digest that is not finished cannot be pickled
 
     def make_task(self, place: int) -> Task:
         """Make a task from its index in the sweep."""
@@ -189,7 +196,7 @@ def plan_sweep(path: Path) -> SweepPlan:
     for engine in sweep.engines:
         if checked_all and engine in choice.named and engine not in possible:
             raise ScenarioError(refusals[engine])
-    return SweepPlan(path.stem, path, sweep, base, TaskSequence(points, _select_riding(base, sweep)))
+    return SweepPlan(path.stem, path, sweep, base, TaskSequence(sweep, base))
 
 
 def _select_riding(base: Mapping[str, Any], sweep: SweepFile) -> dict[str, Any]:

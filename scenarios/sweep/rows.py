@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from ...engines.storage import versioned_metadata
 from .plan import Task
@@ -109,6 +108,9 @@ def make_record(task: Task, row: Mapping[str, Any], columns: pa.Schema) -> dict[
 
 def has_status(table: pa.Table, *statuses: str) -> np.ndarray:
     """Return which rows have one of some statuses, shape (n,) of bool."""
+    # Imported here: it takes as long as some rides, and workers do not need it.
+    import pyarrow.compute as pc
+
     found = pc.is_in(table.column("status"), value_set=pa.array(statuses))  # pyright: ignore[reportAttributeAccessIssue]
     return np.asarray(found.to_numpy(), bool)
 

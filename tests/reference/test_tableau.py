@@ -92,9 +92,3 @@ def test_the_error_norm_is_that_of_scipy() -> None:
     unit = 1e-3 * (1 + np.maximum(abs(y), abs(new)))
     squares5, squares3 = (np.sum((e @ k[:13] / unit) ** 2) for e in (DOP853.E5, DOP853.E3))
     assert found == pytest.approx(0.3 * squares5 / np.sqrt((squares5 + 0.01 * squares3) * SIZE), rel=1e-13)
-
-
-def test_the_error_norm_shows_a_step_to_where_there_is_no_derivative() -> None:
-    k = np.ones((16, SIZE))
-    k[12, 3] = np.nan
-    assert np.isnan(method.error_norm(START, START, 0.3, k.reshape(-1), 1e-3, np.empty(SIZE), np.empty(SIZE)))

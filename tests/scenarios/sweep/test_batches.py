@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import pickle
+import json
 import random
 from collections import Counter
 from itertools import chain, pairwise
@@ -51,7 +51,7 @@ def test_ranges_are_the_chosen_tasks(chosen: list[bool]) -> None:
 def test_a_sweep_travels_and_makes_the_same_tasks(tmp_path: Path) -> None:
     extra = "[latin_hypercube]\ncount = 50\nseed = 3\nranges.motion.speed = [4.0, 6.0]\n"
     tasks = sequence(tmp_path, 3, extra)
-    assert list(pickle.loads(pickle.dumps(tasks))) == list(tasks)
+    assert list(TaskSequence.from_json(json.loads(json.dumps(tasks.as_json())))) == list(tasks)
 
 
 def test_rows_of_all_layouts_survive_packing() -> None:
