@@ -21,6 +21,10 @@ from ..stability import VARIABLES, independent
 # The rear rate, the last of the independent variables, follows from the energy.
 CHART = VARIABLES[:LEVEL_VARIABLES]
 
+_STEP = 1e-30  # complex step: derivatives are exact to round-off
+_MOST = 30  # Newton's iterations
+_CONVERGED = 1e-9  # of quadratic convergence: what remains is round-off
+
 
 @dataclass(frozen=True, eq=False)
 class EnergyLevel:
@@ -69,6 +73,27 @@ class EnergyLevel:
         if not level_field(y, level, self.state, surface.function.complex, surface.parameters, c, rates, rear_rate):
             rates[:] = np.nan
         return rates, rear_rate
+
+    def circle(self, energy: float) -> np.ndarray:
+        """Return the seven independent variables of the circular motion of another energy, near by.
+
+        Raises
+        ------
+        ValueError
+            If Newton's method does not converge.
+        """
+        y, step, rear_rate = self.centre.copy(), np.inf, self.rear_rate
+        for _ in range(_MOST):
+            changed = y + 1j * _STEP * np.eye(LEVEL_VARIABLES + 1, LEVEL_VARIABLES)  # the last row is not changed
+            rates, rear_rates = self.field(changed, np.full(len(changed), complex(energy)))
+            rear_rate = float(np.real(rear_rates[-1]))
+            if step < _CONVERGED or not np.all(np.isfinite(rates)):
+                break
+            change = -np.linalg.solve(np.imag(rates[:-1]).T / _STEP, np.real(rates[-1]))
+            y, step = y + change, float(np.abs(change).max())
+        if not step < _CONVERGED:
+            raise ValueError(f"no circular motion of energy {energy!r} J is found near that of {self.energy!r} J")
+        return np.append(y, rear_rate)
 
 
 def energy_level(equations: Steady, motion: CircularMotion) -> EnergyLevel:

@@ -27,7 +27,7 @@ from .normal_form import NormalForm, expand_hopf, linearise_field
 
 SUPERCRITICAL, SUBCRITICAL = "supercritical", "subcritical"
 
-_LEAN = CHART.index("lean")
+LEAN_INDEX = CHART.index("lean")
 # Oscillations are measured by their angles.
 _SCALE = np.array([1.0 if name in ("lean", "steer") else np.inf for name in CHART])
 
@@ -45,7 +45,7 @@ class HopfPoint:
         Kinetic and potential, the latter zero at z = 0 [J].
     frequency : float
         Imaginary part of the crossing eigenvalue [rad/s].
-    level : EnergyLevel or None
+    level : EnergyLevel
         The flow on the level sets of energy, where the oscillation's amplitude is defined.
     form : NormalForm or None
         Its normal form, where the Hopf point on a level set is generic enough to have one.
@@ -64,7 +64,7 @@ class HopfPoint:
     motion: CircularMotion
     energy: float
     frequency: float
-    level: EnergyLevel | None = None
+    level: EnergyLevel
     form: NormalForm | None = None
     criticality: str | None = None
     amplitude_slope: float | None = None
@@ -76,7 +76,7 @@ class HopfPoint:
         """Re c1 / omega for a lean amplitude A = |z|, which sets the scale of the eigenvector [1/rad^2]."""
         if self.form is None:
             return None
-        return float(self.form.cubic.value.real / self.frequency / (2 * abs(self.form.vector[_LEAN])) ** 2)
+        return float(self.form.cubic.value.real / self.frequency / (2 * abs(self.form.vector[LEAN_INDEX])) ** 2)
 
 
 def section_hopf_points(family: Family) -> list[HopfPoint]:
@@ -112,7 +112,7 @@ def _measure(point: HopfPoint, form: NormalForm) -> HopfPoint:
         return replace(point, why_undefined="the first Lyapunov coefficient is zero")
     if abs(growth) <= form.growth.error:
         return replace(point, why_undefined="the pair of eigenvalues touches the imaginary axis")
-    slope = -4 * float(np.abs(form.vector[_LEAN])) ** 2 * growth / cubic
+    slope = -4 * float(np.abs(form.vector[LEAN_INDEX])) ** 2 * growth / cubic
     return replace(
         point,
         criticality=SUBCRITICAL if cubic > 0 else SUPERCRITICAL,
