@@ -8,10 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from ..circular import Steady
+from ..dae import consistent_state, contact_parameters
 from ..kernels import flow as kernel
 from ..kernels.pose import aligned
 from ..kernels.reduced import VARIABLES
-from ..kinematics import constants
+from ..kinematics import PITCH, constants
+from ..surface import evaluate
 
 _STEP = 1e-30  # complex step: derivatives are exact to round-off
 
@@ -82,7 +84,7 @@ class Flow:
             If the start cannot be placed on the ground, or the ride is not finite.
         """
         ends = np.empty((len(durations), VARIABLES), complex)
-        energy, placed = kernel.flow(start.astype(complex), durations.astype(complex), steps, *self._ground, ends)
+        energy, placed = kernel.flow_legs(start.astype(complex), durations.astype(complex), steps, *self._ground, ends)
         if not placed or not np.all(np.isfinite(ends)):
             raise ValueError("the bicycle does not ride from there")
         return ends, energy
@@ -102,8 +104,17 @@ class Flow:
             by_duration[:, :, j] = np.imag(there) / _STEP
         return Legs(ends, by_start, by_duration, float(energy), gradient)
 
+    def moved_to(self, start: np.ndarray) -> Flow:
+        """Return the same flow, with the state of independent variables (7,) as the one to place others near."""
+        surface, bicycle = self.equations.surface, self.equations.bicycle
+        x, y, lean, steer, *rates = start.tolist()
+        ascent = float(evaluate(surface, x, y)[0] - evaluate(surface, self.near[0], self.near[1])[0])
+        guess = float(self.near[2]) + ascent, float(self.near[PITCH])
+        q, qd = consistent_state(bicycle, surface, (x, y), lean, steer, (rates[0], rates[1], rates[2]), guess=guess)
+        return Flow(self.equations, np.concatenate([q, qd, contact_parameters(bicycle, surface, q)]))
+
     def rates(self, start: np.ndarray) -> np.ndarray:
         """Return the time derivatives (7,) of the independent variables."""
         out = np.full(VARIABLES, np.nan)
-        kernel.rates(start.astype(complex), *self._ground, out)
+        kernel.variable_rates(start.astype(complex), *self._ground, out)
         return out

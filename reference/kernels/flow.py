@@ -16,7 +16,7 @@ from .lean import derivative
 
 
 @jit
-def place(variables, near, function, parameters, c, y):
+def place_on_ground(variables, near, function, parameters, c, y):
     """Fill the state y (24,) = (q, qd, contact parameters), at yaw 0, with seven independent variables.
 
     ``near`` (24,) is a state from which Newton's method starts. Returns whether both wheels reach the ground.
@@ -35,7 +35,7 @@ def place(variables, near, function, parameters, c, y):
 
 
 @jit
-def extract(y, variables):
+def extract_variables(y, variables):
     """Fill the independent variables (7,), x and y in the heading frame, of a state (24,)."""
     cosine, sine = np.cos(y[3]), np.sin(y[3])
     variables[0], variables[1] = cosine * y[0] + sine * y[1], cosine * y[1] - sine * y[0]
@@ -44,7 +44,7 @@ def extract(y, variables):
 
 
 @jit
-def advance(y, duration, steps, function, parameters, a):
+def take_steps(y, duration, steps, function, parameters, a):
     """Advance a state y (24,) in place by equal steps; ``a`` the `Aligned` constants."""
     k, work, new = np.empty(13 * SIZE, y.dtype), np.empty(SIZE, y.dtype), np.empty(SIZE, y.dtype)
     h = duration / steps
@@ -59,32 +59,32 @@ def advance(y, duration, steps, function, parameters, a):
 
 
 @jit
-def flow(variables, durations, steps, near, function, parameters, c, a, out):
+def flow_legs(variables, durations, steps, near, function, parameters, c, a, out):
     """Fill ``out`` (m, 7), the independent variables after each of m durations (m,) one after another.
 
     ``variables`` (7,), ``durations`` and ``out`` are complex, ``steps`` (m,) are the numbers of steps. Returns the
     energy, and whether the start is on the ground.
     """
     y = np.empty(SIZE, np.complex128)
-    if not place(variables, near, function, parameters, c, y):
+    if not place_on_ground(variables, near, function, parameters, c, y):
         return 0j, False
     kinetic, potential = energies(y[:9], y[9:18], c)
     for n in range(len(durations)):
-        advance(y, durations[n], steps[n], function, parameters, a)
-        extract(y, out[n])
+        take_steps(y, durations[n], steps[n], function, parameters, a)
+        extract_variables(y, out[n])
     return kinetic + potential, True
 
 
 @jit
-def rates(variables, near, function, parameters, c, a, out):
+def variable_rates(variables, near, function, parameters, c, a, out):
     """Fill the time derivatives (7,) of independent variables; return whether they are those of a state."""
     y, dy, here = np.empty(SIZE, np.complex128), np.empty(SIZE, np.complex128), np.empty(7, np.complex128)
-    if not place(variables, near, function, parameters, c, y):
+    if not place_on_ground(variables, near, function, parameters, c, y):
         return False
     derivative(y, function, parameters, a, dy)
     for i in range(SIZE):
         y[i] += 1e-30j * dy[i]
-    extract(y, here)
+    extract_variables(y, here)
     for i in range(7):
         out[i] = here[i].imag / 1e-30
     return True

@@ -1,4 +1,4 @@
-"""The branch of periodic orbits that is born at a Hopf point."""
+"""Small periodic orbits near a Hopf point, and the amplitude law that follows from them without derivatives."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .hopf import LEAN_INDEX, HopfPoint
-from .orbits import PeriodicOrbit, solve_orbit
+from .orbits import PeriodicOrbit, amplitude_condition, solve_orbit
 from .shooting import Flow
 
 
@@ -57,7 +57,7 @@ def small_orbits(point: HopfPoint, amplitudes: Sequence[float]) -> list[Periodic
     list of PeriodicOrbit
     """
     flow = flow_near(point)
-    return [solve_orbit(flow, predict_orbit(point, amplitude), amplitude) for amplitude in amplitudes]
+    return [solve_orbit(flow, predict_orbit(point, size), amplitude_condition(size)) for size in amplitudes]
 
 
 def measure_amplitude_slope(energy: float, orbits: Sequence[PeriodicOrbit]) -> tuple[float, float]:
