@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .circle import STEP
 from .compilation import jit
 from .dormand_prince import SIZE, fill_stage, fill_step
 from .dynamics import complete_velocity, energies, settle
@@ -83,8 +84,8 @@ def variable_rates(variables, near, function, parameters, c, a, out):
         return False
     derivative(y, function, parameters, a, dy)
     for i in range(SIZE):
-        y[i] += 1e-30j * dy[i]
+        y[i] += complex(0.0, STEP) * dy[i]
     extract_variables(y, here)
     for i in range(7):
-        out[i] = here[i].imag / 1e-30
+        out[i] = here[i].imag / STEP
     return True
