@@ -28,8 +28,6 @@ from .normal_form import NormalForm, expand_hopf, linearise_field
 SUPERCRITICAL, SUBCRITICAL = "supercritical", "subcritical"
 
 LEAN_INDEX = CHART.index("lean")
-# Oscillations are measured by their angles.
-_SCALE = np.array([1.0 if name in ("lean", "steer") else np.inf for name in CHART])
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +100,11 @@ def examine_hopf(family: Family, end: SectionEnd) -> HopfPoint:
     jacobian, _ = linearise_field(field, level.centre, level.energy)
     if are_zero(np.linalg.eigvals(jacobian)).any():
         return replace(point, why_undefined="the energy is extreme along the family")
-    return _measure(point, expand_hopf(field, level.centre, level.energy, point.frequency, _SCALE))
+    # Oscillations are measured by their angles, and by the position in units of the circle's radius, since nearly level
+    # ground hardly holds the circle's centre.
+    units = {"lean": 1.0, "steer": 1.0, "x": float(np.hypot(*level.centre[:2])), "y": float(np.hypot(*level.centre[:2]))}
+    scale = np.array([units.get(name, np.inf) for name in CHART])
+    return _measure(point, expand_hopf(field, level.centre, level.energy, point.frequency, scale))
 
 
 def _measure(point: HopfPoint, form: NormalForm) -> HopfPoint:
