@@ -12,15 +12,18 @@ and a lean whose peak-to-peak is 2 A = 4 |q_lean| |z| + O(|z|^3), so that
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
-from ..circular import CircularMotion
+from ..circular import CircularMotion, Steady
+from ..continuation import Point, roots_along
 from ..families import Family
 from ..inputs import NO_INPUTS
-from ..sections import SectionEnd, stable_sections
-from ..stability import are_zero
+from ..sections import linearise_point, stable_sections
+from ..stability import are_zero, free_eigenvalues
 from ..surface import is_level
 from .energy_level import CHART, EnergyLevel, energy_level
 from .normal_form import NormalForm, expand_hopf, linearise_field
@@ -28,6 +31,10 @@ from .normal_form import NormalForm, expand_hopf, linearise_field
 SUPERCRITICAL, SUBCRITICAL = "supercritical", "subcritical"
 
 LEAN_INDEX = CHART.index("lean")
+
+# Roots of two functions at one Hopf point differ by round-off of the eigenvalues, 1e-13 to 1e-11, over their slopes
+# along the family; different Hopf points of one family have been seen no nearer than 1e-3.
+_SAME = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,17 +84,64 @@ class HopfPoint:
         return float(self.form.cubic.value.real / self.frequency / (2 * abs(self.form.vector[LEAN_INDEX])) ** 2)
 
 
+def find_hopf_points(family: Family) -> list[HopfPoint]:
+    """Find the Hopf points of a family: those at ends of stable sections first, then others in the order along it.
+
+    At the others a further eigenvalue has a positive real part. Two of them between neighbouring points of the family
+    are missed.
+    """
+    ends = section_hopf_points(family)
+    others = [point for point in _unstable_hopf_points(family) if not any(_is_same(point, end) for end in ends)]
+    return ends + others
+
+
 def section_hopf_points(family: Family) -> list[HopfPoint]:
     """Return the Hopf points at the ends of a family's stable sections, in the order along the family."""
     ends = [end for section in stable_sections(family) for end in section]
-    return [examine_hopf(family, end) for end in ends if end.cause == "hopf"]
+    return [examine_hopf(family, end.motion, end.eigenvalue.imag) for end in ends if end.cause == "hopf"]
 
 
-def examine_hopf(family: Family, end: SectionEnd) -> HopfPoint:
-    """Compute criticality and amplitude at a Hopf point of a family."""
-    equations, motion = family.equations, end.motion
+def _unstable_hopf_points(family: Family) -> Iterator[HopfPoint]:
+    equations = family.equations
+    for _, point in roots_along(equations, family.points, lambda point: _pair_sums(equations, point)):
+        motion, reduced = linearise_point(equations, point)
+        free = free_eigenvalues(equations.surface, reduced.eigenvalues, motion.yaw_rate)
+        first, second = min(combinations(free, 2), key=lambda pair: abs(sum(pair)))
+        # Two real eigenvalues of opposite signs have a zero sum without a bifurcation.
+        if motion.rear_rate != 0 and first.imag == -second.imag != 0:
+            yield examine_hopf(family, motion, abs(first.imag))
+
+
+def _pair_sums(equations: Steady, point: Point) -> float:
+    """Return the product of all sums of two free eigenvalues, which changes its sign where a pair crosses the axis."""
+    motion, reduced = linearise_point(equations, point)
+    free = free_eigenvalues(equations.surface, reduced.eigenvalues, motion.yaw_rate)
+    return float(np.prod([sum(pair) for pair in combinations(free / np.abs(free).max(), 2)]).real)
+
+
+def _is_same(point: HopfPoint, other: HopfPoint) -> bool:
+    """Return whether two Hopf points of a family are one: both are solved to round-off, times the curve's slope."""
+    return abs(point.motion.lean - other.motion.lean) + abs(point.frequency - other.frequency) < _SAME
+
+
+def examine_hopf(family: Family, motion: CircularMotion, frequency: float) -> HopfPoint:
+    """Compute criticality and amplitude at a Hopf point.
+
+    Parameters
+    ----------
+    family : Family
+    motion : CircularMotion
+        A motion of the family with a pair of imaginary eigenvalues.
+    frequency : float
+        Their size [rad/s].
+
+    Returns
+    -------
+    HopfPoint
+    """
+    equations = family.equations
     level = energy_level(equations, motion)
-    point = HopfPoint(family.numbers, motion, level.energy, end.eigenvalue.imag, level)
+    point = HopfPoint(family.numbers, motion, level.energy, frequency, level)
     if equations.inputs != NO_INPUTS:
         return replace(point, why_undefined=f"the energy is not conserved with {equations.inputs.describe()}")
     if is_level(equations.surface):
@@ -102,7 +156,12 @@ def examine_hopf(family: Family, end: SectionEnd) -> HopfPoint:
         return replace(point, why_undefined="the energy is extreme along the family")
     # Oscillations are measured by their angles, and by the position in units of the circle's radius, since nearly level
     # ground hardly holds the circle's centre.
-    units = {"lean": 1.0, "steer": 1.0, "x": float(np.hypot(*level.centre[:2])), "y": float(np.hypot(*level.centre[:2]))}
+    units = {
+        "lean": 1.0,
+        "steer": 1.0,
+        "x": float(np.hypot(*level.centre[:2])),
+        "y": float(np.hypot(*level.centre[:2])),
+    }
     scale = np.array([units.get(name, np.inf) for name in CHART])
     return _measure(point, expand_hopf(field, level.centre, level.energy, point.frequency, scale))
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..continuation import LARGEST_LEAN
+from ..roots import find_root
 from .hopf import LEAN_INDEX, HopfPoint
 from .orbits import PeriodicOrbit, arc_metric, orbit_plane_condition, solve_orbit
 from .shooting import Flow
@@ -114,4 +115,39 @@ def _direct(orbit: PeriodicOrbit, towards: np.ndarray) -> PeriodicOrbit:
     """Return an orbit with its tangent pointing in a direction (9,)."""
     if towards @ (arc_metric(orbit.unknowns) * orbit.tangent) > 0:
         return orbit
-    return replace(orbit, tangent=-orbit.tangent, energy_slope=-orbit.energy_slope)
+    slopes = {"energy_slope": -orbit.energy_slope, "amplitude_slope": -orbit.amplitude_slope}
+    return replace(orbit, tangent=-orbit.tangent, **slopes)
+
+
+def solve_between(branch: OrbitBranch, place: int, function: Callable[[PeriodicOrbit], float]) -> PeriodicOrbit | None:
+    """Solve function = 0 between an orbit of a branch and the next one, where it has opposite signs.
+
+    Parameters
+    ----------
+    branch : OrbitBranch
+    place : int
+        Index of the first of the two orbits.
+    function : callable
+        Maps an orbit, directed as the branch, to a number.
+
+    Returns
+    -------
+    PeriodicOrbit or None
+        To round-off of the distance along the branch; None where an orbit between the two is not found.
+    """
+    first, second = branch.orbits[place : place + 2]
+    length = float((arc_metric(first.unknowns) * first.tangent) @ (second.unknowns - first.unknowns))
+    flow, found = flow_near(branch.point).moved_to(first.state), {0.0: first, length: second}
+
+    def value(distance: float) -> float:
+        if distance not in found:
+            orbit = step_along(flow, first, distance)
+            if orbit is None:
+                raise ValueError("there is no orbit between two of a branch")
+            found[distance] = orbit
+        return function(found[distance])
+
+    try:
+        return found[find_root(value, 0.0, length, tolerance=1e-12)]
+    except ValueError:
+        return None

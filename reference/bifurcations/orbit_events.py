@@ -20,10 +20,8 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from ..roots import find_root
-from .orbit_branch import OrbitBranch, step_along
-from .orbits import PeriodicOrbit, arc_metric
-from .small_orbits import flow_near
+from .orbit_branch import OrbitBranch, solve_between
+from .orbits import PeriodicOrbit
 
 FOLD, PERIOD_DOUBLING, TORUS = "fold", "period doubling", "torus"
 
@@ -68,30 +66,9 @@ def _find_all(branch: OrbitBranch) -> Iterator[OrbitEvent]:
     for place, (first, second) in enumerate(pairwise(branch.orbits)):
         for kind, test in _TESTS.items():
             if test(first) * test(second) < 0:
-                orbit = _solve_event(branch, first, second, test)
+                orbit = solve_between(branch, place, test)
                 if orbit is not None and (kind != TORUS or _crosses_as_pair(orbit)):
                     yield OrbitEvent(kind, orbit, place)
-
-
-def _solve_event(
-    branch: OrbitBranch, first: PeriodicOrbit, second: PeriodicOrbit, test: Callable[[PeriodicOrbit], float]
-) -> PeriodicOrbit | None:
-    """Solve test = 0 between neighbouring orbits; None where an orbit between them is not found."""
-    length = float((arc_metric(first.unknowns) * first.tangent) @ (second.unknowns - first.unknowns))
-    flow, found = flow_near(branch.point).moved_to(first.state), {0.0: first, length: second}
-
-    def value(distance: float) -> float:
-        if distance not in found:
-            orbit = step_along(flow, first, distance)
-            if orbit is None:
-                raise ValueError
-            found[distance] = orbit
-        return test(found[distance])
-
-    try:
-        return found[find_root(value, 0.0, length, tolerance=1e-12)]
-    except ValueError:
-        return None
 
 
 def _crosses_as_pair(orbit: PeriodicOrbit) -> bool:

@@ -68,6 +68,8 @@ class PeriodicOrbit:
         Vector along the branch, of unit length in the metric `arc_metric` and of either sign.
     energy_slope : float
         Derivative of the energy along the tangent [J].
+    amplitude_slope : float
+        Derivative of the lean amplitude along the tangent [rad].
     """
 
     unknowns: np.ndarray
@@ -79,6 +81,7 @@ class PeriodicOrbit:
     steps: int
     tangent: np.ndarray
     energy_slope: float
+    amplitude_slope: float
 
     @property
     def state(self) -> np.ndarray:
@@ -108,11 +111,16 @@ def amplitude_condition(amplitude: float) -> OrbitCondition:
     """Make the condition of a given lean amplitude [rad]."""
 
     def condition(unknowns: np.ndarray, legs: Legs) -> Picked:
-        gradient = -np.append(legs.start_derivatives[0, _LEAN], legs.duration_derivatives[0, _LEAN])
-        gradient[_LEAN] += 1
-        return Picked(float(unknowns[_LEAN] - legs.ends[0, _LEAN]) - 2 * amplitude, gradient)
+        return Picked(float(unknowns[_LEAN] - legs.ends[0, _LEAN]) / 2 - amplitude, _amplitude_gradient(legs))
 
     return condition
+
+
+def _amplitude_gradient(legs: Legs) -> np.ndarray:
+    """Return the derivatives (9,) of the lean amplitude by the unknowns."""
+    gradient = -np.append(legs.start_derivatives[0, _LEAN], legs.duration_derivatives[0, _LEAN]) / 2
+    gradient[_LEAN] += 0.5
+    return gradient
 
 
 def energy_condition(energy: float) -> OrbitCondition:
@@ -177,6 +185,7 @@ def solve_orbit(
         steps=steps,
         tangent=along,
         energy_slope=float(legs.energy_gradient @ along[:7]),
+        amplitude_slope=float(_amplitude_gradient(legs) @ along),
     )
 
 

@@ -142,8 +142,8 @@ def test_the_amplitude_is_undefined_on_the_plane_and_with_damping() -> None:
     with pytest.raises(ValueError, match="pivoting"):
         energy_level(curve.equations, end.motion.__class__(**{**vars(end.motion), "rear_rate": 0.0}))
     damped = Family(2, Steady(BICYCLE, BOWL, Inputs(steer_damping=0.1)), curve.points)
-    found = examine_hopf(damped, end)
+    found = examine_hopf(damped, end.motion, end.eigenvalue.imag)
     assert found.amplitude_slope is None
     assert "not conserved" in (found.why_undefined or "")
     assert found.energy == point.energy
-    assert examine_hopf(level_curve, end).amplitude_slope is None
+    assert examine_hopf(level_curve, end.motion, end.eigenvalue.imag).amplitude_slope is None
