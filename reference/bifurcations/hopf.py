@@ -50,6 +50,9 @@ class HopfPoint:
         Kinetic and potential, the latter zero at z = 0 [J].
     frequency : float
         Imaginary part of the crossing eigenvalue [rad/s].
+    ends_section : bool
+        Whether a stable section of the family ends there. Elsewhere a further eigenvalue has a positive real part, and
+        what `criticality` says of stability is true on the centre manifold only.
     level : EnergyLevel
         The flow on the level sets of energy, where the oscillation's amplitude is defined.
     form : NormalForm or None
@@ -69,6 +72,7 @@ class HopfPoint:
     motion: CircularMotion
     energy: float
     frequency: float
+    ends_section: bool
     level: EnergyLevel
     form: NormalForm | None = None
     criticality: str | None = None
@@ -83,6 +87,14 @@ class HopfPoint:
             return None
         return float(self.form.cubic.value.real / self.frequency / (2 * abs(self.form.vector[LEAN_INDEX])) ** 2)
 
+    @property
+    def growth_in_period(self) -> float:
+        """Factor by which the other disturbances of the circle grow at most while the critical ones turn once."""
+        assert self.form is not None, "there is no normal form"
+        values = np.linalg.eigvals(self.form.jacobian)
+        others = np.abs(np.abs(values.imag) - self.frequency) + np.abs(values.real) > _SAME
+        return float(np.exp(2 * np.pi / self.frequency * values[others].real.max()))
+
 
 def find_hopf_points(family: Family) -> list[HopfPoint]:
     """Find the Hopf points of a family: those at ends of stable sections first, then others in the order along it.
@@ -91,17 +103,17 @@ def find_hopf_points(family: Family) -> list[HopfPoint]:
     are missed.
     """
     ends = section_hopf_points(family)
-    others = [point for point in _unstable_hopf_points(family) if not any(_is_same(point, end) for end in ends)]
-    return ends + others
+    return ends + [point for point in _crossing_points(family) if not any(_is_same(point, end) for end in ends)]
 
 
 def section_hopf_points(family: Family) -> list[HopfPoint]:
     """Return the Hopf points at the ends of a family's stable sections, in the order along the family."""
     ends = [end for section in stable_sections(family) for end in section]
-    return [examine_hopf(family, end.motion, end.eigenvalue.imag) for end in ends if end.cause == "hopf"]
+    return [examine_hopf(family, end.motion, end.eigenvalue.imag, True) for end in ends if end.cause == "hopf"]
 
 
-def _unstable_hopf_points(family: Family) -> Iterator[HopfPoint]:
+def _crossing_points(family: Family) -> Iterator[HopfPoint]:
+    """Yield all Hopf points between neighbouring points of a family, as if none ended a stable section."""
     equations = family.equations
     for _, point in roots_along(equations, family.points, lambda point: _pair_sums(equations, point)):
         motion, reduced = linearise_point(equations, point)
@@ -124,7 +136,7 @@ def _is_same(point: HopfPoint, other: HopfPoint) -> bool:
     return abs(point.motion.lean - other.motion.lean) + abs(point.frequency - other.frequency) < _SAME
 
 
-def examine_hopf(family: Family, motion: CircularMotion, frequency: float) -> HopfPoint:
+def examine_hopf(family: Family, motion: CircularMotion, frequency: float, ends_section: bool = False) -> HopfPoint:
     """Compute criticality and amplitude at a Hopf point.
 
     Parameters
@@ -134,6 +146,8 @@ def examine_hopf(family: Family, motion: CircularMotion, frequency: float) -> Ho
         A motion of the family with a pair of imaginary eigenvalues.
     frequency : float
         Their size [rad/s].
+    ends_section : bool
+        Whether a stable section ends there.
 
     Returns
     -------
@@ -141,7 +155,7 @@ def examine_hopf(family: Family, motion: CircularMotion, frequency: float) -> Ho
     """
     equations = family.equations
     level = energy_level(equations, motion)
-    point = HopfPoint(family.numbers, motion, level.energy, frequency, level)
+    point = HopfPoint(family.numbers, motion, level.energy, frequency, ends_section, level)
     if equations.inputs != NO_INPUTS:
         return replace(point, why_undefined=f"the energy is not conserved with {equations.inputs.describe()}")
     if is_level(equations.surface):

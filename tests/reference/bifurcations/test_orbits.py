@@ -24,8 +24,8 @@ INDICES = pytest.mark.parametrize("index", range(4))
 def test_the_amplitude_slope_is_that_of_the_normal_form(index: int) -> None:
     """By energies of four orbits and no derivatives.
 
-    A multiplier within 1e-4 of 1 makes round-off of 1e-13 one of 1e-9 J, of 0.06 J for the smallest orbit; extrapolation
-    multiplies it by about two, and leaves terms of fifth order.
+    A multiplier within 1e-4 of 1 makes round-off of 1e-13 one of 1e-9 J, of 0.06 J for the smallest orbit;
+    extrapolation multiplies it by about two, and leaves terms of fifth order.
     """
     point = hopf_points()[index]
     orbits = small_orbits(point, [5e-4, 1e-3, 1.5e-3, 2e-3])
