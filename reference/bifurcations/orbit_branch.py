@@ -115,8 +115,12 @@ def _direct(orbit: PeriodicOrbit, towards: np.ndarray) -> PeriodicOrbit:
     """Return an orbit with its tangent pointing in a direction (9,)."""
     if towards @ (arc_metric(orbit.unknowns) * orbit.tangent) > 0:
         return orbit
-    slopes = {"energy_slope": -orbit.energy_slope, "amplitude_slope": -orbit.amplitude_slope}
-    return replace(orbit, tangent=-orbit.tangent, **slopes)
+    return replace(
+        orbit,
+        tangent=-orbit.tangent,
+        energy_slope=-orbit.energy_slope,
+        amplitude_slope=-orbit.amplitude_slope,
+    )
 
 
 def solve_between(branch: OrbitBranch, place: int, function: Callable[[PeriodicOrbit], float]) -> PeriodicOrbit | None:

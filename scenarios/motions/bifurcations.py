@@ -170,7 +170,7 @@ def find_bifurcations(
             raise ScenarioError(f"family {number} has no curve there: {absent.get(number, 'it has joined none')}")
     points = [(curve, point) for curve in curves for point in find_hopf_points(curve)]
     points.sort(key=lambda pair: not pair[1].ends_section)  # stable: by family within both
-    found = []
+    found: list[Bifurcation] = []
     for curve, point in points:
         watch(len(found), len(points))
         found.append(_examine(curve, point))

@@ -142,6 +142,7 @@ DOCUMENTS = {
     "history-rides": [HISTORY],
     "sweep": ["sweep sweep.toml --json"],
     "critical": ["critical --json"],
+    "bifurcations": ["bifurcations --alpha 0.005 --family 4 --json"],
     "atlas": ["atlas --size 2000 --json"],
     "paper": ["paper --json"],
 }
