@@ -8,7 +8,7 @@ import numpy as np
 
 from .orbit_branch import OrbitBranch, solve_between
 from .orbits import OrbitCondition, PeriodicOrbit, amplitude_condition, energy_condition, solve_orbit
-from .small_orbits import flow_near, small_orbits
+from .small_orbits import flow_near, predict_orbit, small_orbits
 
 
 def orbits_of_amplitude(branch: OrbitBranch, amplitude: float) -> list[PeriodicOrbit]:
@@ -19,9 +19,14 @@ def orbits_of_amplitude(branch: OrbitBranch, amplitude: float) -> list[PeriodicO
 
 
 def orbits_of_energy(branch: OrbitBranch, energy: float) -> list[PeriodicOrbit]:
-    """Return the orbits of a branch with an energy [J], in order along it, those smaller than its first left out."""
-    energies = np.array([orbit.energy for orbit in branch.orbits])
-    return _solve_crossings(branch, energies - energy, energy_condition(energy))
+    """Return the orbits of a branch with an energy [J], in order along it."""
+    point, energies = branch.point, np.array([orbit.energy for orbit in branch.orbits])
+    condition, first = energy_condition(energy), []
+    if (energy - point.energy) * (energy - energies[0]) < 0:  # between the Hopf point and the first orbit
+        assert point.amplitude_slope is not None
+        amplitude = float(np.sqrt(point.amplitude_slope * (energy - point.energy)))
+        first = [solve_orbit(flow_near(point), predict_orbit(point, amplitude), condition)]
+    return first + _solve_crossings(branch, energies - energy, condition)
 
 
 def find_largest_orbit(branch: OrbitBranch) -> PeriodicOrbit:

@@ -36,6 +36,8 @@ def show_bifurcations(console: Console, document: Mapping[str, Any]) -> None:
             _show_branch(console, name, point)
     else:
         console.print("no Hopf point", markup=False)
+    for section in document["stable_sections"]:
+        _show_section(console, section)
     for number, reason in document["absent"].items():
         print_words(console, f"family {number}: no curve: {reason}", "yellow")
 
@@ -71,6 +73,24 @@ def _show_branch(console: Console, name: str, point: Mapping[str, Any]) -> None:
     ]
     print_table(console, columns, keys=2)
     print_words(console, f"  {_END_WORDS[point['branch_end']]}")
+
+
+def _show_section(console: Console, section: Mapping[str, Any]) -> None:
+    """Print the circles of a stable section with the amplitude within which they are stable."""
+    name = "a curve without a number" if section["family"] is None else f"family {section['family']}"
+    if section["no_circles_because"] is not None:
+        print_words(console, f"stable section of {name}: {section['no_circles_because']}", "yellow")
+        return
+    print_words(console, f"stable section of {name}: within the lean amplitude of an unstable orbit", "bold")
+    bounds = section["stable_within"]
+    columns = [
+        Column("rear rate", [f"{value:.6f}" for value in section["rear_rate"]], "rad/s"),
+        Column("lean", [f"{value:z.6f}" for value in section["lean"]], "rad"),
+        Column("steer", [f"{value:z.6f}" for value in section["steer"]], "rad"),
+        Column("energy", [f"{value:.5f}" for value in section["energy"]], "J"),
+        Column("stable within", ["" if bound is None else f"{bound:.9f}" for bound in bounds], "rad"),
+    ]
+    print_table(console, columns)
 
 
 _END_WORDS = {

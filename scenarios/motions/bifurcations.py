@@ -15,8 +15,11 @@ from ...reference.bifurcations.orbit_search import find_largest_orbit, orbits_of
 from ...reference.bifurcations.orbits import PeriodicOrbit
 from ...reference.bifurcations.ridden import explain_orbit
 from ...reference.bifurcations.small_orbits import flow_near
+from ...reference.bifurcations.stable_within import BoundedCircle, bound_section
 from ...reference.families import Family, trace_all
 from ...reference.rideability import explain_motion
+from ...reference.sections import SectionEnd, stable_sections
+from ...reference.stability import VARIABLES
 from ...reference.surface import SurfaceOfRevolution
 from ..error import ScenarioError
 from ..files import make_folder, write_json
@@ -27,8 +30,9 @@ from .families import check_inertia
 LISTED_AMPLITUDES = (0.001, 0.005, 0.02)
 # Round-off of a period, 1e-14, times this is the residual at which orbits count as solved, 1e-12 in units of 1.
 _LARGEST_GROWTH = 100.0
-_FIRST_AMPLITUDE = LISTED_AMPLITUDES[0]
-_MOST_ORBITS = 120  # followed; branches of stable circles' ends have some twenty up to the largest amplitude listed
+# Branches are followed up to this lean [rad], to find the orbits that bound stable circles, and this number of orbits.
+_LARGEST_AMPLITUDE, _MOST_ORBITS = 0.1, 120
+_CIRCLES = 9  # examined in a stable section
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -108,6 +112,36 @@ def _describe_orbit(orbit: PeriodicOrbit) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class BoundedSection:
+    """A stable section of a family, and how far from its circles a bicycle may weave and come back.
+
+    Attributes
+    ----------
+    numbers : tuple of int
+        Of the families on the curve.
+    circles : tuple of BoundedCircle
+        Along the section.
+    why_not : str or None
+        Why no circles were examined.
+    """
+
+    numbers: tuple[int, ...]
+    circles: tuple[BoundedCircle, ...] = ()
+    why_not: str | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return this section's part of the document."""
+        columns = {name: VARIABLES.index(name) for name in ("rear_rate", "lean", "steer")}
+        return {
+            "family": self.numbers[0] if self.numbers else None,
+            **{name: [float(circle.state[k]) for circle in self.circles] for name, k in columns.items()},
+            "energy": [circle.energy for circle in self.circles],
+            "stable_within": [circle.stable_within for circle in self.circles],
+            "no_circles_because": self.why_not,
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Bifurcations:
     """The Hopf points of one bicycle on one ground.
 
@@ -117,6 +151,8 @@ class Bifurcations:
     surface : SurfaceOfRevolution
     found : tuple of Bifurcation
         Those at ends of stable sections first, then by family.
+    sections : tuple of BoundedSection
+        The stable sections.
     absent : dict
         By number of a family that has no curve on this ground: the reason.
     """
@@ -124,6 +160,7 @@ class Bifurcations:
     bicycle: Bicycle
     surface: SurfaceOfRevolution
     found: tuple[Bifurcation, ...]
+    sections: tuple[BoundedSection, ...] = ()
     absent: dict[int, str] = field(default_factory=dict)
 
     def as_json(self, bicycle_name: str | None = None) -> dict[str, Any]:
@@ -132,6 +169,7 @@ class Bifurcations:
             **name_surface(self.surface),
             **name_bicycle(self.bicycle, bicycle_name),
             "hopf": [one.as_json() for one in self.found],
+            "stable_sections": [section.as_json() for section in self.sections],
             "absent": {str(number): reason for number, reason in self.absent.items()},
         }
 
@@ -171,28 +209,49 @@ def find_bifurcations(
     points = [(curve, point) for curve in curves for point in find_hopf_points(curve)]
     points.sort(key=lambda pair: not pair[1].ends_section)  # stable: by family within both
     found: list[Bifurcation] = []
+    branches: dict[int, list[OrbitBranch]] = {}
     for curve, point in points:
         watch(len(found), len(points))
-        found.append(_examine(curve, point))
-    return Bifurcations(bicycle=bicycle, surface=surface, found=tuple(found), absent=absent)
+        examined, branch = _examine(curve, point)
+        found.append(examined)
+        if branch is not None:
+            branches.setdefault(curves.index(curve), []).append(branch)
+    sections = [
+        _bound(curve, section, branches.get(k, []))
+        for k, curve in enumerate(curves)
+        for section in stable_sections(curve)
+    ]
+    return Bifurcations(bicycle=bicycle, surface=surface, found=tuple(found), sections=tuple(sections), absent=absent)
 
 
-def _examine(curve: Family, point: HopfPoint) -> Bifurcation:
+def _examine(curve: Family, point: HopfPoint) -> tuple[Bifurcation, OrbitBranch | None]:
     """Follow the orbits born at a Hopf point."""
     why = explain_motion(curve.equations.bicycle, curve.equations.surface, point.motion)
     found = Bifurcation(point=point, unphysical_because=why)
     if point.amplitude_slope is None:
-        return replace(found, why_no_orbits=point.why_undefined)
+        return replace(found, why_no_orbits=point.why_undefined), None
     if point.growth_in_period > _LARGEST_GROWTH:
         why_not = f"a disturbance grows {point.growth_in_period:.3g} times in a period, too much for shooting"
-        return replace(found, why_no_orbits=why_not)
+        return replace(found, why_no_orbits=why_not), None
     try:
-        branch = follow_orbits(point, largest=LISTED_AMPLITUDES[-1], first=_FIRST_AMPLITUDE, most=_MOST_ORBITS)
+        branch = follow_orbits(point, largest=_LARGEST_AMPLITUDE, first=LISTED_AMPLITUDES[0], most=_MOST_ORBITS)
     except ValueError as error:
-        return replace(found, why_no_orbits=str(error))
+        return replace(found, why_no_orbits=str(error)), None
     flow = flow_near(point)
     orbits = [ListedOrbit(orbit=orbit, unphysical_because=explain_orbit(flow, orbit)) for orbit in _list_orbits(branch)]
-    return replace(found, orbits=tuple(orbits), events=tuple(find_events(branch)), branch_end=branch.end)
+    found = replace(found, orbits=tuple(orbits), events=tuple(find_events(branch)), branch_end=branch.end)
+    return found, branch
+
+
+def _bound(curve: Family, section: tuple[SectionEnd, SectionEnd], branches: Sequence[OrbitBranch]) -> BoundedSection:
+    """Find the orbits that bound the circles of a stable section."""
+    if not branches:
+        return BoundedSection(numbers=curve.numbers, why_not="no orbits are known on this curve")
+    try:
+        circles = bound_section(curve, section, branches, _CIRCLES)
+    except ValueError as error:
+        return BoundedSection(numbers=curve.numbers, why_not=str(error))
+    return BoundedSection(numbers=curve.numbers, circles=tuple(circles))
 
 
 def _list_orbits(branch: OrbitBranch) -> Sequence[PeriodicOrbit]:

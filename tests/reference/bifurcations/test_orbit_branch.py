@@ -7,6 +7,7 @@ import pytest
 
 from velodrome.reference.bifurcations.orbit_branch import OrbitBranch, follow_orbits
 from velodrome.reference.bifurcations.orbit_events import FOLD, TORUS, OrbitEvent, find_events
+from velodrome.reference.bifurcations.small_orbits import flow_near
 
 from .test_hopf import hopf_points
 
@@ -59,3 +60,14 @@ def test_a_complex_pair_crosses_the_unit_circle_where_orbits_lose_stability() ->
     growths = [orbit.growth for orbit in branch(3).orbits]
     assert max(growths[: torus.place + 1]) < 1
     assert min(growths[torus.place + 1 :]) > 1
+
+
+def test_the_lean_has_no_larger_and_no_smaller_value_on_an_orbit() -> None:
+    """Both of its turning points are extremes: the amplitude is half of the peak-to-peak."""
+    for orbit in branch(2).orbits[::3]:
+        flow = flow_near(hopf_points()[2]).moved_to(orbit.state)
+        durations = np.append(np.full(8, orbit.unknowns[7] / 8), np.full(8, orbit.unknowns[8] / 8))
+        ends, _ = flow.ride(orbit.state, durations, np.full(16, 8))
+        leans = np.real(ends[:, 2])
+        assert orbit.state[2] >= leans.max() - 1e-12
+        assert leans.min() >= orbit.state[2] - 2 * orbit.lean_amplitude - 1e-12

@@ -517,6 +517,9 @@ def test_bifurcations_of_a_family(velodrome, tmp_path: Path) -> None:
         for orbit in point["orbits"]:
             assert len(orbit["multipliers"]) == len(orbit["state"]) == 7
             assert orbit["multipliers"][:2] == [pytest.approx([1, 0], abs=1e-8)] * 2
+    (section,) = document["stable_sections"]
+    assert len(section["rear_rate"]) == len(section["stable_within"])
+    assert all(bound > 0 for bound in section["stable_within"])
 
 
 def test_bifurcations_on_the_plane_say_why_they_are_undefined(velodrome) -> None:
