@@ -141,13 +141,16 @@ def bifurcations_command(
     surface: GroundOption = None,
     family: Annotated[int | None, typer.Option(min=1, max=4, help="Only curves with this family, 1 to 4.")] = None,
     bicycle: BicycleOption = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for bifurcations.json.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for bifurcations.json and the figure bifurcations.")] = None,
+    formats: FormatOption = None,
+    columns: ColumnsOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Where stable circles end: Hopf points, their criticality, and the periodic orbits born there."""
     from .progress import ProgressBars
     from .terminal import make_console
 
+    figures = parse_figure_output(formats, columns, None if out is not None else "--out")
     with answering_missing_motion(as_json), ProgressBars() as progress:
         from ..motions import find_bifurcations, write_bifurcations
         from ..scenario import make_bowl
@@ -161,7 +164,7 @@ def bifurcations_command(
             family,
             lambda done, points: progress.watch("orbits", done, points, "Hopf points"),
         ).as_json(source.name)
-        written = [] if out is None else write_bifurcations(document, out)
+        written = [] if out is None else write_bifurcations(document, out, figures)
     with ending_with(0):
         if as_json:
             print_json(document)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from ...reference.sections import SectionEnd, stable_sections
 from ...reference.stability import VARIABLES
 from ...reference.surface import SurfaceOfRevolution
 from ..error import ScenarioError
-from ..files import make_folder, write_json
+from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json
 from ..scenario import name_bicycle, name_surface
 from .families import check_inertia
 
@@ -31,7 +32,8 @@ LISTED_AMPLITUDES = (0.001, 0.005, 0.02)
 # Round-off of a period, 1e-14, times this is the residual at which orbits count as solved, 1e-12 in units of 1.
 _LARGEST_GROWTH = 100.0
 # Branches are followed up to this lean [rad], to find the orbits that bound stable circles, and this number of orbits.
-_LARGEST_AMPLITUDE, _MOST_ORBITS = 0.1, 120
+_LARGEST_AMPLITUDE, _MOST_ORBITS = 0.1, 200
+_LONGEST_STEP = 0.025  # along a branch, so that drawn curves bend by some degrees from one orbit to the next
 _CIRCLES = 9  # examined in a stable section
 
 
@@ -65,9 +67,8 @@ class Bifurcation:
         Those of the `LISTED_AMPLITUDES` along the branch and, if all are smaller than the last, its largest.
     events : tuple of OrbitEvent
         Bifurcations of the orbits along the branch.
-    branch_end : str or None
-        What the followed part of the branch ends in, see `velodrome.reference.bifurcations.orbit_branch`; None without
-        a branch.
+    branch : OrbitBranch or None
+        The followed part of the branch.
     why_no_orbits : str or None
         Why no orbits are known.
     """
@@ -76,7 +77,7 @@ class Bifurcation:
     unphysical_because: tuple[str, ...]
     orbits: tuple[ListedOrbit, ...] = ()
     events: tuple[OrbitEvent, ...] = ()
-    branch_end: str | None = None
+    branch: OrbitBranch | None = None
     why_no_orbits: str | None = None
 
     def as_json(self) -> dict[str, Any]:
@@ -97,9 +98,22 @@ class Bifurcation:
             "undefined_because": point.why_undefined,
             "orbits": [orbit.as_json() for orbit in self.orbits],
             "orbit_bifurcations": [{"kind": event.kind, **_describe_orbit(event.orbit)} for event in self.events],
-            "branch_end": self.branch_end,
+            "branch": None if self.branch is None else _list_branch(self.branch, self.events),
+            "branch_end": None if self.branch is None else self.branch.end,
             "no_orbits_because": self.why_no_orbits,
         }
+
+
+def _list_branch(branch: OrbitBranch, events: Sequence[OrbitEvent]) -> dict[str, list[float]]:
+    """Return the quantities along a branch as lists of equal length, its bifurcations in their places."""
+    places = [*enumerate(branch.orbits), *((event.place + 0.5, event.orbit) for event in events)]
+    orbits = [orbit for _, orbit in sorted(places, key=lambda pair: pair[0])]
+    return {
+        "lean_amplitude": [orbit.lean_amplitude for orbit in orbits],
+        "energy": [orbit.energy for orbit in orbits],
+        "period": [orbit.period for orbit in orbits],
+        "largest_multiplier": [orbit.growth for orbit in orbits],
+    }
 
 
 def _describe_orbit(orbit: PeriodicOrbit) -> dict[str, Any]:
@@ -212,10 +226,9 @@ def find_bifurcations(
     branches: dict[int, list[OrbitBranch]] = {}
     for curve, point in points:
         watch(len(found), len(points))
-        examined, branch = _examine(curve, point)
-        found.append(examined)
-        if branch is not None:
-            branches.setdefault(curves.index(curve), []).append(branch)
+        found.append(_examine(curve, point))
+        if found[-1].branch is not None:
+            branches.setdefault(curves.index(curve), []).append(found[-1].branch)
     sections = [
         _bound(curve, section, branches.get(k, []))
         for k, curve in enumerate(curves)
@@ -224,23 +237,22 @@ def find_bifurcations(
     return Bifurcations(bicycle=bicycle, surface=surface, found=tuple(found), sections=tuple(sections), absent=absent)
 
 
-def _examine(curve: Family, point: HopfPoint) -> tuple[Bifurcation, OrbitBranch | None]:
+def _examine(curve: Family, point: HopfPoint) -> Bifurcation:
     """Follow the orbits born at a Hopf point."""
     why = explain_motion(curve.equations.bicycle, curve.equations.surface, point.motion)
     found = Bifurcation(point=point, unphysical_because=why)
     if point.amplitude_slope is None:
-        return replace(found, why_no_orbits=point.why_undefined), None
+        return replace(found, why_no_orbits=point.why_undefined)
     if point.growth_in_period > _LARGEST_GROWTH:
         why_not = f"a disturbance grows {point.growth_in_period:.3g} times in a period, too much for shooting"
-        return replace(found, why_no_orbits=why_not), None
+        return replace(found, why_no_orbits=why_not)
     try:
-        branch = follow_orbits(point, largest=_LARGEST_AMPLITUDE, first=LISTED_AMPLITUDES[0], most=_MOST_ORBITS)
+        branch = follow_orbits(point, _LARGEST_AMPLITUDE, LISTED_AMPLITUDES[0], _LONGEST_STEP, _MOST_ORBITS)
     except ValueError as error:
-        return replace(found, why_no_orbits=str(error)), None
+        return replace(found, why_no_orbits=str(error))
     flow = flow_near(point)
     orbits = [ListedOrbit(orbit=orbit, unphysical_because=explain_orbit(flow, orbit)) for orbit in _list_orbits(branch)]
-    found = replace(found, orbits=tuple(orbits), events=tuple(find_events(branch)), branch_end=branch.end)
-    return found, branch
+    return replace(found, orbits=tuple(orbits), events=tuple(find_events(branch)), branch=branch)
 
 
 def _bound(curve: Family, section: tuple[SectionEnd, SectionEnd], branches: Sequence[OrbitBranch]) -> BoundedSection:
@@ -261,15 +273,33 @@ def _list_orbits(branch: OrbitBranch) -> Sequence[PeriodicOrbit]:
     return listed if largest.lean_amplitude >= LISTED_AMPLITUDES[-1] else [*listed, largest]
 
 
-def write_bifurcations(document: Mapping[str, Any], out: Path) -> list[Path]:
-    """Write the document into a folder, which is made if it does not exist; return the paths of what is written.
+def write_bifurcations(document: Mapping[str, Any], out: Path, output: FigureOutput = DEFAULT_FIGURES) -> list[Path]:
+    """Write the document and its figure into a folder, which is made if it does not exist.
+
+    Parameters
+    ----------
+    document : mapping
+        As `Bifurcations.as_json` returns it.
+    out : Path
+    output : FigureOutput
+        How the figure is written.
+
+    Returns
+    -------
+    list of Path
+        What is written; without stable circles there is no figure.
 
     Raises
     ------
     ScenarioError
         If the folder cannot be made.
     """
+    from ...reports.figures import bifurcation_figure, drawn_sections, write_formats
+
     make_folder(out)
     path = out / "bifurcations.json"
     write_json(path, document)
-    return [path]
+    if not drawn_sections(document):
+        return [path]
+    draw = partial(bifurcation_figure, document)
+    return [path, *write_formats(out / "bifurcations", draw, output.formats, output.columns)]
