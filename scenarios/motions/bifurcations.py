@@ -33,6 +33,7 @@ LISTED_AMPLITUDES = (0.001, 0.005, 0.02)
 _LARGEST_GROWTH = 100.0
 # Branches are followed up to this lean [rad], to find the orbits that bound stable circles, and this number of orbits.
 _LARGEST_AMPLITUDE, _MOST_ORBITS = 0.1, 200
+_FIRST_AMPLITUDE = 2.5e-4  # at which the amplitude law is a good guess even next to a point where it degenerates [rad]
 _LONGEST_STEP = 0.025  # along a branch, so that drawn curves bend by some degrees from one orbit to the next
 _CIRCLES = 9  # examined in a stable section
 
@@ -247,7 +248,7 @@ def _examine(curve: Family, point: HopfPoint) -> Bifurcation:
         why_not = f"a disturbance grows {point.growth_in_period:.3g} times in a period, too much for shooting"
         return replace(found, why_no_orbits=why_not)
     try:
-        branch = follow_orbits(point, _LARGEST_AMPLITUDE, LISTED_AMPLITUDES[0], _LONGEST_STEP, _MOST_ORBITS)
+        branch = follow_orbits(point, _LARGEST_AMPLITUDE, _FIRST_AMPLITUDE, _LONGEST_STEP, _MOST_ORBITS)
     except ValueError as error:
         return replace(found, why_no_orbits=str(error))
     flow = flow_near(point)
