@@ -14,6 +14,8 @@ from .orbits import PeriodicOrbit, arc_metric, orbit_plane_condition, solve_orbi
 from .shooting import Flow
 from .small_orbits import flow_near, small_orbits
 
+# Steps in the metric of the arc, in which leans and steers count as they are: the first is as long as a small orbit is
+# wide, and a curve that needs steps shorter than a thousandth of that ends there.
 _FIRST_STEP, _SHORTEST_STEP, _LONGEST_STEP = 1e-3, 1e-6, 0.05
 _FEW = 6  # Newton's iterations in a step; more mean that it is too long
 # Cosine of the angle between neighbouring tangents: a sharper turn means that the step has jumped to another branch.

@@ -31,7 +31,7 @@ _CONVERGED = 1e-9
 # Residual with twice as many steps, relative to the largest unknown, at which their number is large enough: round-off
 # of some thousand additions. An error of the method is 256 times smaller with the steps doubled.
 _SETTLED = 1e-12
-_FEWEST_STEPS, _MOST_STEPS = 64, 4096
+_FEWEST_STEPS, _MOST_STEPS = 64, 4096  # 64 are enough for small orbits about circles of a usual speed
 
 
 class Picked(NamedTuple):
