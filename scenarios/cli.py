@@ -18,6 +18,7 @@ import typer
 from .commands import (
     atlas_command,
     bicycle_command,
+    bifurcations_command,
     check_command,
     circular_command,
     critical_command,
@@ -71,6 +72,7 @@ _COMMANDS: dict[Callable[..., None], str] = {
     circular_command: "One circular motion and its stability",
     families_command: "The four families of circular motions",
     critical_command: "The critical shapes of the bowl",
+    bifurcations_command: "What happens where stable circles end",
     atlas_command: "Stability over alpha and rear rate",
     bicycle_command: "A bicycle by itself: eigenvalues, speeds",
     paper_command: "The paper's figures and numbers, computed",

@@ -1,6 +1,7 @@
-"""Figures for print: solution families, the atlas, eigenvalues, work-precision, single precision, sweeps."""
+"""Figures for print: solution families, the atlas, eigenvalues, orbits, work-precision, single precision, sweeps."""
 
 from .atlas import growth_figure, stable_figure
+from .bifurcations import bifurcation_figure, drawn_sections
 from .eigenvalues import eigenvalue_figure
 from .families import family_figure
 from .float32 import float32_figure
@@ -32,6 +33,8 @@ __all__ = [
     "SweepMap",
     "SweepRuns",
     "average_cells",
+    "bifurcation_figure",
+    "drawn_sections",
     "eigenvalue_figure",
     "family_figure",
     "float32_figure",

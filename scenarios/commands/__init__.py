@@ -5,7 +5,7 @@ from .check import check_command
 from .float32 import float32_command
 from .history import history_command
 from .league import league_command
-from .motions import atlas_command, circular_command, critical_command, families_command
+from .motions import atlas_command, bifurcations_command, circular_command, critical_command, families_command
 from .run import list_command, run_command
 from .show import show_command
 from .stored import diff_command, view_command
@@ -18,6 +18,7 @@ from .warm_up import warm_up_command
 __all__ = [
     "atlas_command",
     "bicycle_command",
+    "bifurcations_command",
     "check_command",
     "circular_command",
     "critical_command",

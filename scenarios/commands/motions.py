@@ -1,4 +1,4 @@
-"""The commands about circular motions: `circular`, `families`, `critical` and `atlas`."""
+"""The commands about circular motions: `circular`, `families`, `critical`, `bifurcations` and `atlas`."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from .options import (
     parse_figure_output,
     parse_ground,
     print_json,
+    show_written,
 )
 
 
@@ -133,6 +134,43 @@ def critical_command(bicycle: BicycleOption = None, as_json: JsonOption = False)
             print_json(document)
         else:
             show_critical(make_console(), document)
+
+
+def bifurcations_command(
+    alpha: AlphaOption = None,
+    surface: GroundOption = None,
+    family: Annotated[int | None, typer.Option(min=1, max=4, help="Only curves with this family, 1 to 4.")] = None,
+    bicycle: BicycleOption = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for bifurcations.json and the figure bifurcations.")] = None,
+    formats: FormatOption = None,
+    columns: ColumnsOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Where stable circles end: Hopf points, their criticality, and the periodic orbits born there."""
+    from .progress import ProgressBars
+    from .terminal import make_console
+
+    figures = parse_figure_output(formats, columns, None if out is not None else "--out")
+    with answering_missing_motion(as_json), ProgressBars() as progress:
+        from ..motions import find_bifurcations, write_bifurcations
+        from ..scenario import make_bowl
+        from .present_bifurcations import show_bifurcations
+
+        ground, source = parse_ground(alpha, surface), load_bicycle(bicycle)
+        progress.say("following the curves of circular motions")
+        document = find_bifurcations(
+            source.bicycle,
+            make_bowl(ground),
+            family,
+            lambda done, points: progress.watch("orbits", done, points, "Hopf points"),
+        ).as_json(source.name)
+        written = [] if out is None else write_bifurcations(document, out, figures)
+    with ending_with(0):
+        if as_json:
+            print_json(document)
+        else:
+            show_bifurcations(make_console(), document)
+            show_written(written)
 
 
 def atlas_command(

@@ -25,6 +25,7 @@ _USES: tuple[tuple[str, ...], ...] = (
     ("run", "q2-plus", *_RIDE),
     ("run", "plane-circle", *_RIDE),
     ("bicycle", "--json"),
+    ("bifurcations", "--alpha", "0.005", "--family", "4", "--json"),
 )
 _MAIN = "import sys; from {package}.scenarios.cli import main; main()"
 _PATIENCE = 1800  # for one use on a busy machine [s]

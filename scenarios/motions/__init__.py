@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .atlas import make_atlas as make_atlas
+    from .bifurcations import Bifurcations as Bifurcations
+    from .bifurcations import find_bifurcations as find_bifurcations
+    from .bifurcations import write_bifurcations as write_bifurcations
     from .circular import CircularSolution as CircularSolution
     from .circular import solve_circular as solve_circular
     from .families import MERGING as MERGING
@@ -21,19 +24,29 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MERGING",
+    "Bifurcations",
     "CircularSolution",
     "CriticalShapes",
     "FamilyCurve",
     "SolutionFamilies",
     "families_document",
+    "find_bifurcations",
     "find_critical_shapes",
     "follow_families",
     "make_atlas",
     "solve_circular",
+    "write_bifurcations",
     "write_families",
 ]
 
-_HOME = {"make_atlas": ".atlas", "CircularSolution": ".circular", "solve_circular": ".circular"}
+_HOME = {
+    "make_atlas": ".atlas",
+    "Bifurcations": ".bifurcations",
+    "find_bifurcations": ".bifurcations",
+    "write_bifurcations": ".bifurcations",
+    "CircularSolution": ".circular",
+    "solve_circular": ".circular",
+}
 
 
 if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name

@@ -124,6 +124,9 @@ LINES = st.one_of(
         lambda parts: ["circular", *chain.from_iterable(parts)]
     ),
     line("families", plain, option("--alpha", st.sampled_from(["nan", "-1", "1e-300", "x"])), option("--out", text)),
+    st.tuples(option("--alpha", st.sampled_from(["nan", "-1", "x"])), family).map(
+        lambda parts: ["bifurcations", *chain.from_iterable(parts)]
+    ),
     line("precision", plain, source, change, duration, engine, option("--levels", number)),
     line("atlas", plain, option("--largest", number), option("--out", text)).map(lambda line: [*line, "--size", "1"]),
     line("check", plain, engine, option("--reason", text)).map(lambda line: [*line, "none.toml"]),

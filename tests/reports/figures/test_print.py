@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
 from functools import cache, partial
@@ -20,6 +21,7 @@ from PIL import Image
 from velodrome.reference.inputs import Inputs
 from velodrome.reference.surface import Paraboloid
 from velodrome.reports.figures import (
+    bifurcation_figure,
     eigenvalue_figure,
     family_figure,
     float32_figure,
@@ -117,6 +119,11 @@ def families(ground: str, steer_torque: float = 0.0) -> dict[str, Any]:
     return follow_families(bicycle.bicycle, surface, Inputs(steer_torque)).as_json(bicycle.name)
 
 
+def stored_bifurcations() -> dict[str, Any]:
+    path = Path(__file__).parents[2] / "scenarios" / "commands" / "stored" / "bifurcations.json"
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
 def eigenvalues(columns: int) -> Figure:
     speeds = np.linspace(0.0, 10.0, 50)
     weave = 3 - speeds + 1j * speeds
@@ -132,6 +139,7 @@ DRAWN: dict[str, Callable[[int], Figure]] = {
     "precision": partial(precision_figure, PRECISION),
     "float32": partial(float32_figure, FLOAT32),
     "eigenvalues": eigenvalues,
+    "bifurcations": lambda columns: bifurcation_figure(stored_bifurcations(), columns),
     "growth": lambda columns: growth_figure(*atlas_of_planes(), columns),
     "stable": lambda columns: stable_figure(*atlas_of_planes(), columns),
     "plane": draw_families("0.0"),
@@ -257,3 +265,15 @@ def test_the_ground_is_told_with_its_units() -> None:
     assert find_unit("motion.rear_rate") == "rad/s"
     assert find_unit("bicycle.rear_frame_mass") == "kg"
     assert find_unit("title") is find_unit("no.such.field") is None
+
+
+def test_orbits_are_drawn_stable_from_the_supercritical_end_to_the_torus_bifurcation() -> None:
+    with use_style():
+        figure = bifurcation_figure(stored_bifurcations())
+    axes = figure.axes[1]
+    lines = {kind: [line for line in axes.lines if line.get_gid() == kind] for kind in ("stable orbits", "torus")}
+    (torus,) = lines["torus"]
+    energies = [np.asarray(line.get_xdata()) for line in lines["stable orbits"]]
+    end = float(np.asarray(torus.get_xdata())[0])
+    # The stored branch comes from the subcritical end: it is stable beyond the torus bifurcation.
+    assert min(part.min() for part in energies) == pytest.approx(end, abs=1e-6)

@@ -508,3 +508,39 @@ def test_the_parameters_of_the_command_that_runs_are_inspected_only() -> None:
     assert [command.name for command in cli._choose_app(["circular", "--help"]).registered_commands] == ["circular"]
     for arguments in (["--help"], ["circles"], ["--version"]):
         assert cli._choose_app(arguments) is cli.app
+
+
+def test_bifurcations_of_a_family(velodrome, tmp_path: Path) -> None:
+    result = velodrome("bifurcations", "--alpha", "0.02", "--family", "2", "--out", "found", "--json")
+    assert result.status == 0
+    document = result.json()
+    assert document == json.loads((tmp_path / "found" / "bifurcations.json").read_text())
+    assert (tmp_path / "found" / "bifurcations.png").stat().st_size > 10_000
+    ends = [point for point in document["hopf"] if point["ends_stable_section"]]
+    assert [point["criticality"] for point in ends] == ["subcritical", "supercritical"]
+    assert document["hopf"][:2] == ends
+    for point in ends:
+        sizes = [orbit["lean_amplitude"] for orbit in point["orbits"]]
+        assert sizes[:2] == pytest.approx([0.001, 0.005])
+        for orbit in point["orbits"]:
+            assert len(orbit["multipliers"]) == len(orbit["state"]) == 7
+            assert orbit["multipliers"][:2] == [pytest.approx([1, 0], abs=1e-8)] * 2
+    (section,) = document["stable_sections"]
+    assert len(section["rear_rate"]) == len(section["stable_within"])
+    assert all(bound > 0 for bound in section["stable_within"])
+
+
+def test_bifurcations_on_the_plane_say_why_they_are_undefined(velodrome) -> None:
+    result = velodrome("bifurcations", "--alpha", "0", "--family", "2", "--json")
+    assert result.status == 0
+    first = result.json()["hopf"][0]
+    assert first["ends_stable_section"]
+    assert first["criticality"] is first["amplitude_slope"] is first["amplitude_slope_error"] is None
+    assert "circle's centre is free" in first["undefined_because"]
+    assert first["orbits"] == []
+
+
+def test_bifurcations_of_a_family_that_is_not_there(velodrome) -> None:
+    result = velodrome("bifurcations", "--alpha", "0.005", "--family", "7")
+    assert (result.status, result.stdout) == (2, "")
+    assert "--family" in result.stderr

@@ -1,0 +1,48 @@
+"""Whether a periodic orbit can be ridden: both wheels pushed, and both rims touching the ground once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..kinematics import WHEELS
+from ..simulate import simulate
+from ..surface import evaluate
+from .orbits import PeriodicOrbit
+from .shooting import Flow
+
+_LOOKS = 65  # states over a period; forces change as smoothly as the lean does
+
+
+def explain_orbit(flow: Flow, orbit: PeriodicOrbit) -> tuple[str, ...]:
+    """Explain why an orbit cannot be ridden: one text for each obstacle, none if it can.
+
+    The reference rides one period.
+
+    Parameters
+    ----------
+    flow : Flow
+        Near the orbit, see `Flow.moved_to`.
+    orbit : PeriodicOrbit
+
+    Returns
+    -------
+    tuple of str
+    """
+    state = flow.moved_to(orbit.state).near
+    bicycle, surface = flow.equations.bicycle, flow.equations.surface
+    try:
+        motion = simulate(bicycle, surface, state[:9], state[9:18], np.linspace(0.0, orbit.period, _LOOKS))
+    except ValueError as error:  # a rim lies inside the ground at the start
+        return (str(error),)
+    if motion.ended is not None:
+        return (motion.ended,)
+    places = motion.contact[:, :, :2]
+    slopes = evaluate(surface, places[..., 0], places[..., 1])[..., 1:3]
+    normal = np.concatenate([-slopes, np.ones((*slopes.shape[:2], 1))], axis=-1)
+    pushing = np.einsum("nki,nki->nk", motion.force, normal) / np.linalg.norm(normal, axis=-1)
+    least = pushing.min(axis=0)
+    return tuple(
+        f"the ground would have to pull the {wheel} wheel: {force:.3g} N"
+        for wheel, force in zip(WHEELS, least, strict=True)
+        if not force > 0
+    )

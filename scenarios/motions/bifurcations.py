@@ -1,0 +1,306 @@
+"""Hopf points of the solution families and the periodic orbits born there, with their document."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from ...reference.bicycle import Bicycle
+from ...reference.bifurcations.hopf import HopfPoint, find_hopf_points
+from ...reference.bifurcations.orbit_branch import OrbitBranch, follow_orbits
+from ...reference.bifurcations.orbit_events import OrbitEvent, find_events
+from ...reference.bifurcations.orbit_search import find_largest_orbit, orbits_of_amplitude
+from ...reference.bifurcations.orbits import PeriodicOrbit
+from ...reference.bifurcations.ridden import explain_orbit
+from ...reference.bifurcations.small_orbits import flow_near
+from ...reference.bifurcations.stable_within import BoundedCircle, bound_section
+from ...reference.families import Family, trace_all
+from ...reference.rideability import explain_motion
+from ...reference.sections import SectionEnd, stable_sections
+from ...reference.stability import VARIABLES
+from ...reference.surface import SurfaceOfRevolution
+from ..error import ScenarioError
+from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json
+from ..scenario import name_bicycle, name_surface
+from .families import check_inertia
+
+# Lean amplitudes of the orbits that are listed [rad]; a smaller branch has its largest orbit listed too.
+LISTED_AMPLITUDES = (0.001, 0.005, 0.02)
+# Round-off of a period, 1e-14, times this is the residual at which orbits count as solved, 1e-12 in units of 1.
+_LARGEST_GROWTH = 100.0
+# Branches are followed up to this lean [rad], to find the orbits that bound stable circles, and this number of orbits.
+_LARGEST_AMPLITUDE, _MOST_ORBITS = 0.1, 200
+_FIRST_AMPLITUDE = 2.5e-4  # at which the amplitude law is a good guess even next to a point where it degenerates [rad]
+_LONGEST_STEP = 0.025  # along a branch, so that drawn curves bend by some degrees from one orbit to the next
+_CIRCLES = 9  # examined in a stable section
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ListedOrbit:
+    """A periodic orbit with the reasons why it cannot be ridden, none if it can."""
+
+    orbit: PeriodicOrbit
+    unphysical_because: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return this orbit's part of the document."""
+        return {
+            **_describe_orbit(self.orbit),
+            "state": self.orbit.state.tolist(),
+            "physical": not self.unphysical_because,
+            "unphysical_because": list(self.unphysical_because),
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Bifurcation:
+    """A Hopf point and the branch of periodic orbits born there.
+
+    Attributes
+    ----------
+    point : HopfPoint
+    unphysical_because : tuple of str
+        Why the circular motion cannot be ridden, none if it can.
+    orbits : tuple of ListedOrbit
+        Those of the `LISTED_AMPLITUDES` along the branch and, if all are smaller than the last, its largest.
+    events : tuple of OrbitEvent
+        Bifurcations of the orbits along the branch.
+    branch : OrbitBranch or None
+        The followed part of the branch.
+    why_no_orbits : str or None
+        Why no orbits are known.
+    """
+
+    point: HopfPoint
+    unphysical_because: tuple[str, ...]
+    orbits: tuple[ListedOrbit, ...] = ()
+    events: tuple[OrbitEvent, ...] = ()
+    branch: OrbitBranch | None = None
+    why_no_orbits: str | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return this Hopf point's part of the document."""
+        point, motion = self.point, self.point.motion
+        return {
+            "family": point.numbers[0] if point.numbers else None,
+            **{name: getattr(motion, name) for name in ("rear_rate", "front_rate", "lean", "steer")},
+            "energy": point.energy,
+            "frequency": point.frequency,
+            "ends_stable_section": point.ends_section,
+            "physical": not self.unphysical_because,
+            "unphysical_because": list(self.unphysical_because),
+            "criticality": point.criticality,
+            "first_lyapunov_coefficient": point.first_lyapunov_coefficient,
+            "amplitude_slope": point.amplitude_slope,
+            "amplitude_slope_error": point.amplitude_slope_error,
+            "undefined_because": point.why_undefined,
+            "orbits": [orbit.as_json() for orbit in self.orbits],
+            "orbit_bifurcations": [{"kind": event.kind, **_describe_orbit(event.orbit)} for event in self.events],
+            "branch": None if self.branch is None else _list_branch(self.branch, self.events),
+            "branch_end": None if self.branch is None else self.branch.end,
+            "no_orbits_because": self.why_no_orbits,
+        }
+
+
+def _list_branch(branch: OrbitBranch, events: Sequence[OrbitEvent]) -> dict[str, list[float]]:
+    """Return the quantities along a branch as lists of equal length, its bifurcations in their places."""
+    places = [*enumerate(branch.orbits), *((event.place + 0.5, event.orbit) for event in events)]
+    orbits = [orbit for _, orbit in sorted(places, key=lambda pair: pair[0])]
+    return {
+        "lean_amplitude": [orbit.lean_amplitude for orbit in orbits],
+        "energy": [orbit.energy for orbit in orbits],
+        "period": [orbit.period for orbit in orbits],
+        "largest_multiplier": [orbit.growth for orbit in orbits],
+    }
+
+
+def _describe_orbit(orbit: PeriodicOrbit) -> dict[str, Any]:
+    return {
+        "lean_amplitude": orbit.lean_amplitude,
+        "energy": orbit.energy,
+        "period": orbit.period,
+        "multipliers": [[value.real, value.imag] for value in orbit.multipliers.tolist()],
+    }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BoundedSection:
+    """A stable section of a family, and how far from its circles a bicycle may weave and come back.
+
+    Attributes
+    ----------
+    numbers : tuple of int
+        Of the families on the curve.
+    circles : tuple of BoundedCircle
+        Along the section.
+    why_not : str or None
+        Why no circles were examined.
+    """
+
+    numbers: tuple[int, ...]
+    circles: tuple[BoundedCircle, ...] = ()
+    why_not: str | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return this section's part of the document."""
+        columns = {name: VARIABLES.index(name) for name in ("rear_rate", "lean", "steer")}
+        return {
+            "family": self.numbers[0] if self.numbers else None,
+            **{name: [float(circle.state[k]) for circle in self.circles] for name, k in columns.items()},
+            "energy": [circle.energy for circle in self.circles],
+            "stable_within": [circle.stable_within for circle in self.circles],
+            "no_circles_because": self.why_not,
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Bifurcations:
+    """The Hopf points of one bicycle on one ground.
+
+    Attributes
+    ----------
+    bicycle : Bicycle
+    surface : SurfaceOfRevolution
+    found : tuple of Bifurcation
+        Those at ends of stable sections first, then by family.
+    sections : tuple of BoundedSection
+        The stable sections.
+    absent : dict
+        By number of a family that has no curve on this ground: the reason.
+    """
+
+    bicycle: Bicycle
+    surface: SurfaceOfRevolution
+    found: tuple[Bifurcation, ...]
+    sections: tuple[BoundedSection, ...] = ()
+    absent: dict[int, str] = field(default_factory=dict)
+
+    def as_json(self, bicycle_name: str | None = None) -> dict[str, Any]:
+        """Return the JSON document of `velodrome bifurcations`; see `name_bicycle` for the name."""
+        return {
+            **name_surface(self.surface),
+            **name_bicycle(self.bicycle, bicycle_name),
+            "hopf": [one.as_json() for one in self.found],
+            "stable_sections": [section.as_json() for section in self.sections],
+            "absent": {str(number): reason for number, reason in self.absent.items()},
+        }
+
+
+def find_bifurcations(
+    bicycle: Bicycle,
+    surface: SurfaceOfRevolution,
+    number: int | None = None,
+    watch: Callable[[int, int], None] = lambda *_: None,
+) -> Bifurcations:
+    """Find the Hopf points of the circular motions on a ground, and follow the periodic orbits born there.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    surface : SurfaceOfRevolution
+    number : int, optional
+        Of a family, 1 to 4: only curves with this number.
+    watch : callable
+        Called with the number of Hopf points that have been examined, and that of all.
+
+    Returns
+    -------
+    Bifurcations
+
+    Raises
+    ------
+    ScenarioError
+        If the bicycle's equations of motion are singular, or the family has no curve on this ground.
+    """
+    check_inertia(bicycle)
+    curves, absent = trace_all(bicycle, surface)
+    if number is not None:
+        curves = [curve for curve in curves if number in curve.numbers]
+        if not curves:
+            raise ScenarioError(f"family {number} has no curve there: {absent.get(number, 'it has joined none')}")
+    points = [(curve, point) for curve in curves for point in find_hopf_points(curve)]
+    points.sort(key=lambda pair: not pair[1].ends_section)  # stable: by family within both
+    found: list[Bifurcation] = []
+    branches: dict[int, list[OrbitBranch]] = {}
+    for curve, point in points:
+        watch(len(found), len(points))
+        found.append(_examine(curve, point))
+        if found[-1].branch is not None:
+            branches.setdefault(curves.index(curve), []).append(found[-1].branch)
+    sections = [
+        _bound(curve, section, branches.get(k, []))
+        for k, curve in enumerate(curves)
+        for section in stable_sections(curve)
+    ]
+    return Bifurcations(bicycle=bicycle, surface=surface, found=tuple(found), sections=tuple(sections), absent=absent)
+
+
+def _examine(curve: Family, point: HopfPoint) -> Bifurcation:
+    """Follow the orbits born at a Hopf point."""
+    why = explain_motion(curve.equations.bicycle, curve.equations.surface, point.motion)
+    found = Bifurcation(point=point, unphysical_because=why)
+    if point.amplitude_slope is None:
+        return replace(found, why_no_orbits=point.why_undefined)
+    if point.growth_in_period > _LARGEST_GROWTH:
+        why_not = f"a disturbance grows {point.growth_in_period:.3g} times in a period, too much for shooting"
+        return replace(found, why_no_orbits=why_not)
+    try:
+        branch = follow_orbits(point, _LARGEST_AMPLITUDE, _FIRST_AMPLITUDE, _LONGEST_STEP, _MOST_ORBITS)
+    except ValueError as error:
+        return replace(found, why_no_orbits=str(error))
+    flow = flow_near(point)
+    orbits = [ListedOrbit(orbit=orbit, unphysical_because=explain_orbit(flow, orbit)) for orbit in _list_orbits(branch)]
+    return replace(found, orbits=tuple(orbits), events=tuple(find_events(branch)), branch=branch)
+
+
+def _bound(curve: Family, section: tuple[SectionEnd, SectionEnd], branches: Sequence[OrbitBranch]) -> BoundedSection:
+    """Find the orbits that bound the circles of a stable section."""
+    if not branches:
+        return BoundedSection(numbers=curve.numbers, why_not="no orbits are known on this curve")
+    try:
+        circles = bound_section(curve, section, branches, _CIRCLES)
+    except ValueError as error:
+        return BoundedSection(numbers=curve.numbers, why_not=str(error))
+    return BoundedSection(numbers=curve.numbers, circles=tuple(circles))
+
+
+def _list_orbits(branch: OrbitBranch) -> Sequence[PeriodicOrbit]:
+    """Return the orbits of a branch that are listed, in order of amplitude and then along the branch."""
+    listed = [orbit for size in LISTED_AMPLITUDES for orbit in orbits_of_amplitude(branch, size)]
+    largest = find_largest_orbit(branch)
+    return listed if largest.lean_amplitude >= LISTED_AMPLITUDES[-1] else [*listed, largest]
+
+
+def write_bifurcations(document: Mapping[str, Any], out: Path, output: FigureOutput = DEFAULT_FIGURES) -> list[Path]:
+    """Write the document and its figure into a folder, which is made if it does not exist.
+
+    Parameters
+    ----------
+    document : mapping
+        As `Bifurcations.as_json` returns it.
+    out : Path
+    output : FigureOutput
+        How the figure is written.
+
+    Returns
+    -------
+    list of Path
+        What is written; without stable circles there is no figure.
+
+    Raises
+    ------
+    ScenarioError
+        If the folder cannot be made.
+    """
+    from ...reports.figures import bifurcation_figure, drawn_sections, write_formats
+
+    make_folder(out)
+    path = out / "bifurcations.json"
+    write_json(path, document)
+    if not drawn_sections(document):
+        return [path]
+    draw = partial(bifurcation_figure, document)
+    return [path, *write_formats(out / "bifurcations", draw, output.formats, output.columns)]
