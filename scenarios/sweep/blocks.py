@@ -187,13 +187,19 @@ def read_columns(path: Path, columns: Sequence[str]) -> pa.Table:
         return file.read(columns=list(columns))
 
 
+def has_columns(path: Path, columns: pa.Schema) -> bool:
+    """Return whether a file has the columns of its table, which may differ where its footer is damaged."""
+    with _open_table(path) as file:
+        return file.schema_arrow.equals(columns)
+
+
 @contextmanager
 def _open_table(path: Path) -> Iterator[pq.ParquetFile]:
     """Open a file of a table; an error of reading it becomes one line that says what to do."""
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             yield file
-    except (OSError, pa.ArrowException) as error:
+    except (OSError, pa.ArrowException, UnicodeDecodeError) as error:  # the last for the name of a column
         text = " ".join(str(error).split())
         raise ScenarioError(f"{path}: cannot be read ({text}); remove it, and --resume runs its runs again") from error
 

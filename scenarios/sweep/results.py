@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..error import ScenarioError
-from .blocks import read_columns
+from .blocks import BlockTable, has_columns, read_columns
 from .journal import ForeignLine, Journal, JournalLine, finished_rows
 from .plan import SweepPlan
 from .pool import Done
@@ -172,7 +172,7 @@ class ResultStore:
             table.recover()
         timed = np.zeros(len(self._codes), bool)
         for path in self._timings.list_files():
-            timed[self._read_columns(path, ["index"]).column("index").to_numpy()] = True
+            timed[self._read_columns(self._timings, path, ["index"]).column("index").to_numpy()] = True
         self._stored |= timed
         for engine, table in self._tables.items():
             for path in table.list_files():
@@ -191,7 +191,7 @@ class ResultStore:
 
     def _read_file(self, engine: str, path: Path, timed: np.ndarray) -> None:
         """Read which rows of an engine a file has; one without its timing is done again, as if it were not there."""
-        found = self._read_columns(path, ["index", "status"])
+        found = self._read_columns(self._tables[engine], path, ["index", "status"])
         index = found.column("index").to_numpy()
         statuses = found.column("status").combine_chunks().dictionary_encode()
         names = statuses.dictionary.to_pylist()
@@ -204,9 +204,13 @@ class ResultStore:
         counts = np.bincount(kinds[whole], minlength=len(names)).tolist()
         self._counts[engine].update(dict(zip(names, counts, strict=True)))
 
-    def _read_columns(self, path: Path, columns: list[str]) -> pa.Table:
-        """Read columns of a file of this sweep."""
+    def _read_columns(self, table: BlockTable, path: Path, columns: list[str]) -> pa.Table:
+        """Read columns of a file, after it is known that it is of this sweep and can be merged with others."""
         found = read_columns(path, columns)
         if read_key(found.schema) != self._opened.key:
             raise ScenarioError(f"{path}: is not of this sweep; name another folder by --out")
+        if not has_columns(path, table.columns):
+            raise ScenarioError(
+                f"{path}: is damaged: it has other columns; remove it, and --resume runs its runs again"
+            )
         return found

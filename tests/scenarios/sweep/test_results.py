@@ -222,3 +222,14 @@ def test_a_row_of_two_files_is_refused(plan: SweepPlan, tmp_path: Path) -> None:
     part.with_name("block-00000007.parquet").write_bytes(part.read_bytes())
     with pytest.raises(ScenarioError, match=r"block-00000007\.parquet: has rows that another file has as well"):
         swept(plan, out, invent, resume=True)
+
+
+def test_a_damaged_name_of_a_column_is_found(plan: SweepPlan, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    swept(plan, out, invent)
+    table = pq.read_table(out / TIMINGS)
+    names = ["hosu" if name == "host" else name for name in table.column_names]
+    renamed = table.rename_columns(names).replace_schema_metadata(table.schema.metadata)
+    pq.write_table(renamed, out / TIMINGS)
+    with pytest.raises(ScenarioError, match=r"timing\.parquet: is damaged: it has other columns"):
+        swept(plan, out, invent, resume=True)
