@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -56,8 +56,17 @@ class BlockTable:
         return whole + sorted(self.folder.glob("block-*.parquet"))
 
     def recover(self) -> None:
-        """Put a sorted file in its place if the process was killed before it did."""
+        """Put a sorted file in its place if the process was killed before it did.
+
+        Raises
+        ------
+        ScenarioError
+            If it is damaged or not of this table; the blocks then stay.
+        """
         if self._sorted.exists():
+            with _open_table(self._sorted) as file:
+                if not file.schema_arrow.equals(self.columns, check_metadata=True):
+                    raise ScenarioError(f"{self._sorted}: is not of this sweep; name another folder by --out")
             self._replace_files()
 
     def add(self, records: Sequence[Mapping[str, Any]]) -> None:
@@ -100,7 +109,8 @@ class BlockTable:
         prepared = self.staging / "next.parquet"
         with (
             write_whole(prepared, durable=True) as partial,
-            pq.ParquetWriter(partial, self.columns, compression="zstd") as writer,
+            # With checksums, a damaged value is found when the table is read, rather than taken for a result.
+            pq.ParquetWriter(partial, self.columns, compression="zstd", write_page_checksum=True) as writer,
         ):
             for table in tables:
                 writer.write_table(table)
@@ -134,7 +144,7 @@ class _RowGroups:
         self._places: list[tuple[Path, int]] = []
         parts: list[np.ndarray] = []
         for path in files:
-            with pq.ParquetFile(path) as file:
+            with _open_table(path) as file:
                 for number in range(file.num_row_groups):
                     self._places.append((path, number))
                     parts.append(file.read_row_group(number, columns=["index"]).column("index").to_numpy())
@@ -158,7 +168,7 @@ class _RowGroups:
             self._read.move_to_end(owner)
         else:
             path, number = self._places[owner]
-            with pq.ParquetFile(path) as file:
+            with _open_table(path) as file:
                 self._read[owner] = file.read_row_group(number)
             while len(self._read) > 1 and sum(table.num_rows for table in self._read.values()) > _CACHED_ROWS:
                 self._read.popitem(last=False)
@@ -173,10 +183,23 @@ def read_columns(path: Path, columns: Sequence[str]) -> pa.Table:
     ScenarioError
         If the file is damaged.
     """
+    with _open_table(path) as file:
+        return file.read(columns=list(columns))
+
+
+def has_columns(path: Path, columns: pa.Schema) -> bool:
+    """Return whether a file has the columns of its table, which may differ where its footer is damaged."""
+    with _open_table(path) as file:
+        return file.schema_arrow.equals(columns)
+
+
+@contextmanager
+def _open_table(path: Path) -> Iterator[pq.ParquetFile]:
+    """Open a file of a table; an error of reading it becomes one line that says what to do."""
     try:
-        with pq.ParquetFile(path) as file:
-            return file.read(columns=list(columns))
-    except (OSError, pa.ArrowException) as error:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            yield file
+    except (OSError, pa.ArrowException, UnicodeDecodeError) as error:  # the last for the name of a column
         text = " ".join(str(error).split())
         raise ScenarioError(f"{path}: cannot be read ({text}); remove it, and --resume runs its runs again") from error
 
@@ -187,7 +210,9 @@ def _read_index(path: Path) -> np.ndarray:
 
 def _iterate_without(path: Path, indices: np.ndarray) -> Iterator[pa.Table]:
     """Yield the row groups of a file without the rows of some tasks."""
-    with pq.ParquetFile(path) as file:
-        for number in range(file.num_row_groups):
+    with _open_table(path) as file:
+        number_of_groups = file.num_row_groups
+    for number in range(number_of_groups):
+        with _open_table(path) as file:  # not while the caller writes, whose errors are not of this file
             table = file.read_row_group(number)
-            yield table.filter(pa.array(~np.isin(table.column("index").to_numpy(), indices)))
+        yield table.filter(pa.array(~np.isin(table.column("index").to_numpy(), indices)))

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -123,8 +124,12 @@ def read_sweep_folder(folder: Path) -> dict[str, Any]:
         raise ScenarioError(f"{folder}: is not the folder of a sweep: it has no {MANIFEST}") from error
     except (OSError, ValueError, TypeError, AttributeError) as error:
         raise ScenarioError(f"{path}: is not of a sweep: {show_value(str(error))}") from error
+    if not isinstance(manifest.get("engines"), dict) or "tasks" not in manifest:
+        raise ScenarioError(f"{path}: is not of a sweep: it has no engines or no tasks")
     if not manifest.get("complete"):
-        raise ScenarioError(f"{folder}: the sweep is not finished: run its file with --out {folder} --resume first")
+        raise ScenarioError(
+            f"{folder}: the sweep is not finished: run its file with --out {quote(str(folder))} --resume first"
+        )
     return manifest
 
 

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
 from ..error import ScenarioError
-from .blocks import read_columns
+from .blocks import BlockTable, has_columns, read_columns
 from .journal import ForeignLine, Journal, JournalLine, finished_rows
 from .plan import SweepPlan
 from .pool import Done
@@ -58,6 +59,7 @@ class ResultStore:
     def __init__(self, out: Path, plan: SweepPlan, opened: Opened) -> None:
         self._out, self._plan, self._opened = out, plan, opened
         self._codes = np.zeros(len(plan.tasks), np.uint8)  # of the rows' statuses, 0 where there is no row
+        self._stored = np.zeros(len(plan.tasks), bool)  # tasks that a table has, with or without the timing
         self._counts: dict[str, Counter[str]] = {engine: Counter() for engine in plan.file.engines}
         self._pending: dict[int, _Pending] = {}
         self._in_blocks: set[int] = set()  # tasks that are pending and have a row in a block
@@ -131,6 +133,7 @@ class ResultStore:
                 if found:
                     table.add(found)
             self._journal.clear()
+            self._stored[list(self._pending)] = True
             self._pending, self._in_blocks = {}, set()
         self._written_at = time.monotonic()
 
@@ -151,8 +154,8 @@ class ResultStore:
         counts = self._counts[self._plan.tasks.find_engine_of(index)]
         if self._codes[index]:
             counts[STATUSES[self._codes[index] - 1]] -= 1
-            if index not in self._pending:
-                self._in_blocks.add(index)
+        if self._stored[index] and index not in self._pending:
+            self._in_blocks.add(index)
         self._codes[index] = _CODES[row["status"]]
         counts[row["status"]] += 1
         self._pending[index] = _Pending(row, timing)
@@ -167,9 +170,13 @@ class ResultStore:
         """
         for table in (*self._tables.values(), self._timings):
             table.recover()
+        timed = np.zeros(len(self._codes), bool)
+        for path in self._timings.list_files():
+            timed[self._read_columns(self._timings, path, ["index"]).column("index").to_numpy()] = True
+        self._stored |= timed
         for engine, table in self._tables.items():
             for path in table.list_files():
-                self._read_file(engine, path)
+                self._read_file(engine, path, timed)
         path = self._out / JOURNAL
         try:
             for line in finished_rows(path):
@@ -182,12 +189,28 @@ class ResultStore:
                 f"{path}: has {error}, which is not of this sweep; name another folder by --out"
             ) from error
 
-    def _read_file(self, engine: str, path: Path) -> None:
-        found = read_columns(path, ["index", "status"])
-        if read_key(found.schema) != self._opened.key:
-            raise ScenarioError(f"{path}: is not of this sweep; name another folder by --out")
+    def _read_file(self, engine: str, path: Path, timed: np.ndarray) -> None:
+        """Read which rows of an engine a file has; one without its timing is done again, as if it were not there."""
+        found = self._read_columns(self._tables[engine], path, ["index", "status"])
+        index = found.column("index").to_numpy()
         statuses = found.column("status").combine_chunks().dictionary_encode()
         names = statuses.dictionary.to_pylist()
         kinds = statuses.indices.to_numpy()
-        self._codes[found.column("index").to_numpy()] = np.array([_CODES[name] for name in names], np.uint8)[kinds]
-        self._counts[engine].update(dict(zip(names, np.bincount(kinds).tolist(), strict=True)))
+        whole = timed[index]
+        if self._codes[index].any():
+            raise ScenarioError(f"{path}: has rows that another file has as well; remove one of them")
+        self._stored[index] = True
+        self._codes[index] = np.where(whole, np.array([_CODES[name] for name in names], np.uint8)[kinds], 0)
+        counts = np.bincount(kinds[whole], minlength=len(names)).tolist()
+        self._counts[engine].update(dict(zip(names, counts, strict=True)))
+
+    def _read_columns(self, table: BlockTable, path: Path, columns: list[str]) -> pa.Table:
+        """Read columns of a file, after it is known that it is of this sweep and can be merged with others."""
+        found = read_columns(path, columns)
+        if read_key(found.schema) != self._opened.key:
+            raise ScenarioError(f"{path}: is not of this sweep; name another folder by --out")
+        if not has_columns(path, table.columns):
+            raise ScenarioError(
+                f"{path}: is damaged: it has other columns; remove it, and --resume runs its runs again"
+            )
+        return found

@@ -12,7 +12,7 @@ from .plan import SweepPlan, Task
 from .pool import Done, Pool, WorkersBroken
 from .results import ResultStore
 from .selection import SelectedTasks
-from .store import mark_complete, open_folder, refuse_other_limits, write_sweep_manifest
+from .store import mark_complete, note_limits, open_folder, refuse_other_limits, write_sweep_manifest
 from .worker import Setup
 
 Work = Callable[[Setup, Sequence[Task]], Generator[Done]]
@@ -91,6 +91,7 @@ def run_sweep(
     stopped, interrupted = None, False
     with ResultStore(out, plan, opened) as store:
         refuse_other_limits(out, plan, opened, store.list_statuses() - set(retry))
+        opened = note_limits(plan, opened, store.list_statuses())
         missing = SelectedTasks(plan.tasks, store.select_missing(retry))
         left = len(missing)
         recall(_sum_counts(store.counts, set(retry)))
@@ -103,6 +104,8 @@ def run_sweep(
                     store.add(done)
                     left -= 1
                     watch(done)
+            if left:
+                raise WorkersBroken("the work ended before all runs were done")
             store.finish()
             mark_complete(out, plan, opened)
         except KeyboardInterrupt:

@@ -27,6 +27,7 @@ MANIFEST, JOURNAL, RESULTS, TIMINGS = "sweep.json", "journal.txt", "results", "t
 _TIMING_BLOCKS = "timing"  # folder of the timings' blocks
 STAGING = ".staging"  # folder in which files are prepared
 _SWEEP = "sweep"  # in the metadata of every table: the key of the sweep
+_ENDED = {"time_limit": "timeout", "memory_limit": "memory"}  # status of the rows that a limit ended
 SWEEP_VERSION = 4  # of the manifest, the journal and the data set; earlier, "format" says it
 
 
@@ -40,7 +41,7 @@ class Opened:
         Digest of all that determines the sweep's rows, from when the sweep was started; every line of its journal
         has it.
     limits : dict
-        Limits under which the existing rows were done.
+        Limits under which the existing rows were done; a list of limits where they differ.
     facts : dict
         What determines the rows of this session; see `SweepPlan.facts`.
     """
@@ -65,10 +66,11 @@ def open_folder(out: Path, plan: SweepPlan, resume: bool) -> Opened:
         return Opened(then["key"], then["limits"], facts)
     if known.exists():
         raise ScenarioError(f"{out}: holds a sweep already: continue it with --resume, or name another folder by --out")
-    if (out / JOURNAL).exists():
-        raise ScenarioError(
-            f"{out}: holds the {JOURNAL} of a sweep without its {MANIFEST}: name another folder by --out"
-        )
+    for name in (JOURNAL, RESULTS, TIMINGS, _TIMING_BLOCKS, STAGING):
+        if (out / name).exists():  # its rows would become a part of this sweep's data set
+            raise ScenarioError(
+                f"{out}: holds the {name} of a sweep without its {MANIFEST}: name another folder by --out"
+            )
     make_folder(out)
     opened = Opened(hashlib.sha256(canonical_text(facts).encode()).hexdigest()[:16], _limits(plan), facts)
     write_sweep_manifest(out, plan, opened, complete=False)
@@ -94,13 +96,40 @@ def refuse_other_limits(out: Path, plan: SweepPlan, opened: Opened, statuses: Co
         If the file's limits are not those under which rows timed out or ran out of memory.
     """
     now = _limits(plan)
-    for limit, status in (("time_limit", "timeout"), ("memory_limit", "memory")):
+    for limit, status in _ENDED.items():
         then = opened.limits.get(limit)
         if then != now[limit] and status in statuses:
             raise ScenarioError(
                 f"{out}: has rows of status {status} under {limit} {then!r}, but the file has {now[limit]!r}: "
                 f"try them again with --retry {status}"
             )
+
+
+def note_limits(plan: SweepPlan, opened: Opened, statuses: Collection[str]) -> Opened:
+    """Return what is opened with the limits of the rows that a session finds and makes.
+
+    Parameters
+    ----------
+    plan : SweepPlan
+    opened : Opened
+    statuses : collection of str
+        Those of the rows that are there, also of those that are tried again.
+
+    Returns
+    -------
+    Opened
+        Where a limit has changed and rows are there that the earlier one ended, the limit is a list of both: the
+        session may be stopped when some of those rows have been tried again, and the rest must be, too.
+    """
+    found: dict[str, Any] = {}
+    for limit, now in _limits(plan).items():
+        then = opened.limits.get(limit)
+        if then != now and _ENDED[limit] in statuses:
+            earlier = then if isinstance(then, list) else [then]
+            found[limit] = earlier if now in earlier else [*earlier, now]
+        else:
+            found[limit] = now
+    return replace(opened, limits=found)
 
 
 def _manifest(path: Path) -> dict[str, Any]:

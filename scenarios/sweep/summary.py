@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Collection
 from typing import Any
 
@@ -77,5 +78,5 @@ def status_of(outcome: SweepOutcome) -> int:
 
 def resume_command(plan: SweepPlan, outcome: SweepOutcome, retry: Collection[str] = ()) -> str:
     """Return the command that continues a stopped sweep."""
-    again = "".join(f" --retry {status}" for status in retry)
-    return f"velodrome sweep {plan.path} --out {outcome.folder} --resume{again}"
+    again = [part for status in retry for part in ("--retry", status)]
+    return shlex.join(["velodrome", "sweep", str(plan.path), "--out", str(outcome.folder), "--resume", *again])

@@ -102,3 +102,31 @@ def test_a_damaged_block_is_named_with_what_to_do(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-20])
     with pytest.raises(ScenarioError, match=r"block-00000000\.parquet: cannot be read .* --resume runs its runs again"):
         read_columns(path, ["index"])
+
+
+def test_a_damaged_value_is_found(tmp_path: Path) -> None:
+    table = make_table(tmp_path)
+    table.add(make_records([0, 1]))
+    table.add(make_records([2, 3]))
+    path = table.list_files()[0]
+    column = pq.ParquetFile(path).metadata.row_group(0).column(0)
+    data = bytearray(path.read_bytes())
+    data[column.data_page_offset + column.total_compressed_size - 1] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(ScenarioError, match=r"block-00000000\.parquet: cannot be read"):
+        table.sort()
+    assert len(table.list_files()) == 2
+
+
+@pytest.mark.parametrize("content", [b"PAR1", None])
+def test_a_staged_file_that_is_damaged_or_foreign_replaces_nothing(tmp_path: Path, content: bytes | None) -> None:
+    table = make_table(tmp_path)
+    table.add(make_records([0, 1]))
+    staged = table.staging / f"{table.folder.name}.parquet"
+    if content is None:
+        pq.write_table(pa.table({"index": [5]}), staged)
+    else:
+        staged.write_bytes(content)
+    with pytest.raises(ScenarioError, match=r"cannot be read|is not of this sweep"):
+        table.recover()
+    assert [row["index"] for row in read_rows(table)] == [0, 1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Generator, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 from sweeping import UPRIGHT, data_set, planned, rows, stored, swept
 
+from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.sweep import results
 from velodrome.scenarios.sweep.plan import SweepPlan, Task
 from velodrome.scenarios.sweep.pool import Done
@@ -174,3 +176,60 @@ def test_an_unreadable_file_stops_before_anything_is_written(plan: SweepPlan, tm
     assert swept(plan, out, invent, resume=True).missing == 0
     assert rows(out) == pa.Table.to_pylist(pq.ParquetFile(part).read())
     assert len(rows(out)) == COUNT
+
+
+@pytest.mark.parametrize("name", ["results/engine=reference/block-00000000.parquet", "timing/block-00000000.parquet"])
+def test_a_lost_block_is_ridden_again_with_its_timings(plan: SweepPlan, tmp_path: Path, name: str) -> None:
+    def stop(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
+        yield from islice(invent(setup, tasks), 9)
+        raise KeyboardInterrupt
+
+    out = tmp_path / "out"
+    swept(plan, tmp_path / "undisturbed", invent)
+    swept(plan, out, stop)
+    block = out / name
+    lost = pq.ParquetFile(block).read(columns=["index"]).num_rows
+    block.write_bytes(block.read_bytes()[:-20])
+    with pytest.raises(ScenarioError, match=r"block-00000000\.parquet: cannot be read .* remove it"):
+        swept(plan, out, invent, resume=True)
+    block.unlink()
+    asked: list[int] = []
+
+    def count(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
+        asked.extend(task.index for task in tasks)
+        yield from invent(setup, tasks)
+
+    swept(plan, out, count, resume=True)
+    assert len(asked) == 3 + lost
+    assert data_set(out) == data_set(tmp_path / "undisturbed")
+    assert find_timed(out) == list(range(2 * COUNT))
+
+
+def test_a_sweep_without_its_timings_gets_them_again(plan: SweepPlan, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    swept(plan, out, invent)
+    expected = data_set(out)
+    (out / TIMINGS).unlink()
+    assert swept(plan, out, invent, resume=True).counts == swept(plan, out, invent, resume=True).counts
+    assert find_timed(out) == list(range(2 * COUNT))
+    assert data_set(out) == expected
+
+
+def test_a_row_of_two_files_is_refused(plan: SweepPlan, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    swept(plan, out, invent)
+    part = out / RESULTS / "engine=reference" / "part-0.parquet"
+    part.with_name("block-00000007.parquet").write_bytes(part.read_bytes())
+    with pytest.raises(ScenarioError, match=r"block-00000007\.parquet: has rows that another file has as well"):
+        swept(plan, out, invent, resume=True)
+
+
+def test_a_damaged_name_of_a_column_is_found(plan: SweepPlan, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    swept(plan, out, invent)
+    table = pq.read_table(out / TIMINGS)
+    names = ["hosu" if name == "host" else name for name in table.column_names]
+    renamed = table.rename_columns(names).replace_schema_metadata(table.schema.metadata)
+    pq.write_table(renamed, out / TIMINGS)
+    with pytest.raises(ScenarioError, match=r"timing\.parquet: is damaged: it has other columns"):
+        swept(plan, out, invent, resume=True)

@@ -25,7 +25,7 @@ from velodrome.scenarios.sweep import rows as columns
 from velodrome.scenarios.sweep.plan import SweepPlan, Task, plan_sweep
 from velodrome.scenarios.sweep.pool import Done
 from velodrome.scenarios.sweep.run import Work, run_sweep
-from velodrome.scenarios.sweep.store import JOURNAL, MANIFEST, RESULTS, TIMINGS, part_of
+from velodrome.scenarios.sweep.store import JOURNAL, MANIFEST, RESULTS, STAGING, TIMINGS, part_of
 from velodrome.scenarios.sweep.summary import status_of, summarise_sweep
 from velodrome.scenarios.sweep.worker import Setup
 
@@ -194,6 +194,26 @@ def test_a_journal_without_its_manifest_is_not_adopted(tmp_path: Path) -> None:
     assert not (out / MANIFEST).exists()
 
 
+@pytest.mark.parametrize("left", [RESULTS, TIMINGS, STAGING])
+def test_what_another_sweep_left_does_not_become_a_part_of_the_data_set(tmp_path: Path, left: str) -> None:
+    plan, out = planned(tmp_path, LEANING), tmp_path / "out"
+    swept(plan, tmp_path / "other")
+    out.mkdir()
+    (tmp_path / "other" / (RESULTS if left == STAGING else left)).rename(out / left)
+    with pytest.raises(ScenarioError, match=rf"out: holds the {left} of a sweep without its sweep\.json"):
+        swept(plan, out)
+    assert [path.name for path in out.iterdir()] == [left]
+
+
+def test_timings_of_another_sweep_are_refused(tmp_path: Path) -> None:
+    plan, out = planned(tmp_path, LEANING), tmp_path / "out"
+    swept(plan, out)
+    swept(planned(tmp_path, LEANING.replace("0.3", "0.4")), tmp_path / "other")
+    (out / TIMINGS).write_bytes((tmp_path / "other" / TIMINGS).read_bytes())
+    with pytest.raises(ScenarioError, match=r"timing\.parquet: is not of this sweep"):
+        swept(plan, out, resume=True)
+
+
 def test_rows_of_another_sweep_are_refused_and_kept(tmp_path: Path) -> None:
     plan, out = planned(tmp_path, LEANING), tmp_path / "out"
     journal = stopped_without_its_manifest(plan, out)
@@ -280,6 +300,32 @@ def test_another_time_limit_asks_for_the_rows_that_it_ended(tmp_path: Path) -> N
         swept(longer, out, resume=True)
     assert run_sweep(longer, out, here, True, lambda *_: None, ["timeout"]).counts == {"reference": {"done": 4}}
     assert swept(longer, out, resume=True).stopped is None
+
+
+def test_rows_that_ended_under_another_limit_are_found_after_a_stop(tmp_path: Path) -> None:
+    def stopped(work: Work, after: int) -> Work:
+        def part(setup: Setup, tasks: Sequence[Task]) -> Generator[Done]:
+            yield from islice(work(setup, tasks), after)
+            raise KeyboardInterrupt
+
+        return part
+
+    out, text = tmp_path / "out", LEANING
+    swept(planned(tmp_path, text), out, stopped(here, 1))
+    # A shorter limit, under which rows time out, and back to the first one.
+    shorter = planned(tmp_path, text.replace("60.0", "1.0"))
+    swept(shorter, out, stopped(slow(0), 2), resume=True)
+    plan = planned(tmp_path, text)
+    with pytest.raises(ScenarioError, match=r"status timeout under time_limit 1\.0, but the file has 60\.0"):
+        swept(plan, out, resume=True)
+    # One of the two is tried again, and times out under the longer limit, too; then the other one's limit is asked for.
+    run_sweep(plan, out, stopped(slow(0), 1), True, lambda *_: None, ["timeout"])
+    for other in (plan, shorter):
+        with pytest.raises(ScenarioError, match=r"under time_limit \[1\.0, 60\.0\]"):
+            swept(other, out, resume=True)
+    last = run_sweep(plan, out, here, True, lambda *_: None, ["timeout"])
+    assert (last.counts, last.missing) == ({"reference": {"done": 4}}, 0)
+    assert json.loads((out / MANIFEST).read_text())["limits"]["time_limit"] == 60.0
 
 
 def test_a_point_that_is_none_is_a_row_and_the_others_ride(tmp_path: Path) -> None:
