@@ -97,7 +97,12 @@ def run_sweep_command(
     document = summarise_sweep(plan, outcome)
     if document["complete"]:
         write_sweep_page(plan, outcome, document)
-    figures = [] if outcome.stopped is not None else write_sweep_figures(outcome.folder, wanted, output)
+    figures, fault = [], None
+    if outcome.stopped is None:
+        try:
+            figures = write_sweep_figures(outcome.folder, wanted, output)
+        except ScenarioError as error:  # no row has a value: said after the summary of what was ridden
+            fault = error
     document["figures"] = [str(figure) for figure in figures]
     with ending_with(0):
         show_summary(make_console(stderr=as_json), document, resume_command(plan, outcome, retry))
@@ -105,6 +110,8 @@ def run_sweep_command(
             print_json(document)
         else:
             show_written(figures)
+    if fault is not None:
+        raise fault
     return status_of(outcome)
 
 

@@ -194,7 +194,8 @@ def _prepare_maps(tables: Mapping[str, pa.Table], plot: MapPlot) -> dict[str, Ca
             )
     if not found:
         names = ", ".join(show_value(column) for column in plot.columns)
-        raise ScenarioError(f"--plot: no row of the sweep has a value of all of {names}")
+        what = "no ride was computed at points with" if plot.share else "no row of the sweep has"
+        raise ScenarioError(f"--plot: {what} a value of all of {names}")
     return found
 
 

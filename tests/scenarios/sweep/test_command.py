@@ -88,6 +88,17 @@ def test_a_stopped_retry_says_how_to_go_on(
     assert "3 of 3 runs are missing, finished runs are kept" in said
 
 
+def test_a_figure_without_values_is_said_after_the_summary(
+    in_process: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = written(in_process, THREE)
+    with pytest.raises(ScenarioError, match="no row of the sweep has a value of position_error_max"):
+        command.run_sweep_command(
+            path, None, None, None, resume=False, as_json=False, plots=["position_error_max:perturbation.lean_rate"]
+        )
+    assert "data set: " in capsys.readouterr().out
+
+
 def test_progress_counts_and_says_what_failed_and_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tasks = planned(tmp_path, THREE).tasks
     screen = Console(file=io.StringIO(), force_terminal=True, color_system=None, width=100)
