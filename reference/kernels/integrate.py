@@ -213,8 +213,7 @@ def dop853(y, times, index, t, h, tolerance, most_steps, ground, fall, function,
         evaluations += 11
         error, reached = error_norm(y, new, h, k, tolerance, work, work2), False
         if error < 1:
-            for i in range(SIZE):
-                ahead[i] = new[i]
+            copy_array(new, ahead)
             reached = project(ahead, function, parameters, c, bicycle)
             if reached:
                 derivative(ahead, function, parameters, bicycle, ahead_derivative)
@@ -257,8 +256,8 @@ def dop853(y, times, index, t, h, tolerance, most_steps, ground, fall, function,
         factor = 10.0 if error == 0 else min(10.0, 0.9 / _eighth_root(error))
         if not reached:
             return FAILED, index, t, h, steps, evaluations
-        for i in range(SIZE):
-            y[i], stages[0, i] = ahead[i], ahead_derivative[i]
+        copy_array(ahead, y)
+        copy_array(ahead_derivative, stages[0])
         t += h
         h *= min(1.0, factor) if rejected else factor
         steps, rejected, bounds, height = steps + 1, False, next_bounds, next_height

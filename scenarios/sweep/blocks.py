@@ -64,10 +64,26 @@ class BlockTable:
             If it is damaged or not of this table; the blocks then stay.
         """
         if self._sorted.exists():
-            with _open_table(self._sorted) as file:
-                if not file.schema_arrow.equals(self.columns, check_metadata=True):
-                    raise ScenarioError(f"{self._sorted}: is not of this sweep; name another folder by --out")
+            self.read(self._sorted, ["index"])
             self._replace_files()
+
+    def read(self, path: Path, columns: Sequence[str]) -> pa.Table:
+        """Read columns of one of the files, after it is known to be of this table and fit to be merged with others.
+
+        Raises
+        ------
+        ScenarioError
+            If it is damaged or of another sweep.
+        """
+        with _open_table(path) as file:
+            if file.schema_arrow.metadata != self.columns.metadata:
+                raise ScenarioError(f"{path}: is not of this sweep; name another folder by --out")
+            if not file.schema_arrow.equals(self.columns):  # its footer is damaged
+                raise ScenarioError(
+                    f"{path}: is damaged: it has other columns, or is not of this sweep; "
+                    "remove it, and --resume runs its runs again"
+                )
+            return file.read(columns=list(columns))
 
     def add(self, records: Sequence[Mapping[str, Any]]) -> None:
         """Add rows as a block.
@@ -91,7 +107,7 @@ class BlockTable:
         indices : ndarray of int, shape (n,)
         """
         for path in self.list_files():
-            if np.isin(_read_index(path), indices).any():
+            if np.isin(self.read(path, ["index"]).column("index").to_numpy(), indices).any():
                 self._write(path, _iterate_without(path, indices))
 
     def sort(self) -> None:
@@ -175,24 +191,6 @@ class _RowGroups:
         return self._read[owner]
 
 
-def read_columns(path: Path, columns: Sequence[str]) -> pa.Table:
-    """Read columns of one file of a table.
-
-    Raises
-    ------
-    ScenarioError
-        If the file is damaged.
-    """
-    with _open_table(path) as file:
-        return file.read(columns=list(columns))
-
-
-def has_columns(path: Path, columns: pa.Schema) -> bool:
-    """Return whether a file has the columns of its table, which may differ where its footer is damaged."""
-    with _open_table(path) as file:
-        return file.schema_arrow.equals(columns)
-
-
 @contextmanager
 def _open_table(path: Path) -> Iterator[pq.ParquetFile]:
     """Open a file of a table; an error of reading it becomes one line that says what to do."""
@@ -202,10 +200,6 @@ def _open_table(path: Path) -> Iterator[pq.ParquetFile]:
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:  # the last for the name of a column
         text = " ".join(str(error).split())
         raise ScenarioError(f"{path}: cannot be read ({text}); remove it, and --resume runs its runs again") from error
-
-
-def _read_index(path: Path) -> np.ndarray:
-    return read_columns(path, ["index"]).column("index").to_numpy()
 
 
 def _iterate_without(path: Path, indices: np.ndarray) -> Iterator[pa.Table]:

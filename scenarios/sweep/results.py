@@ -5,20 +5,17 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Collection
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
 from ..error import ScenarioError
-from .blocks import BlockTable, has_columns, read_columns
 from .journal import ForeignLine, Journal, JournalLine, finished_rows
 from .plan import SweepPlan
 from .pool import Done
 from .rows import STATUSES, make_record
-from .store import JOURNAL, Opened, make_tables, make_timing_table, read_key, remove_staging
+from .store import JOURNAL, Opened, make_tables, make_timing_table, remove_staging
 
 _BLOCK_ROWS = 4096  # rows of a block: it takes about a third of a second to write
 # A block is written after a minute even if it is smaller, or after a fiftieth of the time so far if that is longer:
@@ -26,14 +23,6 @@ _BLOCK_ROWS = 4096  # rows of a block: it takes about a third of a second to wri
 _BLOCK_TIME, _BLOCK_SHARE = 60.0, 0.02
 
 _CODES = {status: code for code, status in enumerate(STATUSES, 1)}
-
-
-@dataclass(frozen=True)
-class _Pending:
-    """A row that is not yet in a block."""
-
-    row: dict[str, Any]
-    timing: dict[str, Any]
 
 
 class ResultStore:
@@ -61,8 +50,7 @@ class ResultStore:
         self._codes = np.zeros(len(plan.tasks), np.uint8)  # of the rows' statuses, 0 where there is no row
         self._stored = np.zeros(len(plan.tasks), bool)  # tasks that a table has, with or without the timing
         self._counts: dict[str, Counter[str]] = {engine: Counter() for engine in plan.file.engines}
-        self._pending: dict[int, _Pending] = {}
-        self._in_blocks: set[int] = set()  # tasks that are pending and have a row in a block
+        self._pending: dict[int, Done] = {}  # rows that are not yet in a block, by task
         self._begun = self._written_at = time.monotonic()
         self._tables = make_tables(out, plan, opened)
         self._timings = make_timing_table(out, opened)
@@ -101,7 +89,7 @@ class ResultStore:
             If the disk is full or another error occurs; all earlier rows are kept.
         """
         self._journal.append(JournalLine(self._opened.key, done.index, done.row, done.timing))
-        self._count(done.index, done.row, done.timing)
+        self._count(done)
         waited = time.monotonic() - self._written_at
         longest = max(_BLOCK_TIME, _BLOCK_SHARE * (self._written_at - self._begun))
         if len(self._pending) >= _BLOCK_ROWS or waited > longest:
@@ -118,23 +106,25 @@ class ResultStore:
         if self._pending:
             records: dict[str, list[dict[str, Any]]] = {engine: [] for engine in self._tables}
             clocks = []
-            for index, pending in self._pending.items():
+            for index, done in self._pending.items():
                 task = self._plan.tasks[index]
                 # A run that was killed could not report its version.
                 version = {"version": self._opened.facts["engines"][task.engine]}
                 columns = self._tables[task.engine].columns
-                records[task.engine].append(version | make_record(task, pending.row, columns))
-                clocks.append({"key": task.key, "index": index, "engine": task.engine, **pending.timing})
+                records[task.engine].append(version | make_record(task, done.row, columns))
+                clocks.append({"key": task.key, "index": index, "engine": task.engine, **done.timing})
             # The timings last: then a row that has one is found in its engine's table, too.
             blocks = [(self._tables[engine], found) for engine, found in records.items()]
+            arrived = np.array(list(self._pending))
+            replaced = arrived[self._stored[arrived]]
             for table, found in [*blocks, (self._timings, clocks)]:
-                if self._in_blocks:
-                    table.remove(np.fromiter(self._in_blocks, np.int64))
+                if len(replaced):
+                    table.remove(replaced)
                 if found:
                     table.add(found)
             self._journal.clear()
-            self._stored[list(self._pending)] = True
-            self._pending, self._in_blocks = {}, set()
+            self._stored[arrived] = True
+            self._pending = {}
         self._written_at = time.monotonic()
 
     def finish(self) -> None:
@@ -150,15 +140,13 @@ class ResultStore:
             table.sort()
         remove_staging(self._out)
 
-    def _count(self, index: int, row: dict[str, Any], timing: dict[str, Any]) -> None:
-        counts = self._counts[self._plan.tasks.find_engine_of(index)]
-        if self._codes[index]:
-            counts[STATUSES[self._codes[index] - 1]] -= 1
-        if self._stored[index] and index not in self._pending:
-            self._in_blocks.add(index)
-        self._codes[index] = _CODES[row["status"]]
-        counts[row["status"]] += 1
-        self._pending[index] = _Pending(row, timing)
+    def _count(self, done: Done) -> None:
+        counts = self._counts[self._plan.tasks.find_engine_of(done.index)]
+        if self._codes[done.index]:
+            counts[STATUSES[self._codes[done.index] - 1]] -= 1
+        self._codes[done.index] = _CODES[done.row["status"]]
+        counts[done.row["status"]] += 1
+        self._pending[done.index] = done
 
     def _read_stored(self) -> None:
         """Read which rows there are, after what a killed process left has been put in order.
@@ -172,7 +160,7 @@ class ResultStore:
             table.recover()
         timed = np.zeros(len(self._codes), bool)
         for path in self._timings.list_files():
-            timed[self._read_columns(self._timings, path, ["index"]).column("index").to_numpy()] = True
+            timed[self._timings.read(path, ["index"]).column("index").to_numpy()] = True
         self._stored |= timed
         for engine, table in self._tables.items():
             for path in table.list_files():
@@ -183,7 +171,7 @@ class ResultStore:
                 # The sweep's key is a digest of all its tasks: with it, the index says which task it is.
                 if line.sweep != self._opened.key or not 0 <= line.index < len(self._codes):
                     raise ForeignLine(f"the row {line.index}")
-                self._count(line.index, line.row, line.timing)
+                self._count(Done(line.index, line.row, line.timing))
         except ForeignLine as error:
             raise ScenarioError(
                 f"{path}: has {error}, which is not of this sweep; name another folder by --out"
@@ -191,7 +179,7 @@ class ResultStore:
 
     def _read_file(self, engine: str, path: Path, timed: np.ndarray) -> None:
         """Read which rows of an engine a file has; one without its timing is done again, as if it were not there."""
-        found = self._read_columns(self._tables[engine], path, ["index", "status"])
+        found = self._tables[engine].read(path, ["index", "status"])
         index = found.column("index").to_numpy()
         statuses = found.column("status").combine_chunks().dictionary_encode()
         names = statuses.dictionary.to_pylist()
@@ -203,14 +191,3 @@ class ResultStore:
         self._codes[index] = np.where(whole, np.array([_CODES[name] for name in names], np.uint8)[kinds], 0)
         counts = np.bincount(kinds[whole], minlength=len(names)).tolist()
         self._counts[engine].update(dict(zip(names, counts, strict=True)))
-
-    def _read_columns(self, table: BlockTable, path: Path, columns: list[str]) -> pa.Table:
-        """Read columns of a file, after it is known that it is of this sweep and can be merged with others."""
-        found = read_columns(path, columns)
-        if read_key(found.schema) != self._opened.key:
-            raise ScenarioError(f"{path}: is not of this sweep; name another folder by --out")
-        if not has_columns(path, table.columns):
-            raise ScenarioError(
-                f"{path}: is damaged: it has other columns; remove it, and --resume runs its runs again"
-            )
-        return found

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import shutil
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
@@ -11,10 +10,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import pyarrow as pa
-
 from ...engines.format_version import VERSION_KEY, read_version
-from ...engines.storage import METADATA_KEY
 from ..error import ScenarioError
 from ..files import make_folder, write_json
 from ..run import read_json
@@ -187,14 +183,6 @@ def make_tables(out: Path, plan: SweepPlan, opened: Opened) -> dict[str, BlockTa
 def make_timing_table(out: Path, opened: Opened) -> BlockTable:
     """Return the table of the rows' timings."""
     return BlockTable(out / _TIMING_BLOCKS, out / TIMINGS, out / STAGING, timing_schema({_SWEEP: opened.key}))
-
-
-def read_key(columns: pa.Schema) -> str | None:
-    """Return the key of the sweep that a table belongs to; None if it does not say."""
-    try:
-        return json.loads((columns.metadata or {})[METADATA_KEY]).get(_SWEEP)
-    except (KeyError, ValueError, AttributeError):
-        return None
 
 
 def remove_staging(out: Path) -> None:

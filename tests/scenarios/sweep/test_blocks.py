@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from velodrome.scenarios.error import ScenarioError
 from velodrome.scenarios.sweep import blocks
-from velodrome.scenarios.sweep.blocks import BlockTable, read_columns
+from velodrome.scenarios.sweep.blocks import BlockTable
 
 COLUMNS = pa.schema([("index", pa.int64()), ("text", pa.string()), ("value", pa.float64())])
 
@@ -101,7 +101,7 @@ def test_a_damaged_block_is_named_with_what_to_do(tmp_path: Path) -> None:
     (path,) = table.list_files()
     path.write_bytes(path.read_bytes()[:-20])
     with pytest.raises(ScenarioError, match=r"block-00000000\.parquet: cannot be read .* --resume runs its runs again"):
-        read_columns(path, ["index"])
+        table.read(path, ["index"])
 
 
 def test_a_damaged_value_is_found(tmp_path: Path) -> None:
