@@ -73,7 +73,10 @@ def test_a_keeper_that_is_stopped_while_its_child_dies_is_replaced(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pool, "_PATIENCE", 1.0)
-    plan = planned(tmp_path, UPRIGHT + "perturbation.lean_rate = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]\n")
+    # A worker has two groups at most, so that most tasks are still to be done when the first row comes.
+    count = 8 * pool.GROUP
+    rates = ", ".join(str(k / 1000) for k in range(count))
+    plan = planned(tmp_path, UPRIGHT + f"perturbation.lean_rate = [{rates}]\n")
     # No time limit comes to the rescue, and nobody else does the work.
     with within(120.0), Pool(Setup(plan.base, 1000.0, None), 1) as workers:
         arriving = workers.run(plan.tasks)
@@ -84,7 +87,7 @@ def test_a_keeper_that_is_stopped_while_its_child_dies_is_replaced(
         os.kill(worker.child, signal.SIGKILL)
         found += arriving
         assert workers._workers != [worker]
-    assert sorted(done.index for done in found) == list(range(6))
+    assert sorted(done.index for done in found) == list(range(count))
     assert {done.row["status"] for done in found} == {"done"}
     assert not alive(worker.process.pid)
 
