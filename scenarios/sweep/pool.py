@@ -100,6 +100,7 @@ class Pool:
         self._left = 0  # tasks without a result
         self._longest = math.inf
         self._begun: float | None = None  # when the first task was sent
+        self._looked = -math.inf  # when the workers were last looked at
         self._workers = [self._start_worker() for _ in range(workers)]
 
     def __enter__(self) -> Pool:
@@ -271,6 +272,9 @@ class Pool:
     def _check_deadlines(self) -> Iterator[Done]:
         """Kill children that hang; replace workers that died unnoticed or are silent."""
         now = time.monotonic()
+        if now < self._looked + _LOOK:
+            return
+        self._looked = now
         for worker in list(self._workers):
             if worker.overdue is None and worker.child is not None and _is_dead(worker.child):
                 worker.overdue = now + _PATIENCE

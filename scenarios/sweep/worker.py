@@ -123,8 +123,8 @@ def _do_tasks(setup: Setup, tasks: int, results: int) -> None:
             signal.setitimer(signal.ITIMER_REAL, setup.time_limit * len(points) + _GRACE)
             found = work.do_many(group["engine"], [point["changes"] for point in points])
             signal.setitimer(signal.ITIMER_REAL, 0)
-            for point, (row, timing) in zip(points, found, strict=True):
-                _send(results, {"index": point["index"], "row": row, "timing": timing | who})
+            pairs = zip(points, found, strict=True)
+            _send(results, *({"index": p["index"], "row": row, "timing": timing | who} for p, (row, timing) in pairs))
             if any(row["status"] == "memory" for row, _ in found):
                 os._exit(RETIRED)  # the remaining memory may be too little for the next tasks
         status = _INPUT_ENDED
@@ -159,9 +159,9 @@ def _read_lines(source: int, at_a_time: int = 1 << 16) -> Iterator[str]:
             yield line.decode(errors="replace")
 
 
-def _send(results: int, message: dict[str, Any]) -> None:
+def _send(results: int, *messages: dict[str, Any]) -> None:
     # The leading line feed ends a line that a dead child may have left incomplete.
-    data = b"\n" + json.dumps(message).encode() + b"\n"
+    data = b"\n" + "".join(f"{json.dumps(message)}\n" for message in messages).encode()
     while data:
         data = data[os.write(results, data) :]
 
