@@ -31,7 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .taylor import Estimate, choose_radius, expand_on_torus
+from .taylor import Estimate, choose_radius, expand_conjugate, expand_on_circle
 
 Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -152,9 +152,9 @@ def expand_hopf(field: Field, centre: np.ndarray, energy: float, frequency: floa
         return field(centre + variables, np.full(len(variables), complex(energy)))
 
     def manifold(radius: float) -> tuple[np.ndarray, np.ndarray]:
-        second_order = expand_on_torus(lambda s, t: on_level(np.outer(s, q) + np.outer(t, q.conj())), radius)
-        second = np.linalg.solve(2j * omega * identity - jacobian, 2 * second_order[2, 0])
-        return second, -np.linalg.solve(jacobian, second_order[1, 1].real)
+        terms = expand_conjugate(lambda s, t: on_level(np.outer(s, q) + np.outer(t, q.conj())), radius, 2)
+        second = np.linalg.solve(2j * omega * identity - jacobian, 2 * terms[0])
+        return second, -np.linalg.solve(jacobian, terms[1].real)
 
     def cubic(radius: float) -> complex:
         second, mean = manifold(radius)
@@ -165,17 +165,22 @@ def expand_hopf(field: Field, centre: np.ndarray, energy: float, frequency: floa
                 linear + np.outer(s * s, second / 2) + np.outer(t * t, second.conj() / 2) + np.outer(s * t, mean)
             )
 
-        third = expand_on_torus(on_manifold, radius)[2, 1]
-        return complex(p @ third)
+        return complex(p @ expand_conjugate(on_manifold, radius, 3)[1])
 
     # The equilibrium moves by as much as the oscillation.
     unit = 1 / np.abs(moved / scale).max()
+    # The terms of second order turn with -2 to 2 times the angle of s, that of s t with 1 times it.
+    turns = np.exp(2j * np.pi * np.arange(5) / 5)
 
     def growth(radius: float) -> complex:
-        def along_family(s: np.ndarray, t: np.ndarray) -> np.ndarray:
-            return field(centre + np.outer(s, q) + np.outer(unit * t, moved), energy + unit * t)
+        def along_family(x: np.ndarray) -> np.ndarray:
+            s, t = np.outer(x, turns).ravel(), np.repeat(unit * x, len(turns))
+            conjugate = np.outer(x, turns.conj()).ravel()
+            oscillating = np.outer(s, q) + np.outer(conjugate, q.conj())
+            return field(centre + oscillating + np.outer(t, moved), energy + t).reshape(len(x), len(turns), -1)
 
-        return complex(p @ expand_on_torus(along_family, radius)[1, 1] / unit)
+        mixed = np.fft.fft(expand_on_circle(along_family, radius, 2), axis=0)[1] / len(turns)
+        return complex(p @ mixed / unit)
 
     third, change = choose_radius(cubic, _RADII), choose_radius(growth, _RADII)
     second, mean = manifold(third.radius)

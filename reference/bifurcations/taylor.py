@@ -1,11 +1,11 @@
 """Taylor coefficients of analytic functions by Cauchy's integrals.
 
-On circles |s| = |t| = r the trapezoidal rule gives the coefficients of a function of two complex variables,
+On the circle |x| = r the trapezoidal rule with n points gives the coefficients of a function of a complex variable,
 
-    c_jk = 1/n^2 sum_ab f(r w^a, r w^b) w^(-ja - kb) / r^(j + k),    w = exp(2 pi i / n)
+    c_k = 1/n sum_a f(r w^a) w^(-ka) / r^k,    w = exp(2 pi i / n)
 
-up to terms of c_(j + n)k r^n and c_j(k + n) r^n, and round-off eps / r^(j + k). There is no cancellation as in
-differences of real numbers, so that third derivatives have eleven digits.
+up to the term c_(k + n) r^n and round-off eps / r^k. There is no cancellation as in differences of real numbers, so
+that third derivatives have eleven digits. A function that is real for real x needs the upper half of the circle only.
 
 References
 ----------
@@ -23,7 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 
 # Points on a circle. At a quarter of the radius of convergence the first term left out is 4^-16 = 2e-10 of the function
-# and falls by 2^-16 with each halving of the radius, while the round-off of third derivatives grows by 2^3.
+# and falls by 2^-16 with each halving of the radius, while the round-off of third derivatives grows by 2^3. An
+# oscillation of amplitude r along its vector and the conjugate is as wide as 2 r.
 SAMPLES = 16
 
 
@@ -45,26 +46,56 @@ class Estimate:
     radius: float
 
 
-def expand_on_torus(function: Callable[[np.ndarray, np.ndarray], np.ndarray], radius: float) -> np.ndarray:
-    """Compute Taylor coefficients of a function of two complex variables about zero.
+def expand_on_circle(function: Callable[[np.ndarray], np.ndarray], radius: float, order: int) -> np.ndarray:
+    """Compute the Taylor coefficient of an order of functions of a complex variable, about zero.
 
     Parameters
     ----------
     function : callable
-        Maps s and t, complex arrays of shape (m,), to values (m, d).
+        Maps complex numbers (m,) to values (m, ...), real for real numbers.
     radius : float
-        Of the circles on which s and t lie.
+        Of the circle.
+    order : int
+        Well below `SAMPLES`.
 
     Returns
     -------
-    ndarray, shape (n, n, d), complex
-        Entry [j, k] is the coefficient of s^j t^k, useful for orders j + k well below n = `SAMPLES`.
+    ndarray, shape (...)
     """
-    circle = radius * np.exp(2j * np.pi * np.arange(SAMPLES) / SAMPLES)
-    s, t = np.meshgrid(circle, circle, indexing="ij")
-    values = function(s.ravel(), t.ravel()).reshape(SAMPLES, SAMPLES, -1)
-    orders = radius ** -np.arange(float(SAMPLES))
-    return np.fft.fft2(values, axes=(0, 1)) / SAMPLES**2 * (orders[:, None] * orders)[..., None]
+    turns = np.exp(2j * np.pi * np.arange(SAMPLES // 2 + 1) / SAMPLES)
+    weights = turns**-order
+    weights[1:-1] *= 2  # with those of the lower half, which are conjugate
+    return np.real(np.tensordot(weights, function(radius * turns), axes=1)) / (SAMPLES * radius**order)
+
+
+def expand_conjugate(function: Callable[[np.ndarray, np.ndarray], np.ndarray], radius: float, order: int) -> np.ndarray:
+    """Compute the Taylor coefficients of an order of a function of two complex variables that is real on conjugates.
+
+    Along s = x exp(i phi), t = x exp(-i phi) the coefficient of x^n is the sum of c_jk exp(i (j - k) phi) over
+    j + k = n: n + 1 angles phi give all of them.
+
+    Parameters
+    ----------
+    function : callable
+        Maps s and t, complex arrays of shape (m,), to values (m, d), real where t is the conjugate of s.
+    radius : float
+        Of the circles on which s and t lie.
+    order : int
+        n.
+
+    Returns
+    -------
+    ndarray, shape (n + 1, d), complex
+        Entry k is the coefficient of s^(n - k) t^k.
+    """
+    turns = np.exp(1j * np.pi * np.arange(order + 1) / (order + 1))
+
+    def evaluate_rays(x: np.ndarray) -> np.ndarray:
+        s, t = np.outer(x, turns), np.outer(x, turns.conj())
+        return function(s.ravel(), t.ravel()).reshape(*s.shape, -1)
+
+    rays = expand_on_circle(evaluate_rays, radius, order)
+    return np.fft.ifft(rays * (turns**-order)[:, None], axis=0)
 
 
 def choose_radius(compute: Callable[[float], complex], radii: Sequence[float]) -> Estimate:
@@ -75,7 +106,7 @@ def choose_radius(compute: Callable[[float], complex], radii: Sequence[float]) -
     compute : callable
         Maps a radius to a number, which is not finite where the radius is too large.
     radii : sequence of float
-        Monotonic.
+        Falling; those far beyond the best one are not tried.
 
     Returns
     -------
@@ -88,9 +119,15 @@ def choose_radius(compute: Callable[[float], complex], radii: Sequence[float]) -
     ValueError
         If no three neighbouring radii give finite values.
     """
-    values = np.array([compute(radius) for radius in radii])
-    changes = np.abs(np.diff(values))
-    errors = np.maximum(changes[:-1], changes[1:])
+    values: list[complex] = []
+    errors = np.empty(0)
+    for radius in radii:
+        values.append(compute(radius))
+        changes = np.abs(np.diff(values))
+        errors = np.maximum(changes[:-1], changes[1:])
+        # Beyond the best radius round-off of derivatives grows by a power of the ratio of radii.
+        if np.isfinite(errors).any() and np.all(errors[-2:] > 2 * np.nanmin(errors)):
+            break
     if not np.isfinite(errors).any():
         raise ValueError("the function has no value on circles of any radius")
     best = int(np.nanargmin(errors))

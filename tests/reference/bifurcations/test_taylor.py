@@ -1,33 +1,42 @@
 import numpy as np
 import pytest
 
-from velodrome.reference.bifurcations.taylor import choose_radius, expand_on_torus
+from velodrome.reference.bifurcations.taylor import choose_radius, expand_conjugate, expand_on_circle
 
 RADII = [0.4 / 2**k for k in range(8)]
 
 
 def exponential(s: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Have the coefficients 1 / j! and 2^k / k!."""
-    return np.exp(s + 2 * t)[:, None]
+    """Have the coefficients a^j b^k / (j! k!), a = 1 + i, b its conjugate."""
+    return np.exp((1 + 1j) * s + (1 - 1j) * t)[:, None]
 
 
 def test_coefficients_of_an_exponential() -> None:
-    found = expand_on_torus(exponential, 0.1)[..., 0]
-    for j, k, expected in ((0, 0, 1), (1, 0, 1), (0, 1, 2), (1, 1, 2), (2, 1, 1), (1, 2, 2), (0, 3, 4 / 3)):
-        # Round-off of values up to e^0.3 in sums of 256, divided by r^(j + k).
-        assert found[j, k] == pytest.approx(expected, abs=1e-14 / 0.1 ** (j + k))
+    a, factorials = 1 + 1j, [1, 1, 2, 6]
+    for order in range(4):
+        found = expand_conjugate(exponential, 0.1, order)[:, 0]
+        for k, value in enumerate(found):
+            j = order - k
+            expected = a**j * np.conj(a) ** k / (factorials[j] * factorials[k])
+            # Round-off of values up to e^0.3, divided by r^(j + k).
+            assert value == pytest.approx(expected, abs=2e-15 / 0.1**order)
+
+
+def test_coefficients_of_several_functions_of_one_variable() -> None:
+    found = expand_on_circle(lambda x: np.stack([np.exp(x), np.sin(x)], axis=-1), 0.1, 3)
+    np.testing.assert_allclose(found, [1 / 6, -1 / 6], atol=1e-12)
 
 
 def test_the_chosen_radius_has_the_error_that_is_estimated() -> None:
-    """With a pole at s = 1 the coefficient of s^2 t is 6, and large radii leave terms out."""
+    """With poles at s, t = 1 the coefficient of s^2 t is 18, and large radii leave terms out."""
 
     def rational(s: np.ndarray, t: np.ndarray) -> np.ndarray:
-        return (t / (1 - s) ** 3)[:, None]
+        return 1 / ((1 - s) * (1 - t))[:, None] ** 3
 
-    found = choose_radius(lambda radius: complex(expand_on_torus(rational, radius)[2, 1, 0]), RADII)
-    assert abs(found.value - 6) <= found.error < 1e-11
-    worst = expand_on_torus(rational, RADII[0])[2, 1, 0]
-    assert abs(worst - 6) > 1e3 * found.error
+    found = choose_radius(lambda radius: complex(expand_conjugate(rational, radius, 3)[1, 0]), RADII)
+    assert abs(found.value - 18) <= found.error < 1e-9
+    worst = expand_conjugate(rational, RADII[0], 3)[1, 0]
+    assert abs(worst - 18) > 1e2 * found.error
 
 
 def test_no_radius_with_values_is_an_error() -> None:
