@@ -205,6 +205,23 @@ class Steady:
         )
 
 
+def find_unknowns(equations: Steady, motion: CircularMotion) -> np.ndarray:
+    """Return the 22 unknowns of a circular motion, from which `Steady.motion` makes it."""
+    rates = np.array([motion.yaw_rate, motion.rear_rate, motion.front_rate])
+    speed = float(np.linalg.norm(rates))
+    weight = equations.bicycle.mass * equations.bicycle.gravity
+    return np.concatenate(
+        [
+            motion.position,
+            [motion.lean, motion.pitch, motion.steer],
+            rates / speed,
+            [speed**2 / kernel.SIGMA_UNIT],
+            motion.contact.ravel(),
+            motion.force.ravel() / weight,
+        ]
+    )
+
+
 def reverse_speeds(unknowns: np.ndarray) -> np.ndarray:
     """Return the same solution, or its tangent, (22,) each, with the signs of all three speeds reversed."""
     other = unknowns.copy()

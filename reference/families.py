@@ -43,6 +43,7 @@ from .continuation import (
     largest_sigma,
     metric,
     roots_along,
+    tangent,
 )
 from .inputs import NO_INPUTS, Inputs
 from .kernels.circle import SIGMA_UNIT
@@ -170,6 +171,12 @@ def trace_from(start: Anchor, longest: float = LONGEST_STEP) -> Family:
     return Family(start.family, start.equations, points)
 
 
+def trace_through(equations: Steady, unknowns: np.ndarray) -> Family:
+    """Follow the curve through a circular motion, given as its 22 unknowns, to both ends; it has no number."""
+    u = as_solved(unknowns)
+    return trace_from(_make_anchor(equations, Point(u, tangent(equations, u))))
+
+
 def trace_all(
     bicycle: Bicycle, surface: SurfaceOfRevolution, longest: float = LONGEST_STEP, inputs: Inputs = NO_INPUTS
 ) -> tuple[list[Family], dict[int, str]]:
@@ -279,7 +286,7 @@ def search_curves(
     for start in search_starts(bicycle, surface, inputs):
         known = [*families, *found]
         if not any(is_on_curve(curve.equations, curve.points, start) for curve in known):
-            curve = trace_from(_searched_anchor(Steady(bicycle, surface, inputs), start), longest)
+            curve = trace_from(_make_anchor(Steady(bicycle, surface, inputs), start), longest)
             # A followed curve may have ended a step before a motion that lies on it.
             if not any(_is_part_of(other, curve) for other in known) and _is_ridden_somewhere(curve):
                 found.append(curve)
@@ -291,8 +298,8 @@ def _is_part_of(other: Family, curve: Family) -> bool:
     return is_on_curve(curve.equations, curve.points, other.points[len(other.points) // 2])
 
 
-def _searched_anchor(equations: Steady, found: Point) -> Anchor:
-    """Make an anchor, without a family, of a motion that the search has found."""
+def _make_anchor(equations: Steady, found: Point) -> Anchor:
+    """Make an anchor, without a family, of a motion."""
     covector = metric(found.unknowns) * found.tangent
     condition = plane_condition(found.unknowns, covector, 0.0)
     return Anchor(None, equations, found.unknowns, (found.tangent, -found.tangent), condition)

@@ -22,7 +22,7 @@ from ..circular import CircularMotion, Steady
 from ..continuation import Point, roots_along
 from ..families import Family
 from ..inputs import NO_INPUTS
-from ..sections import linearise_point, stable_sections
+from ..sections import SectionEnd, linearise_point, stable_sections
 from ..stability import are_zero, free_eigenvalues
 from ..surface import is_level
 from .energy_level import CHART, EnergyLevel, energy_level
@@ -109,7 +109,12 @@ def find_hopf_points(family: Family) -> list[HopfPoint]:
 def section_hopf_points(family: Family) -> list[HopfPoint]:
     """Return the Hopf points at the ends of a family's stable sections, in the order along the family."""
     ends = [end for section in stable_sections(family) for end in section]
-    return [examine_hopf(family, end.motion, end.eigenvalue.imag, True) for end in ends if end.cause == "hopf"]
+    return [examine_end(family, end) for end in ends if end.cause == "hopf"]
+
+
+def examine_end(family: Family, end: SectionEnd) -> HopfPoint:
+    """Compute criticality and amplitude at a Hopf point that ends a stable section."""
+    return examine_hopf(family, end.motion, end.eigenvalue.imag, True)
 
 
 def _crossing_points(family: Family) -> Iterator[HopfPoint]:
@@ -156,10 +161,8 @@ def examine_hopf(family: Family, motion: CircularMotion, frequency: float, ends_
     equations = family.equations
     level = energy_level(equations, motion)
     point = HopfPoint(family.numbers, motion, level.energy, frequency, ends_section, level)
-    if equations.inputs != NO_INPUTS:
-        return replace(point, why_undefined=f"the energy is not conserved with {equations.inputs.describe()}")
-    if is_level(equations.surface):
-        why = "on the level plane the circle's centre is free, and a second pair of eigenvalues is imaginary"
+    why = explain_undefined(equations)
+    if why is not None:
         return replace(point, why_undefined=why)
 
     def field(variables: np.ndarray, energy: np.ndarray) -> np.ndarray:
@@ -177,7 +180,20 @@ def examine_hopf(family: Family, motion: CircularMotion, frequency: float, ends_
         "y": float(np.hypot(*level.centre[:2])),
     }
     scale = np.array([units.get(name, np.inf) for name in CHART])
-    return _measure(point, expand_hopf(field, level.centre, level.energy, point.frequency, scale))
+    try:
+        form = expand_hopf(field, level.centre, level.energy, point.frequency, scale)
+    except ValueError as error:  # next to a singularity of the equations
+        return replace(point, why_undefined=f"the normal form cannot be computed: {error}")
+    return _measure(point, form)
+
+
+def explain_undefined(equations: Steady) -> str | None:
+    """Explain why no circle of a bicycle on its ground has oscillations whose amplitude follows from the energy."""
+    if equations.inputs != NO_INPUTS:
+        return f"the energy is not conserved with {equations.inputs.describe()}"
+    if is_level(equations.surface):
+        return "on the level plane the circle's centre is free, and a second pair of eigenvalues is imaginary"
+    return None
 
 
 def _measure(point: HopfPoint, form: NormalForm) -> HopfPoint:

@@ -33,8 +33,9 @@ class OrbitBranch:
         In order along the branch, of positive lean amplitude; their tangents point in that direction.
     end : str
         ``hopf``: the amplitude has shrunk to zero at another Hopf point; ``largest``: it has reached the amplitude
-        at which the branch is left; ``flat``: a wheel lies nearly flat on the ground; ``lost``: the shortest step
-        finds no further orbit; ``unfinished``: the largest number of orbits is reached.
+        at which the branch is left; ``stopped``: it is left on request; ``flat``: a wheel lies nearly flat on the
+        ground; ``lost``: the shortest step finds no further orbit; ``unfinished``: the largest number of orbits is
+        reached.
     """
 
     point: HopfPoint
@@ -48,6 +49,7 @@ def follow_orbits(
     first: float = 1e-3,
     longest: float = _LONGEST_STEP,
     most: int = 300,
+    stop: Callable[[OrbitBranch], bool] = lambda _: False,
 ) -> OrbitBranch:
     """Follow the periodic orbits born at a Hopf point.
 
@@ -58,11 +60,13 @@ def follow_orbits(
     largest : float
         Lean amplitude at which the branch is left [rad].
     first : float
-        Lean amplitude of the first orbit [rad].
+        Lean amplitude of the first orbit [rad], down to which the branch is followed to another Hopf point.
     longest : float
         Longest step, in the metric `velodrome.reference.bifurcations.orbits.arc_metric`.
     most : int
         Largest number of orbits.
+    stop : callable
+        Maps the branch, as far as it is followed, to whether it is left there.
 
     Returns
     -------
@@ -70,31 +74,37 @@ def follow_orbits(
     """
     near, far = small_orbits(point, [first, 1.1 * first])
     orbits = [_direct(near, far.unknowns - near.unknowns)]
-    end = "lost"
-    for orbit in _follow(flow_near(point), orbits[0], longest):
-        if orbit.lean_amplitude <= 0:
-            end = "hopf"
-            break
-        orbits.append(orbit)
-        if orbit.lean_amplitude > largest:
+    following = _follow(flow_near(point), orbits[0], longest, first)
+    end: str | None = None
+    while end is None:
+        if stop(OrbitBranch(point, orbits, "stopped")):
+            end = "stopped"
+        elif orbits[-1].lean_amplitude > largest:
             end = "largest"
-            break
-        if abs(orbit.state[LEAN_INDEX]) > LARGEST_LEAN:
+        elif abs(orbits[-1].state[LEAN_INDEX]) > LARGEST_LEAN:
             end = "flat"
-            break
-        if len(orbits) >= most:
+        elif len(orbits) >= most:
             end = "unfinished"
-            break
+        elif (orbit := next(following, None)) is None:
+            end = "lost"
+        elif orbit.lean_amplitude <= 0:
+            end = "hopf"
+        else:
+            orbits.append(orbit)
     return OrbitBranch(point, orbits, end)
 
 
-def _follow(flow: Flow, orbit: PeriodicOrbit, longest: float) -> Iterator[PeriodicOrbit]:
-    """Yield the orbits that follow one in the direction of its tangent, until the shortest step finds none."""
+def _follow(flow: Flow, orbit: PeriodicOrbit, longest: float, smallest: float) -> Iterator[PeriodicOrbit]:
+    """Yield the orbits that follow one in the direction of its tangent, until the shortest step finds none.
+
+    Beyond a Hopf point the curve goes on with the same orbits, whose amplitude then counts as negative. It is passed
+    from an orbit of the smallest amplitude [rad] or less only, since no orbit of the branch is to be left out.
+    """
     distance = _FIRST_STEP
     while distance >= _SHORTEST_STEP:
         flow = flow.moved_to(orbit.state)
         found = step_along(flow, orbit, distance)
-        if found is None:
+        if found is None or (found.lean_amplitude <= 0 and orbit.lean_amplitude > smallest):
             distance /= 2
         else:
             orbit, distance = found, min(longest, 1.4 * distance)

@@ -41,6 +41,18 @@ def find_largest_orbit(branch: OrbitBranch) -> PeriodicOrbit:
     return branch.orbits[best]
 
 
+def find_crossing_saddle(branch: OrbitBranch, energy: float) -> list[PeriodicOrbit]:
+    """Return the unstable orbit of an energy [J], see `find_bounding_orbit`, next to the last one of a branch.
+
+    It lies between that one and the one before, or the Hopf point; empty if there is none.
+    """
+    if len(branch.orbits) == 1:
+        return list(filter(_is_saddle, orbits_of_energy(branch, energy)))
+    last = OrbitBranch(branch.point, branch.orbits[-2:], branch.end)
+    energies = np.array([orbit.energy for orbit in last.orbits])
+    return list(filter(_is_saddle, _solve_crossings(last, energies - energy, energy_condition(energy))))
+
+
 def find_bounding_orbit(branch: OrbitBranch, energy: float) -> PeriodicOrbit | None:
     """Return the smallest unstable orbit of an energy [J] on a branch, None if there is none.
 

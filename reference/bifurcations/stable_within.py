@@ -1,18 +1,29 @@
-"""How far from a stable circle a bicycle may weave and come back: the unstable orbits that bound a stable section."""
+"""How far from a stable circle a bicycle may weave and come back: the unstable orbits that bound stable circles."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..families import Family
-from ..sections import SectionEnd
+from ..anchors import are_same_solution
+from ..circular import CircularMotion, Steady, find_unknowns
+from ..families import Family, trace_through
+from ..sections import SectionEnd, stable_sections
+from ..stability import independent
 from .energy_level import energy_level
-from .orbit_branch import OrbitBranch
-from .orbit_search import find_bounding_orbit
+from .hopf import HopfPoint, examine_end, explain_undefined
+from .orbit_branch import OrbitBranch, follow_orbits
+from .orbit_search import find_bounding_orbit, find_crossing_saddle
 from .orbits import PeriodicOrbit
+
+# Branches are followed up to this lean [rad] and this number of orbits.
+_LARGEST_AMPLITUDE, _MOST_ORBITS = 0.1, 200
+_FIRST_AMPLITUDE = 2.5e-4  # at which the amplitude law is a good guess even next to a point where it degenerates [rad]
+_LONGEST_STEP = 0.025  # along a branch, so that drawn curves bend by some degrees from one orbit to the next
+# Round-off of a period, 1e-14, times this is the residual at which orbits count as solved, 1e-12 in units of 1.
+_LARGEST_GROWTH = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,16 +38,97 @@ class BoundedCircle:
         Of both [J].
     orbit : PeriodicOrbit or None
         The smallest unstable orbit of this energy on the branches that were searched; None if there is none.
+    why_not : str or None
+        Why no orbit is known.
     """
 
     state: np.ndarray
     energy: float
     orbit: PeriodicOrbit | None
+    why_not: str | None = None
 
     @property
     def stable_within(self) -> float | None:
         """Lean amplitude of the orbit [rad]."""
         return None if self.orbit is None else self.orbit.lean_amplitude
+
+
+def follow_branch(point: HopfPoint, stop: Callable[[OrbitBranch], bool] = lambda _: False) -> OrbitBranch:
+    """Follow the orbits born at a Hopf point as far as they may bound stable circles.
+
+    Parameters
+    ----------
+    point : HopfPoint
+    stop : callable
+        See `follow_orbits`.
+
+    Returns
+    -------
+    OrbitBranch
+
+    Raises
+    ------
+    ValueError
+        If no orbits are known there, with the reason.
+    """
+    if point.amplitude_slope is None:
+        raise ValueError(point.why_undefined)
+    if point.growth_in_period > _LARGEST_GROWTH:
+        raise ValueError(f"a disturbance grows {point.growth_in_period:.3g} times in a period, too much for shooting")
+    return follow_orbits(point, _LARGEST_AMPLITUDE, _FIRST_AMPLITUDE, _LONGEST_STEP, _MOST_ORBITS, stop)
+
+
+def bound_circle(equations: Steady, motion: CircularMotion) -> BoundedCircle:
+    """Find the orbit that bounds a stable circle.
+
+    The branches born at both ends of the circle's stable section are followed up to the first unstable orbit of its
+    energy.
+
+    Parameters
+    ----------
+    equations : Steady
+    motion : CircularMotion
+        Lyapunov stable.
+
+    Returns
+    -------
+    BoundedCircle
+
+    Raises
+    ------
+    ValueError
+        If the rear wheel stands.
+    """
+    circle = BoundedCircle(independent(*motion.state()), energy_level(equations, motion).energy, None)
+    why = explain_undefined(equations)
+    if why is not None:
+        return replace(circle, why_not=why)
+    unknowns = find_unknowns(equations, motion)
+    curve = trace_through(equations, unknowns)
+    place = next(k for k, point in enumerate(curve.points) if are_same_solution(point.unknowns, unknowns))
+    around = [ends for ends in stable_sections(curve) if ends[0].place < place <= ends[1].place]
+    reasons, orbits = [], []
+    for end in (end for ends in around for end in ends):
+        try:
+            orbits += _find_first_saddle(examine_end(curve, end), circle.energy)
+        except ValueError as error:
+            reasons.append(str(error))
+    if orbits:
+        return replace(circle, orbit=min(orbits, key=_amplitude))
+    none = "no unstable orbit of its energy is on the branches born at the ends of its stable section"
+    return replace(circle, why_not="; ".join([none, *dict.fromkeys(reasons)]))
+
+
+def _find_first_saddle(point: HopfPoint, energy: float) -> list[PeriodicOrbit]:
+    """Return the first unstable orbit of an energy [J] on the branch born at a Hopf point, if there is one."""
+    found: list[PeriodicOrbit] = []
+
+    def stop(branch: OrbitBranch) -> bool:
+        found.extend(find_crossing_saddle(branch, energy))
+        return bool(found)
+
+    follow_branch(point, stop)
+    return found
 
 
 def bound_section(

@@ -17,6 +17,7 @@ from .options import (
     RearTorqueOption,
     SteerDampingOption,
     SteerTorqueOption,
+    WithinOption,
     answering_missing_motion,
     ending_with,
     load_bicycle,
@@ -42,6 +43,7 @@ def circular_command(
     steer_torque: SteerTorqueOption = 0.0,
     rear_wheel_torque: RearTorqueOption = 0.0,
     steer_damping: SteerDampingOption = 0.0,
+    within: WithinOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """One circular motion: its 21 constants, contact forces, eigenvalues, verdict on stability.
@@ -51,13 +53,16 @@ def circular_command(
     from .progress import COMPUTING, ProgressBars
 
     with answering_missing_motion(as_json), ProgressBars() as progress:
-        from ..motions import solve_circular
+        from ..motions import search_bound, solve_circular
         from ..scenario import make_bowl
 
         angles, ground, source = parse_angles(near), parse_ground(alpha, surface), load_bicycle(bicycle)
         inputs = make_inputs(steer_torque, rear_wheel_torque, steer_damping)
         progress.say(COMPUTING)
         solution = solve_circular(source.bicycle, make_bowl(ground), rear_rate, family, angles, inputs)
+        if within:
+            progress.say("following the orbits that bound it")
+            solution = search_bound(solution)
         found = solution.as_json(source.name)
     with ending_with(0):
         if as_json:
@@ -76,6 +81,7 @@ def families_command(
     steer_torque: SteerTorqueOption = 0.0,
     rear_wheel_torque: RearTorqueOption = 0.0,
     steer_damping: SteerDampingOption = 0.0,
+    within: WithinOption = False,
     out: Annotated[
         Path | None, typer.Option(help="Folder for families.json, its page and the figure families.")
     ] = None,
@@ -102,6 +108,7 @@ def families_command(
             make_bowl(ground),
             inputs,
             lambda done, curves: progress.watch("stability", done, curves, "curves"),
+            within,
         )
         document = families.as_json(source.name)
         if out is not None:

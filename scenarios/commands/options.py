@@ -55,6 +55,12 @@ RearTorqueOption = Annotated[
 SteerDampingOption = Annotated[
     float, typer.Option(min=0, help="Coefficient of the torque against the steer rate [N m s/rad].")
 ]
+WithinOption = Annotated[
+    bool,
+    typer.Option(
+        "--within", help="Search for the unstable orbits that bound stable motions, too; this takes some seconds."
+    ),
+]
 CacheOption = Annotated[
     Path | None,
     typer.Option(

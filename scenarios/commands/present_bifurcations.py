@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
-from .present_motions import show_bicycle_name
+from .present_motions import show_bicycle_name, show_bounds
 from .tables import Column, print_table
 from .terminal import print_words
 
@@ -78,19 +78,7 @@ def _show_branch(console: Console, name: str, point: Mapping[str, Any]) -> None:
 def _show_section(console: Console, section: Mapping[str, Any]) -> None:
     """Print the circles of a stable section with the amplitude within which they are stable."""
     name = "a curve without a number" if section["family"] is None else f"family {section['family']}"
-    if section["no_circles_because"] is not None:
-        print_words(console, f"stable section of {name}: {section['no_circles_because']}", "yellow")
-        return
-    print_words(console, f"stable section of {name}: within the lean amplitude of an unstable orbit", "bold")
-    bounds = section["stable_within"]
-    columns = [
-        Column("rear rate", [f"{value:.6f}" for value in section["rear_rate"]], "rad/s"),
-        Column("lean", [f"{value:z.6f}" for value in section["lean"]], "rad"),
-        Column("steer", [f"{value:z.6f}" for value in section["steer"]], "rad"),
-        Column("energy", [f"{value:.5f}" for value in section["energy"]], "J"),
-        Column("stable within", ["" if bound is None else f"{bound:.9f}" for bound in bounds], "rad"),
-    ]
-    print_table(console, columns)
+    show_bounds(console, f"stable section of {name}", section)
 
 
 _END_WORDS = {

@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ...reference.stability import are_zero
+from ..motions import NOT_SEARCHED
 from ..scenario import BENCHMARK
 from .tables import Column, print_table
 from .terminal import print_line, print_words
@@ -66,12 +67,25 @@ def show_circular(console: Console, found: dict[str, Any]) -> None:
     columns = [Column("", list(vectors), right=False)]
     columns += [Column(axis, [cells[k] for cells in components]) for k, axis in enumerate("xyz")]
     print_table(console, columns)
-    console.print("Lyapunov stable" if found["lyapunov_stable"] else "unstable")
+    print_words(console, _describe_stability(found))
     if found["physical"]:
         friction = f"{found['required_friction']:.6g}"
         print_words(console, f"it can be ridden: rolling needs a coefficient of friction of {friction}")
     for reason in found["unphysical_because"]:
         print_words(console, f"it cannot be ridden: {reason}", "yellow")
+
+
+def _describe_stability(found: Mapping[str, Any]) -> str:
+    """Say whether a motion is stable, and within what; stability by eigenvalues holds for small disturbances only."""
+    if not found["lyapunov_stable"]:
+        return "unstable"
+    bound = found["stable_within"]
+    if bound is not None:
+        return f"Lyapunov stable, within {bound:.4g} rad ({math.degrees(bound):.3g} deg) of lean"
+    why = found["no_bound_because"]
+    if why == NOT_SEARCHED:
+        return "Lyapunov stable: small disturbances die out; --within finds how large they may be"
+    return f"Lyapunov stable: small disturbances die out; it is not known how large they may be: {why}"
 
 
 def _print_rows(console: Console, rows: Sequence[tuple[str, str, str]]) -> None:
@@ -136,12 +150,33 @@ def show_families(console: Console, document: Mapping[str, Any]) -> None:
                 ridden = [_format_section(part) for part in section["rideable_parts"]]
                 words = f"only {' and '.join(ridden)} of it can be ridden" if ridden else "none of it can be ridden"
                 print_words(console, f"  {words}", "yellow")
+            if section["within"] is not None:
+                show_bounds(console, "stable", section["within"])
         if not all(points["physical"]):
             ridden = [_format_section(part) for part in family["rideable_parts"]]
             words = f"can be ridden: rear rate {', '.join(ridden)}" if ridden else "cannot be ridden"
             print_words(console, words, "yellow")
+    if any(section["within"] is None for family in document["families"] for section in family["stable_sections"]):
+        print_words(console, "Lyapunov stable: small disturbances die out; --within finds how large they may be", "dim")
     for number, reason in document["absent"].items():
         print_words(console, f"family {number}: no curve: {reason}", "yellow")
+
+
+def show_bounds(console: Console, name: str, within: Mapping[str, Any]) -> None:
+    """Print the circles of a named stable section with the lean amplitudes within which they are stable."""
+    if within["no_circles_because"] is not None:
+        print_words(console, f"{name}: {within['no_circles_because']}", "yellow")
+        return
+    print_words(console, f"{name}: within the lean amplitude of an unstable orbit", "bold")
+    bounds = within["stable_within"]
+    columns = [
+        Column("rear rate", [f"{value:.6f}" for value in within["rear_rate"]], "rad/s"),
+        Column("lean", [f"{value:z.6f}" for value in within["lean"]], "rad"),
+        Column("steer", [f"{value:z.6f}" for value in within["steer"]], "rad"),
+        Column("energy", [f"{value:.5f}" for value in within["energy"]], "J"),
+        Column("stable within", ["" if bound is None else f"{bound:.9f}" for bound in bounds], "rad"),
+    ]
+    print_table(console, columns)
 
 
 def _format_section(section: Mapping[str, Any]) -> str:

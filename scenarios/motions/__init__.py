@@ -11,7 +11,9 @@ if TYPE_CHECKING:
     from .bifurcations import Bifurcations as Bifurcations
     from .bifurcations import find_bifurcations as find_bifurcations
     from .bifurcations import write_bifurcations as write_bifurcations
+    from .circular import NOT_SEARCHED as NOT_SEARCHED
     from .circular import CircularSolution as CircularSolution
+    from .circular import search_bound as search_bound
     from .circular import solve_circular as solve_circular
     from .families import MERGING as MERGING
     from .families import CriticalShapes as CriticalShapes
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MERGING",
+    "NOT_SEARCHED",
     "Bifurcations",
     "CircularSolution",
     "CriticalShapes",
@@ -34,6 +37,7 @@ __all__ = [
     "find_critical_shapes",
     "follow_families",
     "make_atlas",
+    "search_bound",
     "solve_circular",
     "write_bifurcations",
     "write_families",
@@ -44,7 +48,9 @@ _HOME = {
     "Bifurcations": ".bifurcations",
     "find_bifurcations": ".bifurcations",
     "write_bifurcations": ".bifurcations",
+    "NOT_SEARCHED": ".circular",
     "CircularSolution": ".circular",
+    "search_bound": ".circular",
     "solve_circular": ".circular",
 }
 

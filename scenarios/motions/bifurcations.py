@@ -10,32 +10,25 @@ from typing import Any
 
 from ...reference.bicycle import Bicycle
 from ...reference.bifurcations.hopf import HopfPoint, find_hopf_points
-from ...reference.bifurcations.orbit_branch import OrbitBranch, follow_orbits
+from ...reference.bifurcations.orbit_branch import OrbitBranch
 from ...reference.bifurcations.orbit_events import OrbitEvent, find_events
 from ...reference.bifurcations.orbit_search import find_largest_orbit, orbits_of_amplitude
 from ...reference.bifurcations.orbits import PeriodicOrbit
 from ...reference.bifurcations.ridden import explain_orbit
 from ...reference.bifurcations.small_orbits import flow_near
-from ...reference.bifurcations.stable_within import BoundedCircle, bound_section
+from ...reference.bifurcations.stable_within import follow_branch
 from ...reference.families import Family, trace_all
 from ...reference.rideability import explain_motion
-from ...reference.sections import SectionEnd, stable_sections
-from ...reference.stability import VARIABLES
+from ...reference.sections import stable_sections
 from ...reference.surface import SurfaceOfRevolution
 from ..error import ScenarioError
 from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json
 from ..scenario import name_bicycle, name_surface
+from .bounds import BoundedSection, bound_stable_section
 from .families import check_inertia
 
 # Lean amplitudes of the orbits that are listed [rad]; a smaller branch has its largest orbit listed too.
 LISTED_AMPLITUDES = (0.001, 0.005, 0.02)
-# Round-off of a period, 1e-14, times this is the residual at which orbits count as solved, 1e-12 in units of 1.
-_LARGEST_GROWTH = 100.0
-# Branches are followed up to this lean [rad], to find the orbits that bound stable circles, and this number of orbits.
-_LARGEST_AMPLITUDE, _MOST_ORBITS = 0.1, 200
-_FIRST_AMPLITUDE = 2.5e-4  # at which the amplitude law is a good guess even next to a point where it degenerates [rad]
-_LONGEST_STEP = 0.025  # along a branch, so that drawn curves bend by some degrees from one orbit to the next
-_CIRCLES = 9  # examined in a stable section
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,36 +120,6 @@ def _describe_orbit(orbit: PeriodicOrbit) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class BoundedSection:
-    """A stable section of a family, and how far from its circles a bicycle may weave and come back.
-
-    Attributes
-    ----------
-    numbers : tuple of int
-        Of the families on the curve.
-    circles : tuple of BoundedCircle
-        Along the section.
-    why_not : str or None
-        Why no circles were examined.
-    """
-
-    numbers: tuple[int, ...]
-    circles: tuple[BoundedCircle, ...] = ()
-    why_not: str | None = None
-
-    def as_json(self) -> dict[str, Any]:
-        """Return this section's part of the document."""
-        columns = {name: VARIABLES.index(name) for name in ("rear_rate", "lean", "steer")}
-        return {
-            "family": self.numbers[0] if self.numbers else None,
-            **{name: [float(circle.state[k]) for circle in self.circles] for name, k in columns.items()},
-            "energy": [circle.energy for circle in self.circles],
-            "stable_within": [circle.stable_within for circle in self.circles],
-            "no_circles_because": self.why_not,
-        }
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Bifurcations:
     """The Hopf points of one bicycle on one ground.
 
@@ -184,7 +147,10 @@ class Bifurcations:
             **name_surface(self.surface),
             **name_bicycle(self.bicycle, bicycle_name),
             "hopf": [one.as_json() for one in self.found],
-            "stable_sections": [section.as_json() for section in self.sections],
+            "stable_sections": [
+                {"family": section.numbers[0] if section.numbers else None, **section.as_json()}
+                for section in self.sections
+            ],
             "absent": {str(number): reason for number, reason in self.absent.items()},
         }
 
@@ -231,7 +197,7 @@ def find_bifurcations(
         if found[-1].branch is not None:
             branches.setdefault(curves.index(curve), []).append(found[-1].branch)
     sections = [
-        _bound(curve, section, branches.get(k, []))
+        bound_stable_section(curve, section, branches.get(k, []), "no orbits are known on this curve")
         for k, curve in enumerate(curves)
         for section in stable_sections(curve)
     ]
@@ -242,29 +208,13 @@ def _examine(curve: Family, point: HopfPoint) -> Bifurcation:
     """Follow the orbits born at a Hopf point."""
     why = explain_motion(curve.equations.bicycle, curve.equations.surface, point.motion)
     found = Bifurcation(point=point, unphysical_because=why)
-    if point.amplitude_slope is None:
-        return replace(found, why_no_orbits=point.why_undefined)
-    if point.growth_in_period > _LARGEST_GROWTH:
-        why_not = f"a disturbance grows {point.growth_in_period:.3g} times in a period, too much for shooting"
-        return replace(found, why_no_orbits=why_not)
     try:
-        branch = follow_orbits(point, _LARGEST_AMPLITUDE, _FIRST_AMPLITUDE, _LONGEST_STEP, _MOST_ORBITS)
+        branch = follow_branch(point)
     except ValueError as error:
         return replace(found, why_no_orbits=str(error))
     flow = flow_near(point)
     orbits = [ListedOrbit(orbit=orbit, unphysical_because=explain_orbit(flow, orbit)) for orbit in _list_orbits(branch)]
     return replace(found, orbits=tuple(orbits), events=tuple(find_events(branch)), branch=branch)
-
-
-def _bound(curve: Family, section: tuple[SectionEnd, SectionEnd], branches: Sequence[OrbitBranch]) -> BoundedSection:
-    """Find the orbits that bound the circles of a stable section."""
-    if not branches:
-        return BoundedSection(numbers=curve.numbers, why_not="no orbits are known on this curve")
-    try:
-        circles = bound_section(curve, section, branches, _CIRCLES)
-    except ValueError as error:
-        return BoundedSection(numbers=curve.numbers, why_not=str(error))
-    return BoundedSection(numbers=curve.numbers, circles=tuple(circles))
 
 
 def _list_orbits(branch: OrbitBranch) -> Sequence[PeriodicOrbit]:

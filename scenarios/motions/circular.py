@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from ...reference.bicycle import Bicycle
-from ...reference.circular import CircularMotion
+from ...reference.circular import CircularMotion, Steady
 from ...reference.contact import observe
 from ...reference.families import find_motion
 from ...reference.inputs import NO_INPUTS, Inputs
@@ -20,6 +20,9 @@ from ...reference.stability import growth_rate, linearise
 from ...reference.surface import SurfaceOfRevolution
 from ..error import ScenarioError
 from ..scenario import describe_missing_motion, name_bicycle, name_surface, show_value
+
+NOT_SEARCHED = "it was not searched for"
+_NOT_STABLE = "the motion is not Lyapunov stable"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,6 +57,11 @@ class CircularSolution:
         or the wheels overlap, each with how much. Empty if it can. Frames have no known shape and are not looked at.
     inputs : Inputs
         Inputs that are held in the motion.
+    stable_within : float or None
+        Half of the peak-to-peak of the lean of the unstable orbit that bounds the stable motion, of the same energy
+        [rad]; None where none is known, see `no_bound_because`.
+    no_bound_because : str or None
+        Why `stable_within` is None.
     """
 
     bicycle: Bicycle = field(repr=False)
@@ -69,6 +77,8 @@ class CircularSolution:
     wheel_friction: np.ndarray = field(repr=False)
     unphysical_because: tuple[str, ...]
     inputs: Inputs = NO_INPUTS
+    stable_within: float | None = None
+    no_bound_because: str | None = None
 
     @property
     def lyapunov_stable(self) -> bool:
@@ -91,6 +101,8 @@ class CircularSolution:
         rates = ", ".join(f"{name} {getattr(motion, name):.6g}" for name in ("rear_rate", "front_rate", "yaw_rate"))
         angles = ", ".join(f"{name} {getattr(motion, name):.6g}" for name in ("lean", "steer", "pitch"))
         stable = "Lyapunov stable" if self.lyapunov_stable else "not Lyapunov stable"
+        if self.stable_within is not None:
+            stable += f" within {self.stable_within:.6g} rad of lean"
         ground = name_surface(self.surface)
         where = f"alpha {ground['alpha']:g} 1/m" if ground["alpha"] is not None else show_value(repr(self.surface))
         kind = "straight" if motion.is_straight else f"family {self.family}"
@@ -131,6 +143,8 @@ class CircularSolution:
             "eigenvalues": [[value.real, value.imag] for value in self.eigenvalues.tolist()],
             "jacobian": self.jacobian.tolist(),
             "lyapunov_stable": self.lyapunov_stable,
+            "stable_within": self.stable_within,
+            "no_bound_because": self.no_bound_because,
             "physical": self.physical,
             "unphysical_because": list(self.unphysical_because),
             "required_friction": self.required_friction,
@@ -185,6 +199,7 @@ def solve_circular(
         raise ScenarioError(str(error)) from error
     contact = observe(bicycle, surface, q[None], qd[None])
     rideability = assess_state(bicycle, surface, q, motion.contact, motion.force)
+    growth = growth_rate(surface, reduced.eigenvalues, float(qd[YAW]))
     return CircularSolution(
         bicycle=bicycle,
         motion=motion,
@@ -195,11 +210,33 @@ def solve_circular(
         energy=float(contact.kinetic_energy[0] + contact.potential_energy[0]),
         eigenvalues=reduced.eigenvalues,
         jacobian=reduced.jacobian,
-        growth_rate=growth_rate(surface, reduced.eigenvalues, float(qd[YAW])),
+        growth_rate=growth,
+        no_bound_because=NOT_SEARCHED if growth < 0 else _NOT_STABLE,
         inputs=inputs,
         wheel_friction=rideability.friction[0],
         unphysical_because=explain_motion(bicycle, surface, motion),
     )
+
+
+def search_bound(solution: CircularSolution) -> CircularSolution:
+    """Search for the unstable orbit that bounds a stable motion; this takes some seconds.
+
+    Parameters
+    ----------
+    solution : CircularSolution
+        As `solve_circular` returns it.
+
+    Returns
+    -------
+    CircularSolution
+        With `stable_within`, or the reason why it is not known; unchanged if the motion is not stable.
+    """
+    if not solution.lyapunov_stable:
+        return solution
+    from ...reference.bifurcations.stable_within import bound_circle  # one motion alone does not need orbits
+
+    found = bound_circle(Steady(solution.bicycle, solution.surface, solution.inputs), solution.motion)
+    return replace(solution, stable_within=found.stable_within, no_bound_because=found.why_not)
 
 
 def _split_by_wheel(pair: np.ndarray) -> dict[str, Any]:

@@ -30,6 +30,8 @@ from ..scenario import describe_missing_motion, find_unit, make_bowl, name_bicyc
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from .bounds import BoundedSection
+
 # Longest step along the arc: 100 to 300 points per family. No known stable section is shorter than three steps.
 LONGEST_DRAWN_STEP = 0.05
 MERGING = "merging"  # stage of the search for critical shapes whose progress is an alpha [1/m]
@@ -60,6 +62,9 @@ class FamilyCurve:
         For each of these sections, the ends of its parts that can be ridden.
     special_points : tuple of SpecialPoint
         Points with a letter in the paper, folds, cusps and extremes of the energy.
+    bounds : tuple of BoundedSection, or None
+        For each stable section, how far from its circles a bicycle may weave and come back; None where that was not
+        searched for.
     """
 
     numbers: tuple[int, ...]
@@ -71,6 +76,7 @@ class FamilyCurve:
     stable_sections: tuple[tuple[SectionEnd, SectionEnd], ...] = field(repr=False)
     stable_parts: tuple[tuple[tuple[PartEnd, PartEnd], ...], ...] = field(repr=False)
     special_points: tuple[SpecialPoint, ...] = field(repr=False)
+    bounds: tuple[BoundedSection, ...] | None = field(default=None, repr=False)
 
     @property
     def number(self) -> int | None:
@@ -96,8 +102,13 @@ class FamilyCurve:
             "points": self._list_points(),
             "rideable_parts": [_describe_ends(*ends) for ends in self.rideable_parts],
             "stable_sections": [
-                _describe_section(*ends, parts=parts)
-                for ends, parts in zip(self.stable_sections, self.stable_parts, strict=True)
+                _describe_section(*ends, parts=parts) | {"within": None if bound is None else bound.as_json()}
+                for ends, parts, bound in zip(
+                    self.stable_sections,
+                    self.stable_parts,
+                    self.bounds or [None] * len(self.stable_sections),
+                    strict=True,
+                )
             ],
             "special_points": {
                 point.name: {
@@ -225,6 +236,7 @@ def follow_families(
     surface: SurfaceOfRevolution,
     inputs: Inputs = NO_INPUTS,
     watch: Callable[[int, int], None] = lambda *_: None,
+    within: bool = False,
 ) -> SolutionFamilies:
     """Follow every curve of the four families on a ground, with special points and stable sections.
 
@@ -236,6 +248,8 @@ def follow_families(
         Held constant.
     watch : callable
         Called with the number of curves that have been examined, and that of all.
+    within : bool
+        Search for the orbits that bound stable circles, too; this takes some seconds for each stable section.
 
     Returns
     -------
@@ -256,7 +270,7 @@ def follow_families(
     examined: list[FamilyCurve] = []
     for curve in curves:
         watch(len(examined), len(curves))
-        examined.append(examine_curve(curve))
+        examined.append(examine_curve(curve, within))
     return SolutionFamilies(bicycle=bicycle, surface=surface, curves=tuple(examined), absent=absent, inputs=inputs)
 
 
@@ -268,9 +282,14 @@ def check_inertia(bicycle: Bicycle) -> None:
         raise ScenarioError(f"bicycle: {error}") from error
 
 
-def examine_curve(family: Family) -> FamilyCurve:
-    """Sample a curve and find its special points, its stable sections and what of them can be ridden."""
+def examine_curve(family: Family, within: bool = False) -> FamilyCurve:
+    """Sample a curve and find its special points, its stable sections, what of them can be ridden, and their bounds."""
     sections = stable_sections(family)
+    bounds: tuple[BoundedSection, ...] | None = None
+    if within:
+        from .bounds import bound_stable_sections  # without, families need no orbits
+
+        bounds = bound_stable_sections(family, sections)
     return FamilyCurve(
         numbers=family.numbers,
         ends=family.ends,
@@ -281,6 +300,7 @@ def examine_curve(family: Family) -> FamilyCurve:
         stable_sections=tuple(sections),
         stable_parts=tuple(tuple(find_rideable_parts_of_section(family, ends)) for ends in sections),
         special_points=tuple(special_points(family)),
+        bounds=bounds,
     )
 
 

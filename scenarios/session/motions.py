@@ -14,6 +14,7 @@ from ..motions import (
     SolutionFamilies,
     find_critical_shapes,
     follow_families,
+    search_bound,
     solve_circular,
 )
 from ..scenario import make_bowl
@@ -37,6 +38,7 @@ def circular(
     near: tuple[float, float] | None = None,
     bicycle: Bicycle | str | Path | None = None,
     inputs: Inputs | None = None,
+    within: bool = False,
 ) -> CircularSolution:
     """Compute one circular motion, hands-free or with constant inputs, its contact forces and its stability.
 
@@ -58,6 +60,8 @@ def circular(
     inputs : Inputs, optional
         Torques and steer damping that are held; none if not given. With a steer torque the families have no numbers,
         and ``near`` is needed.
+    within : bool
+        Search for the unstable orbit that bounds a stable motion, too; this takes some seconds.
 
     Returns
     -------
@@ -83,7 +87,8 @@ def circular(
     ground = make_bowl(read_ground(alpha, surface))
     rate = read_number("rear_rate", rear_rate, "rad/s")
     made = read_bicycle(bicycle)
-    return solve_circular(made, ground, rate, read_family(family), read_near(near), read_inputs(inputs))
+    found = solve_circular(made, ground, rate, read_family(family), read_near(near), read_inputs(inputs))
+    return search_bound(found) if within else found
 
 
 def families(
@@ -92,6 +97,7 @@ def families(
     surface: Surface | str | None = None,
     bicycle: Bicycle | str | Path | None = None,
     inputs: Inputs | None = None,
+    within: bool = False,
 ) -> SolutionFamilies:
     """Follow the four families of circular motions, with special points and stable sections.
 
@@ -105,6 +111,8 @@ def families(
         A bicycle, or a bicycle file as `velodrome bicycle` reads it; the benchmark bicycle if not given.
     inputs : Inputs, optional
         Torques and steer damping that are held; none if not given. With a steer torque no curve has a number.
+    within : bool
+        Search for the unstable orbits that bound stable circles, too; this takes some seconds for each stable section.
 
     Returns
     -------
@@ -125,7 +133,8 @@ def families(
     >>> found.curves[1].samples.lean.shape == found.curves[1].samples.rear_rate.shape
     True
     """
-    return follow_families(read_bicycle(bicycle), make_bowl(read_ground(alpha, surface)), read_inputs(inputs))
+    ground, held = make_bowl(read_ground(alpha, surface)), read_inputs(inputs)
+    return follow_families(read_bicycle(bicycle), ground, held, within=within)
 
 
 def critical(

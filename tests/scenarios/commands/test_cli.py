@@ -28,7 +28,7 @@ from velodrome.reference.bicycle import Bicycle
 from velodrome.reference.families import find_motion
 from velodrome.reference.surface import Paraboloid
 from velodrome.scenarios import cli, gate
-from velodrome.scenarios.commands.present_motions import show_families
+from velodrome.scenarios.commands.present_motions import show_circular, show_families
 from velodrome.scenarios.gate.verdict import Verdict, missing_verdict
 from velodrome.scenarios.run import runner
 from velodrome.scenarios.scenario.schema import library_names
@@ -69,7 +69,7 @@ def test_list_says_which_engines_do_not_ride_with_the_installed_release(
 CIRCULAR_FIELDS = {
     *("alpha", "family", "inputs", "rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "position"),
     *("contact_point", "contact_force", "normal_force", "energy", "residual", "eigenvalues", "jacobian"),
-    *("lyapunov_stable", "physical", "unphysical_because", "required_friction"),
+    *("lyapunov_stable", "stable_within", "no_bound_because", "physical", "unphysical_because", "required_friction"),
 }
 
 
@@ -131,10 +131,27 @@ def test_circular_tells_people_the_same(velodrome) -> None:
     for words in (
         "0.737443",
         "-12.2844",
-        "Lyapunov stable",
+        "Lyapunov stable: small disturbances die out; --within finds how large they may be",
         "it can be ridden: rolling needs a coefficient of friction of 0.9592",
     ):
         assert words in result.stdout
+
+
+def test_circular_says_within_what_it_is_stable(velodrome) -> None:
+    """A circle of family 4; `tests/reference/bifurcations` compares it with its section's."""
+    where = ("--alpha", "0.005", "--rear-rate", "11.103300308685844", "--near", "0.4789,2.6150", "--within")
+    found = velodrome("circular", *where, "--json").json()
+    assert found["family"] == 4
+    assert found["stable_within"] == pytest.approx(0.00397302, rel=1e-6)
+    assert found["no_bound_because"] is None
+    words = io.StringIO()
+    show_circular(Console(file=words, width=120), found)
+    assert "Lyapunov stable, within 0.003973 rad (0.228 deg) of lean" in words.getvalue()
+
+
+def test_an_unstable_circle_has_no_bound(velodrome) -> None:
+    found = velodrome("circular", *Q2, "--family", "1", "--within", "--json").json()
+    assert (found["stable_within"], found["no_bound_because"]) == (None, "the motion is not Lyapunov stable")
 
 
 SHORT = ("--duration", "0.1", "--engine", "mujoco-native", "--out", "out")
@@ -471,6 +488,19 @@ def test_families_is_one_document_with_every_family(velodrome, tmp_path: Path) -
     table = console.file.getvalue()
     assert all(f"family {number}: " in table for number in (1, 2, 3, 4))
     assert "Lyapunov stable: rear rate 15.276263732 rad/s (hopf) to 19.314284863 rad/s (hopf)" in table
+
+
+@pytest.mark.slow
+def test_families_say_within_what_their_circles_are_stable(velodrome) -> None:
+    families = velodrome("families", "--alpha", "0.005", "--within", "--json").json()["families"]
+    bifurcations = velodrome("bifurcations", "--alpha", "0.005", "--json").json()["stable_sections"]
+    known = {section.pop("family"): section for section in bifurcations}
+    assert set(known) == {2, 4}
+    for family in families:
+        for section in family["stable_sections"]:
+            for name, values in section["within"].items():
+                assert values == pytest.approx(known[family["family"]][name], abs=1e-9), name
+    assert [len(family["stable_sections"]) for family in families] == [0, 1, 0, 1]
 
 
 def test_families_refuses_a_shape_that_is_none(velodrome, tmp_path: Path) -> None:
