@@ -9,19 +9,29 @@ import numpy as np
 
 from .anchors import ANCHORS, Anchor, anchor, next_anchor
 from .bicycle import Bicycle
+from .bifurcations.bautin import BautinPoint, changes_criticality, solve_bautin
+from .bifurcations.hopf import HopfPoint, examine_end
 from .circular import Steady
 from .critical import CriticalPoint, reconnections, vanishing_between
 from .curve import Samples
-from .families import FAMILIES, trace_from
+from .families import FAMILIES, Family, trace, trace_from
 from .rideability import Rideability
 from .rideable_parts import assess_family
 from .sections import SectionEnd, sample_family, stable_sections
 from .surface import Paraboloid
 
 ATLAS_SIZE = 400_000
+SIDES = ("start", "end")  # of a stable section, in the order of the family's points
 _CROWDED = 0.04  # the last stable section vanishes at 0.033, the cusps meet at 0.017
+# Distances in alpha from the point where a section vanishes, of that from the last shape before it, at which the
+# criticality of its ends is looked at.
+_LEFT = (0.1, 1e-2, 1e-3, 1e-4)
 _ARC = 38.0  # arclength of all four families together, a mean over alpha
 _LONGEST_STEP = 0.05  # of the arc: every known section is long enough to be found with this step
+
+Section = tuple[SectionEnd, SectionEnd]
+HopfPair = tuple[HopfPoint | None, HopfPoint | None]
+Ends = tuple[float, list[HopfPair]]  # a shape [1/m], and the Hopf points at the ends of a family's stable sections
 
 
 @dataclass(frozen=True)
@@ -41,6 +51,8 @@ class AtlasCurve:
         Whether the motions can be ridden, and what friction they need.
     sections : list of (SectionEnd, SectionEnd)
         Its stable sections, their ends solved to round-off.
+    hopf : list of (HopfPoint or None, HopfPoint or None)
+        Criticality and amplitude at their ends; None where an end is no Hopf point.
     """
 
     alpha: float
@@ -48,7 +60,8 @@ class AtlasCurve:
     ends: tuple[str, str]
     samples: Samples
     rideability: Rideability
-    sections: list[tuple[SectionEnd, SectionEnd]]
+    sections: list[Section]
+    hopf: list[HopfPair]
 
 
 @dataclass(frozen=True)
@@ -59,9 +72,13 @@ class Boundary:
     ----------
     family : int
     alpha : list of float
-        [1/m].
+        Those of the curves and, before the section vanishes, some between the last of these and that point [1/m].
     ends : list of (SectionEnd, SectionEnd)
         At each alpha, in the order of the family's points.
+    hopf : list of (HopfPoint or None, HopfPoint or None)
+        The same of `AtlasCurve.hopf`.
+    bautin : list of (str, BautinPoint)
+        Where an end changes its criticality: the side, of `SIDES`, and the degenerate Hopf point, by rising alpha.
     vanishing : CriticalPoint or None
         Where both ends meet and the section vanishes as alpha grows; None where it reaches the last alpha, and where
         the point is not solved.
@@ -69,7 +86,9 @@ class Boundary:
 
     family: int
     alpha: list[float]
-    ends: list[tuple[SectionEnd, SectionEnd]]
+    ends: list[Section]
+    hopf: list[HopfPair]
+    bautin: list[tuple[str, BautinPoint]]
     vanishing: CriticalPoint | None
 
 
@@ -192,7 +211,14 @@ def _compute_curve(
     family = trace_from(start, longest)
     seen = sample_family(family)
     sections = stable_sections(family, seen.growth_rate)
-    return AtlasCurve(alpha, number, family.ends, seen, assess_family(family), sections)
+    hopf = _examine_sections(family, sections)
+    return AtlasCurve(alpha, number, family.ends, seen, assess_family(family), sections, hopf)
+
+
+def _examine_sections(family: Family, sections: list[Section]) -> list[HopfPair]:
+    """Compute criticality and amplitude at the ends of stable sections, where they are Hopf points."""
+    found = [[examine_end(family, end) if end.cause == "hopf" else None for end in ends] for ends in sections]
+    return [(start, end) for start, end in found]
 
 
 def _carry_anchor(bicycle: Bicycle, alpha: float, number: int, known: tuple[float, np.ndarray] | None) -> Anchor:
@@ -213,23 +239,77 @@ def _follow_boundaries(
 ) -> list[Boundary]:
     """Follow the stable sections of a family, each from its first alpha to its last.
 
-    A point at which the last one vanishes, and which cannot be solved, is added to ``absent``.
+    A point at which the last one vanishes or an end changes its criticality, and which cannot be solved, is added to
+    ``absent``.
     """
     found: list[Boundary] = []
     current: list[Boundary] = []
     before = None
     for curve in (curve for curve in curves if curve.family == number):
-        if len(curve.sections) != len(current):
+        if before is None or len(curve.sections) != len(current):
             if before is not None and current and not curve.sections:
-                try:
-                    closing = vanishing_between(bicycle, number, before.alpha, curve.alpha)
-                    found[-1] = replace(found[-1], vanishing=closing)
-                except ValueError as error:
-                    absent.append(Absence(before.alpha, number, str(error)))
-            current = [Boundary(number, [], [], None) for _ in curve.sections]
+                found[-1] = _close_boundary(bicycle, current, before, curve.alpha, absent)
+            current = [Boundary(number, [], [], [], [], None) for _ in curve.sections]
             found += current
-        for boundary, ends in zip(current, curve.sections, strict=True):
-            boundary.alpha.append(curve.alpha)
-            boundary.ends.append(ends)
+        else:
+            _add_bautin_points(bicycle, current, (before.alpha, before.hopf), (curve.alpha, curve.hopf), absent)
+        _append_shape(current, curve.alpha, curve.sections, curve.hopf)
         before = curve
     return found
+
+
+def _append_shape(boundaries: list[Boundary], alpha: float, sections: list[Section], hopf: list[HopfPair]) -> None:
+    """Append the ends of a family's stable sections at one shape to their boundaries."""
+    for boundary, ends, points in zip(boundaries, sections, hopf, strict=True):
+        boundary.alpha.append(alpha)
+        boundary.ends.append(ends)
+        boundary.hopf.append(points)
+
+
+def _close_boundary(
+    bicycle: Bicycle, boundaries: list[Boundary], last: AtlasCurve, unstable: float, absent: list[Absence]
+) -> Boundary:
+    """Return the last of a family's boundaries with the point at which it vanishes.
+
+    That lies between the last alpha of the boundaries and an alpha without a stable section.
+    """
+    boundary, number = boundaries[-1], last.family
+    try:
+        closing = vanishing_between(bicycle, number, last.alpha, unstable)
+    except ValueError as error:
+        absent.append(Absence(last.alpha, number, str(error)))
+        return boundary
+    before: Ends = last.alpha, last.hopf
+    for left in _LEFT:
+        alpha = closing.alpha - left * (closing.alpha - last.alpha)
+        family = trace(bicycle, Paraboloid(alpha), number)
+        sections = stable_sections(family)
+        here: Ends = alpha, _examine_sections(family, sections)
+        _add_bautin_points(bicycle, boundaries, before, here, absent)
+        if len(sections) == len(boundaries):
+            _append_shape(boundaries, alpha, sections, here[1])
+        before = here
+        # Where the ends meet at a single pair of eigenvalues, their criticality is the same.
+        if closing.kind != "tangency" or not any(a and b and changes_criticality(a, b) for a, b in here[1]):
+            return replace(boundary, vanishing=closing)
+    why = f"the criticality of both ends is not the same up to alpha = {before[0]:.9g}, where they meet"
+    absent.append(Absence(last.alpha, number, why))
+    return replace(boundary, vanishing=closing)
+
+
+def _add_bautin_points(
+    bicycle: Bicycle, boundaries: list[Boundary], low: Ends, high: Ends, absent: list[Absence]
+) -> None:
+    """Solve for the degenerate Hopf points between two neighbouring shapes, and add them to their boundaries."""
+    sides = [[point for points in hopf for point in points] for _, hopf in (low, high)]
+    places = [[point is not None for point in side] for side in sides]
+    if places[0] != places[1]:  # what ends a section has changed, as next to the plane
+        return
+    for k, (before, after) in enumerate(zip(*sides, strict=True)):
+        if before is not None and after is not None and changes_criticality(before, after):
+            family, place = boundaries[0].family, sum(places[0][:k])
+            try:
+                solved = solve_bautin(bicycle, family, place, (low[0], before), (high[0], after))
+                boundaries[k // 2].bautin.append((SIDES[k % 2], solved))
+            except ValueError as error:
+                absent.append(Absence(low[0], family, str(error)))

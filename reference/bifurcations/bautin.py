@@ -17,8 +17,13 @@ from itertools import pairwise
 from ..bicycle import Bicycle
 from ..families import trace
 from ..roots import find_root
+from ..sections import stable_sections
 from ..surface import Paraboloid
-from .hopf import HopfPoint, section_hopf_points
+from .hopf import HopfPoint, examine_end, section_hopf_points
+
+# Coefficient at a root, relative to those between which it was searched for. Where it passes zero it is round-off of
+# 1e-11 or so there; where it jumps, as from one pair of eigenvalues to another, it stays of their order.
+_VANISHED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +60,11 @@ def find_bautin_points(bicycle: Bicycle, number: int, alphas: Sequence[float]) -
     -------
     list of BautinPoint
         In the order of alpha.
+
+    Raises
+    ------
+    ValueError
+        See `solve_bautin`.
     """
     found = []
     points = [section_hopf_points(trace(bicycle, Paraboloid(alpha), number)) for alpha in alphas]
@@ -69,17 +79,57 @@ def _find_between(
 ) -> Iterator[BautinPoint]:
     """Yield the points where coefficients of the same ends have opposite signs at two shapes of the bowl."""
     for k, (before, after) in enumerate(zip(low[1], high[1], strict=True)):
-        if _cubic(before) * _cubic(after) >= 0:
-            continue
-        known = {low[0]: before, high[0]: after}
+        if changes_criticality(before, after):
+            yield solve_bautin(bicycle, number, k, (low[0], before), (high[0], after))
 
-        def value(alpha: float, k: int = k, known: dict[float, HopfPoint] = known) -> float:
-            if alpha not in known:
-                known[alpha] = section_hopf_points(trace(bicycle, Paraboloid(alpha), number))[k]
-            return _cubic(known[alpha])
 
-        root = find_root(value, low[0], high[0], tolerance=1e-14)
-        yield BautinPoint(number, root, known[root])
+def changes_criticality(before: HopfPoint, after: HopfPoint) -> bool:
+    """Return whether the first Lyapunov coefficients of two Hopf points have opposite signs."""
+    return _cubic(before) * _cubic(after) < 0
+
+
+def solve_bautin(
+    bicycle: Bicycle, number: int, place: int, low: tuple[float, HopfPoint], high: tuple[float, HopfPoint]
+) -> BautinPoint:
+    """Solve for the degenerate Hopf point between two shapes of the bowl.
+
+    Parameters
+    ----------
+    bicycle : Bicycle
+    number : int
+        Of the family.
+    place : int
+        Index of the end among the Hopf points at the ends of the family's stable sections.
+    low, high : tuple of float and HopfPoint
+        Two shapes of the bowl [1/m] with this end, whose first Lyapunov coefficients have opposite signs.
+
+    Returns
+    -------
+    BautinPoint
+
+    Raises
+    ------
+    ValueError
+        If the end is lost between the two, or the coefficient changes its sign without being zero.
+    """
+    known = dict([low, high])
+
+    def value(alpha: float) -> float:
+        if alpha not in known:
+            family = trace(bicycle, Paraboloid(alpha), number)
+            ends = [end for ends in stable_sections(family) for end in ends if end.cause == "hopf"]
+            if place >= len(ends):
+                raise ValueError(f"a stable section of family {number} is lost at alpha = {alpha:.6g}")
+            known[alpha] = examine_end(family, ends[place])
+        return _cubic(known[alpha])
+
+    root = find_root(value, low[0], high[0], tolerance=1e-14)
+    if abs(value(root)) > _VANISHED * max(abs(_cubic(low[1])), abs(_cubic(high[1]))):
+        raise ValueError(
+            f"the first Lyapunov coefficient changes its sign at alpha = {root:.9g} without being zero: it has a pole, "
+            "or another pair of eigenvalues crosses beyond"
+        )
+    return BautinPoint(number, root, known[root])
 
 
 def _cubic(point: HopfPoint) -> float:

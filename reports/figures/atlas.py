@@ -19,6 +19,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from ...reference.families import FAMILIES
+from ..drawing.atlas_sides import KIND_LABELS, list_kinds
 from .labels import Badge, Label, name_other_bicycle, place_labels
 from .style import FAMILY_COLOURS, INK, WIDTHS, new_figure
 
@@ -33,8 +34,15 @@ _NORM = LogNorm(_SLOW, _FAST)
 _COLOURS = ListedColormap(colormaps["YlOrRd"](np.linspace(0.04, 0.82, 256)))
 _ABSENT_HATCH, _STABLE_HATCH, _UNRIDDEN_HATCH = "xxxx", "....", "////"
 _ABSENT_INK = "#a0a0a0"
-_CAUSE_LINES = {"hopf": "-", "energy": ":", "end": "--"}
-_CAUSE_LABELS = {"hopf": "a complex pair crosses (Hopf)", "energy": "the energy is extreme", "end": "the family ends"}
+# Of what ends stability, `velodrome.reports.drawing.atlas_sides.list_kinds`. Subcritical branches are dashed.
+_KIND_LINES: dict[str, Any] = {
+    "supercritical": "-",
+    "subcritical": (0, (4, 1.6)),
+    "hopf": "-.",
+    "energy": ":",
+    "end": (0, (6, 1.5, 1, 1.5, 1, 1.5)),
+}
+_BAUTIN: dict[str, Any] = {"marker": "o", "ls": "", "mfc": "white", "mec": INK, "mew": 0.9, "ms": 5}
 _ABSENT = "the family has no such motion"
 _NOT_RIDDEN = "cannot be ridden: contact lost, or a rim inside the ground"
 _TICKS = (0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
@@ -85,7 +93,7 @@ def growth_figure(columns: Columns, document: Mapping[str, Any], width: int = 2)
 def _add_legend(figure: Figure, handles: Sequence[Any], width: int, count: int) -> None:
     """Add a legend below all axes, with a number of columns, or with one where the figure is narrow."""
     for handle in handles:
-        handle.set_label(fill(handle.get_label(), 70 if width == 2 else 52))
+        handle.set_label(fill(handle.get_label(), 120 // count if width == 2 else 52))
     figure.legend(handles=handles, loc="outside lower center", ncols=count if width == 2 else 1)
 
 
@@ -216,26 +224,33 @@ def _set_root_scale(axes: Axes, largest: float) -> None:
     axes.xaxis.set_minor_locator(NullLocator())
 
 
-def _split_by_cause(boundary: Mapping[str, Any], side: str, name: str) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield one side of a region as lines of one cause each, up to the point where it vanishes: (cause, (n, 2))."""
+def _split_by_kind(boundary: Mapping[str, Any], side: str, name: str) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield one side of a region as lines of one kind of end each, up to the point where it vanishes: (kind, (n, 2)).
+
+    Lines of different criticality meet in the degenerate Hopf point between them.
+    """
     line = list(zip(boundary["alpha"], boundary[side][name], strict=True))
-    causes = list(boundary[side]["cause"])
+    kinds = list_kinds(boundary[side])
+    turns = [(point["alpha"], point[name]) for point in boundary["bautin"] if point["side"] == side]
     if boundary["vanishing"] is not None:
         line.append((boundary["vanishing"]["alpha"], boundary["vanishing"][name]))
-        causes.append(causes[-1])
-    starts = [0, *(i for i in range(1, len(causes)) if causes[i] != causes[i - 1]), len(causes)]
+        kinds.append(kinds[-1])
+    starts = [0, *(i for i in range(1, len(kinds)) if kinds[i] != kinds[i - 1]), len(kinds)]
     for start, stop in pairwise(starts):
-        yield causes[start], np.array(line[start:stop])
+        first, last = line[max(start - 1, 0)][0], line[min(stop, len(line) - 1)][0]
+        yield kinds[start], np.array(sorted([*line[start:stop], *(turn for turn in turns if first <= turn[0] <= last)]))
 
 
 def _draw_sides(axes: Axes, boundary: Mapping[str, Any], name: str, colour: str, width: float) -> None:
-    """Draw both sides of a region; a cause that applies at a single alpha, as on the plane, is a mark."""
+    """Draw both sides of a region; what ends it at a single alpha, as on the plane, is a mark."""
     for side in ("start", "end"):
-        for cause, line in _split_by_cause(boundary, side, name):
+        for kind, line in _split_by_kind(boundary, side, name):
             if len(line) == 1:
                 axes.plot(*line.T, "s", color="white", mec=colour, mew=width, ms=4, clip_on=False, zorder=6)
             else:
-                axes.plot(*line.T, color=colour, lw=width, ls=_CAUSE_LINES[cause])
+                axes.plot(*line.T, color=colour, lw=width, ls=_KIND_LINES[kind], gid=f"{side}: {kind}")
+    for point in boundary["bautin"]:
+        axes.plot(point["alpha"], point[name], **_BAUTIN, zorder=6, gid="Bautin point")
 
 
 def _draw_boundaries(axes: Axes, document: Mapping[str, Any], family: int) -> None:
@@ -271,7 +286,7 @@ def _growth_legend(document: Mapping[str, Any]) -> Iterator[Any]:
     yield Patch(facecolor=STABLE, edgecolor="white", lw=0, hatch=_STABLE_HATCH, label="stable")
     yield Patch(facecolor="white", edgecolor=_ABSENT_INK, lw=0, hatch=_ABSENT_HATCH, label=_ABSENT)
     yield Patch(facecolor="white", edgecolor=INK, lw=0.6, hatch=_UNRIDDEN_HATCH, label=_NOT_RIDDEN)
-    yield from _cause_legend(document)
+    yield from _kind_legend(document)
     yield Line2D([], [], ls="", marker="*", color=INK, ms=8, label="the stable section vanishes")
     yield Line2D([], [], ls="", marker="D", color="white", mec=INK, ms=5, label="two curves touch and exchange parts")
 
@@ -310,22 +325,26 @@ def _stable_legend(columns: Columns, document: Mapping[str, Any]) -> Iterator[An
     for boundary in document["stable"]:
         colour = FAMILY_COLOURS[boundary["family"]]
         yield Patch(facecolor=colour, alpha=0.4, label=f"family {boundary['family']}")
-    yield from _cause_legend(document)
+    yield from _kind_legend(document)
     if np.any(columns["stable"] & ~columns["physical"]):
         yield Patch(facecolor="white", edgecolor=INK, lw=0.6, hatch=_UNRIDDEN_HATCH, label=_NOT_RIDDEN)
     yield Line2D([], [], ls="", marker="*", color=INK, ms=9, label="the stable section vanishes")
 
 
-def _cause_legend(document: Mapping[str, Any]) -> Iterator[Any]:
+def _kind_legend(document: Mapping[str, Any]) -> Iterator[Any]:
     """Yield legend entries for what ends a section, along a line or at a single alpha."""
     pieces = [
-        (cause, len(line))
+        (kind, len(line))
         for boundary in document["stable"]
         for side in ("start", "end")
-        for cause, line in _split_by_cause(boundary, side, "lean")
+        for kind, line in _split_by_kind(boundary, side, "lean")
     ]
-    for cause in sorted({cause for cause, length in pieces if length > 1}):
-        yield Line2D([], [], color=INK, ls=_CAUSE_LINES[cause], label=f"end of stability: {_CAUSE_LABELS[cause]}")
-    for cause in sorted({cause for cause, length in pieces if length == 1}):
-        mark: dict[str, Any] = {"marker": "s", "color": "white", "mec": INK, "ms": 4, "ls": ""}
-        yield Line2D([], [], **mark, label=f"on the plane alone: {_CAUSE_LABELS[cause]}")
+    for kind in _KIND_LINES:
+        if any(one == kind and length > 1 for one, length in pieces):
+            yield Line2D([], [], color=INK, ls=_KIND_LINES[kind], label=f"end of stability: {KIND_LABELS[kind]}")
+    if any(boundary["bautin"] for boundary in document["stable"]):
+        yield Line2D([], [], **_BAUTIN, label="its criticality changes (Bautin point)")
+    for kind in _KIND_LINES:
+        if any(one == kind and length == 1 for one, length in pieces):
+            mark: dict[str, Any] = {"marker": "s", "color": "white", "mec": INK, "ms": 4, "ls": ""}
+            yield Line2D([], [], **mark, label=f"on the plane alone: {KIND_LABELS[kind]}")

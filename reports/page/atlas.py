@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..drawing.atlas_sides import describe_kinds
 from .curve_chart import draw_plane
 from .document import list_engine_styles, render_page
 from .tables import PageTable, TableColumn
@@ -43,6 +44,12 @@ def make_atlas_page(document: Mapping[str, Any], libraries: Mapping[str, str]) -
         table=_make_table(regions, document["alphas"][-1]),
         remarks=[
             *document["warnings"],
+            *(
+                f"{name}: the {point['side']} of its stable sections changes its criticality at alpha "
+                f"{point['alpha']:.6g} 1/m, rear rate {point['rear_rate']:.6g} rad/s (Bautin point)"
+                for name, region in regions.items()
+                for point in region["bautin"]
+            ),
             *(
                 f"families {' and '.join(map(str, point['families']))} touch at alpha {point['alpha']:.6g} 1/m, "
                 f"rear rate {point['rear_rate']:.6g} rad/s"
@@ -89,6 +96,8 @@ def _draw(regions: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
         outline = np.array([*sides[0], *tip, *reversed(sides[1])])
         curves[name] = (outline[:, 0], outline[:, 1])
         spots += [(name, alpha, rate, f"the last stable motion of {name}") for alpha, rate in tip]
+        turns = [(point["alpha"], point["rear_rate"]) for point in region["bautin"]]
+        spots += [(name, alpha, rate, f"Bautin point of {name}") for alpha, rate in turns]
     return draw_plane(curves, list(regions), spots=spots)
 
 
@@ -96,7 +105,8 @@ def _make_table(regions: Mapping[str, Mapping[str, Any]], largest: float) -> Pag
     rows = list(regions.values())
     ends = [row["vanishing"] for row in rows]
     return PageTable(
-        caption="Stable regions; at both sides of a region stands what ends it in the first bowl.",
+        caption="Stable regions; for both sides of a region stands what ends it, from the first bowl on: a Hopf point "
+        "by its criticality, if that is defined.",
         head="family",
         names=list(regions),
         columns=[
@@ -105,8 +115,9 @@ def _make_table(regions: Mapping[str, Mapping[str, Any]], largest: float) -> Pag
             TableColumn(
                 "where, rear rate", "rad/s", ["–" if end is None else f"{end['rear_rate']:.6f}" for end in ends]
             ),
-            TableColumn(
-                "ends by", "", [f"{row['start']['cause'][0]}, {row['end']['cause'][0]}" for row in rows], words=True
+            *(
+                TableColumn(f"{side} of sections", "", [describe_kinds(row[side]) for row in rows], words=True)
+                for side in ("start", "end")
             ),
         ],
     )

@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ...reference.stability import are_zero
+from ...reports.drawing.atlas_sides import describe_kinds
 from ..motions import NOT_SEARCHED
 from ..scenario import BENCHMARK
 from .tables import Column, print_table
@@ -253,11 +254,22 @@ def show_atlas(console: Console, document: Mapping[str, Any], out: Path) -> None
     ]
     if regions:
         print_table(console, columns)
+        for region in regions:
+            _show_sides(console, region)
     else:
         console.print("no family has a stable motion", markup=False)
     _show_not_found(console, _sum_up_absences(document))
     _show_unnumbered_remark(console, document)
     print_line(console, f"{document['motions']} motions in {out}")
+
+
+def _show_sides(console: Console, region: Mapping[str, Any]) -> None:
+    """Print what ends the stable sections of a region as alpha grows, and where that changes its criticality."""
+    for side in ("start", "end"):
+        words = f"family {region['family']}, {side} of stable sections: {describe_kinds(region[side])}"
+        turns = [point for point in region["bautin"] if point["side"] == side]
+        places = [f"alpha {point['alpha']:.12f}, rear rate {point['rear_rate']:.6f} rad/s" for point in turns]
+        print_words(console, "\n  Bautin point at ".join([words, *places]))
 
 
 def _format_end(region: Mapping[str, Any], largest: float) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -10,8 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ...reference.atlas import ATLAS_SIZE, Atlas, Boundary, compute_atlas, spacing
+from ...reference.atlas import ATLAS_SIZE, SIDES, Atlas, Boundary, compute_atlas, spacing
+from ...reference.bifurcations.bautin import BautinPoint
+from ...reference.bifurcations.hopf import HopfPoint
 from ...reference.rideability import OBSTACLES
+from ...reference.sections import SectionEnd
 from ...reference.stability import VARIABLES
 from ..error import MissingMotionError, ScenarioError
 from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json, write_text
@@ -33,6 +36,11 @@ UNITS = {
     "normal_force_front": "N",
     "growth_rate": "1/s",
     "required_friction": "1",
+}
+_PLACE = ("rear_rate", "front_rate", "lean", "steer")
+_NO_HOPF = {
+    "energy": "a real eigenvalue is zero, as the energy is extreme along the family",
+    "end": "the family ends there, and no eigenvalue is zero or imaginary",
 }
 _SAMPLED = ("rear_rate", "front_rate", "yaw_rate", "lean", "steer", "pitch", "radius", "energy", "growth_rate")
 
@@ -160,17 +168,37 @@ def atlas_document(found: Atlas, bicycle_name: str | None = None) -> dict[str, A
 
 
 def _describe_boundary(boundary: Boundary) -> dict[str, Any]:
-    sides = zip(("start", "end"), zip(*boundary.ends, strict=True), strict=True)
+    ends, points = (zip(*both, strict=True) for both in (boundary.ends, boundary.hopf))
     return {
         "family": boundary.family,
         "alpha": boundary.alpha,
-        **{name: dict(_describe_side(list(ends))) for name, ends in sides},
+        **{name: _describe_side(*side) for name, *side in zip(SIDES, ends, points, strict=True)},
+        "bautin": [{"side": side} | _describe_bautin(point) for side, point in boundary.bautin],
         "vanishing": None if boundary.vanishing is None else critical_entry(boundary.vanishing),
     }
 
 
-def _describe_side(ends: list[Any]) -> Iterator[tuple[str, list[Any]]]:
-    for name in ("rear_rate", "front_rate", "lean", "steer"):
-        yield name, [getattr(end.motion, name) for end in ends]
-    yield "cause", [end.cause for end in ends]
-    yield "eigenvalue", [[end.eigenvalue.real, end.eigenvalue.imag] for end in ends]
+def _describe_side(ends: Sequence[SectionEnd], points: Sequence[HopfPoint | None]) -> dict[str, list[Any]]:
+    """Return one side of a stable region over alpha, as lists of equal length."""
+    hopf = ("criticality", "first_lyapunov_coefficient", "amplitude_slope", "amplitude_slope_error")
+    return {
+        **{name: [getattr(end.motion, name) for end in ends] for name in _PLACE},
+        "cause": [end.cause for end in ends],
+        "eigenvalue": [[end.eigenvalue.real, end.eigenvalue.imag] for end in ends],
+        **{name: [None if point is None else getattr(point, name) for point in points] for name in hopf},
+        "undefined_because": [
+            _NO_HOPF[end.cause] if point is None else point.why_undefined
+            for end, point in zip(ends, points, strict=True)
+        ],
+    }
+
+
+def _describe_bautin(found: BautinPoint) -> dict[str, Any]:
+    """Return the entry of a degenerate Hopf point."""
+    point = found.point
+    return {
+        "alpha": found.alpha,
+        **{name: getattr(point.motion, name) for name in _PLACE},
+        "energy": point.energy,
+        "frequency": point.frequency,
+    }

@@ -85,14 +85,55 @@ def test_on_the_plane_one_end_is_an_energy_extremum_and_in_a_bowl_none_is() -> N
 def test_boundaries_end_in_the_critical_points() -> None:
     for family, last in ((2, 0.0333), (4, 0.009)):
         found = boundary(family)
-        assert found.alpha[-1] == last
         vanishing = found.vanishing
         assert vanishing is not None
         (following,) = (alpha for i, alpha in enumerate(ALPHAS) if ALPHAS[i - 1] == last)
         assert last < vanishing.alpha < following
-        # Both ends close in on it like the root of the distance in alpha.
-        start, end = found.ends[-1]
-        assert min(start.motion.lean, end.motion.lean) < vanishing.motion.lean < max(start.motion.lean, end.motion.lean)
+        # Both ends close in on it like the root of the distance in alpha, from the last of the curves on.
+        first = found.alpha.index(last)
+        assert first < len(found.alpha) - 1
+        widths = []
+        for alpha, (start, end) in list(zip(found.alpha, found.ends, strict=True))[first:]:
+            low, high = sorted([start.motion.lean, end.motion.lean])
+            assert low < vanishing.motion.lean < high
+            widths.append((high - low) / np.sqrt(vanishing.alpha - alpha))
+        assert max(widths) < 1.1 * min(widths)
+
+
+def test_every_end_in_a_bowl_has_a_criticality_and_on_the_plane_none_has() -> None:
+    for family in (2, 4):
+        on_plane, *in_bowls = boundary(family).hopf
+        assert on_plane[0] is None, "the energy is extreme there"
+        assert on_plane[1] is not None
+        assert "centre is free" in (on_plane[1].why_undefined or "")
+        for point in (point for points in in_bowls for point in points):
+            assert point is not None
+            assert point.amplitude_slope is not None
+            assert point.amplitude_slope_error is not None
+            # Third derivatives have ten digits; the pair nearly touches the axis next to the end of a region.
+            assert point.amplitude_slope_error < 1e-7 * abs(point.amplitude_slope)
+
+
+@pytest.mark.parametrize(
+    ("family", "side", "alpha", "before", "after"),
+    [
+        (2, 0, 0.031055750472, ["subcritical", "supercritical"], ["supercritical", "supercritical"]),
+        (4, 1, 0.009106767627, ["subcritical", "supercritical"], ["subcritical", "subcritical"]),
+    ],
+)
+def test_an_end_changes_its_criticality_at_one_degenerate_point(
+    family: int, side: int, alpha: float, before: list[str], after: list[str]
+) -> None:
+    """That of family 4 lies between the last of these shapes and the one where both ends meet."""
+    found = boundary(family)
+    ((where, degenerate),) = found.bautin
+    assert where == ("start", "end")[side]
+    assert degenerate.alpha == pytest.approx(alpha, abs=1e-11)
+    for shape, points in list(zip(found.alpha, found.hopf, strict=True))[1:]:
+        kinds = [point.criticality for point in points if point is not None]
+        assert kinds == (before if shape < alpha else after)
+    assert found.vanishing is not None
+    assert alpha < found.vanishing.alpha
 
 
 def test_families_one_and_three_have_no_boundary() -> None:

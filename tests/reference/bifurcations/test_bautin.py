@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from velodrome.reference.bicycle import Bicycle
-from velodrome.reference.bifurcations.bautin import find_bautin_points
+from velodrome.reference.bifurcations.bautin import find_bautin_points, solve_bautin
 from velodrome.reference.bifurcations.hopf import section_hopf_points
 from velodrome.reference.bifurcations.small_orbits import small_orbits
 from velodrome.reference.families import trace
@@ -32,6 +32,14 @@ def test_degenerate_points_are_found_between_two_shapes(number: int, end: int, a
     assert found.alpha == pytest.approx(alpha, abs=1e-12)
     again = section_hopf_points(trace(Bicycle(), Paraboloid(found.alpha), number))[end]
     assert found.point.motion.lean == again.motion.lean
+
+
+def test_a_coefficient_that_jumps_is_no_degenerate_point() -> None:
+    """As if the other end of the section were that at the larger alpha."""
+    alpha = 0.005
+    slow, fast = section_hopf_points(trace(Bicycle(), Paraboloid(alpha), 2))
+    with pytest.raises(ValueError, match=r"changes its sign at alpha = 0\.005 without being zero"):
+        solve_bautin(Bicycle(), 2, 0, (alpha - 1e-11, slow), (alpha, fast))
 
 
 def test_no_point_is_found_where_the_sign_stays() -> None:

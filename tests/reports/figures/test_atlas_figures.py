@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from velodrome.reports.figures.atlas import sheet
+from tests.reports.figures.test_print import atlas_of_planes
+from velodrome.reports.figures.atlas import sheet, stable_figure
+from velodrome.reports.figures.style import use_style
 
 
 def test_where_a_curve_folds_the_least_growth_is_shown() -> None:
@@ -24,3 +26,16 @@ def test_where_a_curve_folds_the_least_growth_is_shown() -> None:
     assert np.array_equal(shown[:, 1], [np.nan, np.nan, 1.0, 2.5], equal_nan=True)
     assert pushed[:, 0].tolist() == [True, True, True, False]
     assert not pushed[:, 1].any()
+
+
+def test_lines_of_different_criticality_meet_in_the_degenerate_point() -> None:
+    with use_style():
+        axes = stable_figure(*atlas_of_planes()).axes[0]
+    lines = {line.get_gid(): (np.array(line.get_xdata()), line.get_linestyle()) for line in axes.lines}
+    (dashed, dashes), (solid, style) = lines["start: subcritical"], lines["start: supercritical"]
+    assert dashed.tolist() == [0.1, 0.4, 0.5]
+    assert solid.tolist() == [0.5, 0.7, 1.0, 1.0]
+    assert (dashes, style) == ("--", "-")
+    assert lines["Bautin point"][0].tolist() == [0.5]
+    # The other side has no such point: its lines end at the shapes between which the criticality changes.
+    assert lines["end: subcritical"][0].tolist() == [0.1, 0.4]

@@ -98,9 +98,11 @@ def atlas_of_planes() -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     }
 
     def side(at: float) -> dict[str, list[Any]]:
-        return {"rear_rate": [at] * 5, "lean": [at / 40] * 5, "cause": ["hopf"] * 5}
+        criticality = [None, *["subcritical"] * 2, *["supercritical"] * 2]
+        return {"rear_rate": [at] * 5, "lean": [at / 40] * 5, "cause": ["hopf"] * 5, "criticality": criticality}
 
-    section = {"family": 2, "alpha": list(alphas), "start": side(8.0), "end": side(12.0)}
+    turn = {"side": "start", "alpha": 0.5, "rear_rate": 8.0, "lean": 0.2}
+    section = {"family": 2, "alpha": list(alphas), "start": side(8.0), "end": side(12.0), "bautin": [turn]}
     end = {"alpha": 1.0, "rear_rate": 10.0, "lean": 0.25}
     touching = [{"alpha": 0.384, "rear_rate": 2.0, "families": [1, 3]}]
     document = {"alphas": list(alphas), "stable": [section | {"vanishing": end}], "touching": touching}

@@ -438,9 +438,17 @@ def test_curves_are_cut_at_gaps_and_at_the_box() -> None:
 
 def atlas_document() -> dict[str, Any]:
     def side(*rates: float) -> dict[str, Any]:
-        return {"rear_rate": list(rates), "cause": ["hopf", HOSTILE]}
+        return {"rear_rate": list(rates), "cause": ["hopf", HOSTILE], "criticality": ["subcritical", None]}
 
-    region = {"family": 2, "alpha": [0.0, 0.01], "start": side(15.0, 14.0), "end": side(20.0, 18.0), "vanishing": None}
+    turn = {"side": "start", "alpha": 0.0075, "rear_rate": 14.25}
+    region = {
+        "family": 2,
+        "bautin": [turn],
+        "alpha": [0.0, 0.01],
+        "start": side(15.0, 14.0),
+        "end": side(20.0, 18.0),
+        "vanishing": None,
+    }
     tip = {"alpha": 0.015, "rear_rate": 11.0}
     return {
         "bicycle": {"name": HOSTILE, "parameters": {}},
@@ -468,6 +476,12 @@ def test_an_atlas_page_tells_how_far_families_are_stable() -> None:
     assert "! families 2 and 4 touch at alpha 0.1 1/m, rear rate 3 rad/s" in said
     assert f"! family 1 was not followed in 2 of 3 bowls, alpha 0.01 to 0.02 1/m: {HOSTILE}" in said
     assert page.count('title="the last stable motion of family 4"') == 1
+    assert page.count('title="Bautin point of family 2"') == 1
+    assert (
+        "! family 2: the start of its stable sections changes its criticality at alpha 0.0075 1/m, rear rate 14.25 "
+        "rad/s (Bautin point)"
+    ) in said
+    assert f"subcritical Hopf point; then {HOSTILE}" in [text for _, text in parsed.all("td")]
     twice = atlas_document()
     twice["stable"].append(twice["stable"][1])
     names = [text for _, text in Parsed(make_atlas_page(twice, MACHINE["libraries"])).all("th")]

@@ -55,6 +55,16 @@ def test_an_atlas_is_written_whole(tmp_path: Path) -> None:
             inside = values["stable"] & (values["family"] == boundary["family"]) & (values["alpha"] == alpha)
             assert np.all(np.diff(values["index"][inside]) == 1)
     assert {boundary["family"] for boundary in document["stable"]} == {2, 4}
+    for boundary in document["stable"]:
+        for side in (boundary["start"], boundary["end"]):
+            assert {len(values) for values in side.values()} == {len(boundary["alpha"])}
+            # Whatever is not defined has a reason.
+            for name in ("criticality", "first_lyapunov_coefficient", "amplitude_slope", "amplitude_slope_error"):
+                assert [value is None for value in side[name]] == [bool(why) for why in side["undefined_because"]]
+    (degenerate,) = [(boundary["family"], point) for boundary in document["stable"] for point in boundary["bautin"]]
+    assert (degenerate[0], degenerate[1]["side"]) == (4, "end")
+    assert degenerate[1]["alpha"] == pytest.approx(0.009106767627, abs=1e-11)
+    assert page.count('title="Bautin point of family 4"') == 1
 
 
 @pytest.mark.parametrize(
