@@ -89,11 +89,15 @@ class HopfPoint:
 
     @property
     def growth_in_period(self) -> float:
-        """Factor by which the other disturbances of the circle grow at most while the critical ones turn once."""
+        """Factor by which the other disturbances of the circle grow at most while the critical ones turn once.
+
+        It is inf where it overflows.
+        """
         assert self.form is not None, "there is no normal form"
         values = np.linalg.eigvals(self.form.jacobian)
         others = np.abs(np.abs(values.imag) - self.frequency) + np.abs(values.real) > _SAME
-        return float(np.exp(2 * np.pi / self.frequency * values[others].real.max()))
+        with np.errstate(over="ignore"):
+            return float(np.exp(2 * np.pi / self.frequency * values[others].real.max()))
 
 
 def find_hopf_points(family: Family) -> list[HopfPoint]:

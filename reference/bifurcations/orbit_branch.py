@@ -124,7 +124,7 @@ def step_along(flow: Flow, orbit: PeriodicOrbit, distance: float) -> PeriodicOrb
 
 
 def _direct(orbit: PeriodicOrbit, towards: np.ndarray) -> PeriodicOrbit:
-    """Return an orbit with its tangent pointing in a direction (9,)."""
+    """Return an orbit with its tangent pointing in a direction of its unknowns."""
     if towards @ (arc_metric(orbit.unknowns) * orbit.tangent) > 0:
         return orbit
     return replace(

@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from ..kinematics import WHEELS
-from ..simulate import simulate
-from ..surface import evaluate
+from ..simulate import PreciseMotion, simulate
+from ..surface import Surface, evaluate
 from .orbits import PeriodicOrbit
 from .shooting import Flow
 
-_LOOKS = 65  # states over a period; forces change as smoothly as the lean does
+_LOOKS = 64  # states over a period; forces change as smoothly as the lean does
 
 
 def explain_orbit(flow: Flow, orbit: PeriodicOrbit) -> tuple[str, ...]:
     """Explain why an orbit cannot be ridden: one text for each obstacle, none if it can.
 
-    The reference rides one period.
+    The reference rides one period, leg by leg, since a disturbance may grow large in a period.
 
     Parameters
     ----------
@@ -28,21 +28,29 @@ def explain_orbit(flow: Flow, orbit: PeriodicOrbit) -> tuple[str, ...]:
     -------
     tuple of str
     """
-    state = flow.moved_to(orbit.state).near
     bicycle, surface = flow.equations.bicycle, flow.equations.surface
-    try:
-        motion = simulate(bicycle, surface, state[:9], state[9:18], np.linspace(0.0, orbit.period, _LOOKS))
-    except ValueError as error:  # a rim lies inside the ground at the start
-        return (str(error),)
-    if motion.ended is not None:
-        return (motion.ended,)
-    places = motion.contact[:, :, :2]
-    slopes = evaluate(surface, places[..., 0], places[..., 1])[..., 1:3]
-    normal = np.concatenate([-slopes, np.ones((*slopes.shape[:2], 1))], axis=-1)
-    pushing = np.einsum("nki,nki->nk", motion.force, normal) / np.linalg.norm(normal, axis=-1)
-    least = pushing.min(axis=0)
+    looks = -(-_LOOKS // len(orbit.states)) + 1
+    pushing = []
+    for start, duration in zip(orbit.states, orbit.durations, strict=True):
+        state = flow.moved_to(start).near
+        try:
+            motion = simulate(bicycle, surface, state[:9], state[9:18], np.linspace(0.0, duration, looks))
+        except ValueError as error:  # a rim lies inside the ground at the start
+            return (str(error),)
+        if motion.ended is not None:
+            return (motion.ended,)
+        pushing.append(_find_normal_forces(surface, motion))
+    least = np.concatenate(pushing).min(axis=0)
     return tuple(
         f"the ground would have to pull the {wheel} wheel: {force:.3g} N"
         for wheel, force in zip(WHEELS, least, strict=True)
         if not force > 0
     )
+
+
+def _find_normal_forces(surface: Surface, motion: PreciseMotion) -> np.ndarray:
+    """Return the forces (n, 2) along the ground's normals on the rear and the front wheel of a ride."""
+    places = motion.contact[:, :, :2]
+    slopes = evaluate(surface, places[..., 0], places[..., 1])[..., 1:3]
+    normal = np.concatenate([-slopes, np.ones((*slopes.shape[:2], 1))], axis=-1)
+    return np.einsum("nki,nki->nk", motion.force, normal) / np.linalg.norm(normal, axis=-1)

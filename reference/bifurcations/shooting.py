@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,26 +21,26 @@ _STEP = 1e-30  # complex step: derivatives are exact to round-off
 
 @dataclass(frozen=True, eq=False)
 class Legs:
-    """A ride over m durations one after another.
+    """Rides over m legs, each from a start of its own.
 
     Attributes
     ----------
     ends : ndarray, shape (m, 7)
         Independent variables after each.
     start_derivatives : ndarray, shape (m, 7, 7)
-        Derivatives of the ends by the variables at the start.
-    duration_derivatives : ndarray, shape (m, 7, m)
-        Derivatives of the ends by the durations.
-    energy : float
-        At the start [J].
-    energy_gradient : ndarray, shape (7,)
+        Derivatives of the ends by the variables at the start of the leg.
+    duration_derivatives : ndarray, shape (m, 7)
+        Derivatives of the ends by the duration of the leg.
+    energies : ndarray, shape (m,)
+        At the starts [J].
+    energy_gradients : ndarray, shape (m, 7)
     """
 
     ends: np.ndarray
     start_derivatives: np.ndarray
     duration_derivatives: np.ndarray
-    energy: float
-    energy_gradient: np.ndarray
+    energies: np.ndarray
+    energy_gradients: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,21 +90,6 @@ class Flow:
             raise ValueError("the bicycle does not ride from there")
         return ends, energy
 
-    def ride_legs(self, start: np.ndarray, durations: np.ndarray, steps: np.ndarray) -> Legs:
-        """Ride over durations one after another, with all derivatives; see `ride`."""
-        count = len(durations)
-        by_start, by_duration = np.empty((count, VARIABLES, VARIABLES)), np.empty((count, VARIABLES, count))
-        gradient, ends, energy = np.empty(VARIABLES), np.empty((count, VARIABLES)), 0.0
-        for j in range(VARIABLES):
-            changed = start + 1j * _STEP * np.eye(VARIABLES)[j]
-            there, level = self.ride(changed, durations, steps)
-            ends, energy = np.real(there), level.real
-            by_start[:, :, j], gradient[j] = np.imag(there) / _STEP, level.imag / _STEP
-        for j in range(count):
-            there, _ = self.ride(start, durations + 1j * _STEP * np.eye(count)[j], steps)
-            by_duration[:, :, j] = np.imag(there) / _STEP
-        return Legs(ends, by_start, by_duration, float(energy), gradient)
-
     def moved_to(self, start: np.ndarray) -> Flow:
         """Return the same flow, with the state of independent variables (7,) as the one to place others near."""
         surface, bicycle = self.equations.surface, self.equations.bicycle
@@ -118,3 +104,37 @@ class Flow:
         out = np.full(VARIABLES, np.nan)
         kernel.variable_rates(start.astype(complex), *self._ground, out)
         return out
+
+
+def ride_legs(flows: Sequence[Flow], starts: np.ndarray, durations: np.ndarray, steps: int) -> Legs:
+    """Ride m legs, each from a start of its own, with all derivatives.
+
+    Parameters
+    ----------
+    flows : sequence of Flow, length m
+        Each near the start of its leg.
+    starts : ndarray, shape (m, 7)
+    durations : ndarray, shape (m,)
+        [s].
+    steps : int
+        Number of steps of each.
+
+    Returns
+    -------
+    Legs
+
+    Raises
+    ------
+    ValueError
+        See `Flow.ride`.
+    """
+    count, number = len(durations), np.array([steps])
+    ends, by_duration, gradients = (np.empty((count, VARIABLES)) for _ in range(3))
+    by_start, energies = np.empty((count, VARIABLES, VARIABLES)), np.empty(count)
+    for i, (flow, start, duration) in enumerate(zip(flows, starts, durations[:, None], strict=True)):
+        for j in range(VARIABLES):
+            there, level = flow.ride(start + 1j * _STEP * np.eye(VARIABLES)[j], duration, number)
+            by_start[i, :, j], gradients[i, j] = np.imag(there[0]) / _STEP, level.imag / _STEP
+        there, level = flow.ride(start, duration + 1j * _STEP, number)
+        ends[i], by_duration[i], energies[i] = np.real(there[0]), np.imag(there[0]) / _STEP, level.real
+    return Legs(ends, by_start, by_duration, energies, gradients)

@@ -10,14 +10,32 @@ from .hopf import LEAN_INDEX, HopfPoint
 from .orbits import PeriodicOrbit, amplitude_condition, solve_orbit
 from .shooting import Flow
 
+# In a leg. Round-off of a leg, 1e-14, times this is the residual at which orbits count as solved, 1e-12 in units of 1.
+_LARGEST_GROWTH = 100.0
+_MOST_LEGS = 24  # of which an orbit takes seconds
+
 
 def flow_near(point: HopfPoint) -> Flow:
     """Return the flow of the independent variables near a Hopf point."""
     return Flow(point.level.equations, point.level.state)
 
 
-def predict_orbit(point: HopfPoint, amplitude: float) -> np.ndarray:
-    """Return the unknowns (9,) of `velodrome.reference.bifurcations.orbits` of a small orbit from the normal form.
+def count_legs(point: HopfPoint) -> int:
+    """Return the number of legs, an even one, of orbits born at a Hopf point: disturbances grow by little in each.
+
+    Raises
+    ------
+    ValueError
+        If they grow so much in a period that there would be too many legs.
+    """
+    pairs = np.log(max(point.growth_in_period, 1.0)) / np.log(_LARGEST_GROWTH) / 2
+    if not pairs <= _MOST_LEGS // 2:
+        raise ValueError(f"a disturbance grows {point.growth_in_period:.3g} times in a period, too much for shooting")
+    return 2 * max(1, int(np.ceil(pairs)))
+
+
+def predict_orbit(point: HopfPoint, amplitude: float, legs: int | None = None) -> np.ndarray:
+    """Return the unknowns of `velodrome.reference.bifurcations.orbits` of a small orbit from the normal form.
 
     Parameters
     ----------
@@ -25,10 +43,12 @@ def predict_orbit(point: HopfPoint, amplitude: float) -> np.ndarray:
         With an amplitude slope.
     amplitude : float
         Half of the peak-to-peak of the lean [rad].
+    legs : int, optional
+        Their number m, even; that of `count_legs` if not given.
 
     Returns
     -------
-    ndarray, shape (9,)
+    ndarray, shape (7 m + 2,)
         To second order in the amplitude.
     """
     if point.form is None or point.amplitude_slope is None:
@@ -37,10 +57,14 @@ def predict_orbit(point: HopfPoint, amplitude: float) -> np.ndarray:
     q = form.vector[LEAN_INDEX]
     z = amplitude / (2 * q)  # the lean is greatest at the start
     change = amplitude**2 / point.amplitude_slope
-    variables = level.centre + change * form.equilibrium_slope + form.manifold(z)
-    _, rear_rate = level.field(variables[None], np.array([level.energy + change]))
+    count = count_legs(point) if legs is None else legs
+    turns = np.exp(2j * np.pi * np.arange(count) / count)
+    oscillations = np.array([form.manifold(turned) for turned in z * turns])
+    variables = level.centre + change * form.equilibrium_slope + oscillations
+    _, rear_rate = level.field(variables, np.full(count, level.energy + change))
     rate = form.frequency + form.growth.value.imag * change + form.cubic.value.imag * abs(z) ** 2
-    return np.concatenate([variables, np.real(rear_rate), np.full(2, np.pi / rate)])
+    states = np.column_stack([variables, np.real(rear_rate)])
+    return np.concatenate([states.ravel(), np.full(2, np.pi / rate)])
 
 
 def small_orbits(point: HopfPoint, amplitudes: Sequence[float]) -> list[PeriodicOrbit]:

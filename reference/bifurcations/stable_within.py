@@ -22,8 +22,6 @@ from .orbits import PeriodicOrbit
 _LARGEST_AMPLITUDE, _MOST_ORBITS = 0.1, 200
 _FIRST_AMPLITUDE = 2.5e-4  # at which the amplitude law is a good guess even next to a point where it degenerates [rad]
 _LONGEST_STEP = 0.025  # along a branch, so that drawn curves bend by some degrees from one orbit to the next
-# Round-off of a period, 1e-14, times this is the residual at which orbits count as solved, 1e-12 in units of 1.
-_LARGEST_GROWTH = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +51,15 @@ class BoundedCircle:
         return None if self.orbit is None else self.orbit.lean_amplitude
 
 
-def follow_branch(point: HopfPoint, stop: Callable[[OrbitBranch], bool] = lambda _: False) -> OrbitBranch:
+def follow_branch(
+    point: HopfPoint, largest: float = _LARGEST_AMPLITUDE, stop: Callable[[OrbitBranch], bool] = lambda _: False
+) -> OrbitBranch:
     """Follow the orbits born at a Hopf point as far as they may bound stable circles.
 
     Parameters
     ----------
     point : HopfPoint
-    stop : callable
+    largest, stop
         See `follow_orbits`.
 
     Returns
@@ -73,9 +73,7 @@ def follow_branch(point: HopfPoint, stop: Callable[[OrbitBranch], bool] = lambda
     """
     if point.amplitude_slope is None:
         raise ValueError(point.why_undefined)
-    if point.growth_in_period > _LARGEST_GROWTH:
-        raise ValueError(f"a disturbance grows {point.growth_in_period:.3g} times in a period, too much for shooting")
-    return follow_orbits(point, _LARGEST_AMPLITUDE, _FIRST_AMPLITUDE, _LONGEST_STEP, _MOST_ORBITS, stop)
+    return follow_orbits(point, largest, _FIRST_AMPLITUDE, _LONGEST_STEP, _MOST_ORBITS, stop)
 
 
 def bound_circle(equations: Steady, motion: CircularMotion) -> BoundedCircle:
@@ -127,7 +125,7 @@ def _find_first_saddle(point: HopfPoint, energy: float) -> list[PeriodicOrbit]:
         found.extend(find_crossing_saddle(branch, energy))
         return bool(found)
 
-    follow_branch(point, stop)
+    follow_branch(point, stop=stop)
     return found
 
 

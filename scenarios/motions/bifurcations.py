@@ -194,10 +194,10 @@ def find_bifurcations(
     for curve, point in points:
         watch(len(found), len(points))
         found.append(_examine(curve, point))
-        if found[-1].branch is not None:
+        if found[-1].branch is not None and point.ends_section:
             branches.setdefault(curves.index(curve), []).append(found[-1].branch)
     sections = [
-        bound_stable_section(curve, section, branches.get(k, []), "no orbits are known on this curve")
+        bound_stable_section(curve, section, branches.get(k, []), "no orbits are known at the ends of stable sections")
         for k, curve in enumerate(curves)
         for section in stable_sections(curve)
     ]
@@ -209,7 +209,8 @@ def _examine(curve: Family, point: HopfPoint) -> Bifurcation:
     why = explain_motion(curve.equations.bicycle, curve.equations.surface, point.motion)
     found = Bifurcation(point=point, unphysical_because=why)
     try:
-        branch = follow_branch(point)
+        # Orbits that may bound stable circles are followed further than those of circles that are unstable anyway.
+        branch = follow_branch(point) if point.ends_section else follow_branch(point, LISTED_AMPLITUDES[-1])
     except ValueError as error:
         return replace(found, why_no_orbits=str(error))
     flow = flow_near(point)

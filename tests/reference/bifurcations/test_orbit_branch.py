@@ -66,7 +66,7 @@ def test_the_lean_has_no_larger_and_no_smaller_value_on_an_orbit() -> None:
     """Both of its turning points are extremes: the amplitude is half of the peak-to-peak."""
     for orbit in branch(2).orbits[::3]:
         flow = flow_near(hopf_points()[2]).moved_to(orbit.state)
-        durations = np.append(np.full(8, orbit.unknowns[7] / 8), np.full(8, orbit.unknowns[8] / 8))
+        durations = np.append(np.full(8, orbit.unknowns[-2] / 8), np.full(8, orbit.unknowns[-1] / 8))
         ends, _ = flow.ride(orbit.state, durations, np.full(16, 8))
         leans = np.real(ends[:, 2])
         assert orbit.state[2] >= leans.max() - 1e-12
