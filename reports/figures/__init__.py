@@ -20,6 +20,7 @@ from .style import (
 )
 from .sweep import SweepAxis, SweepRuns, sweep_figure
 from .sweep_map import CellGrid, MapRuns, SweepMap, average_cells, make_cells, sweep_map_figure
+from .within import list_bounded_regions, within_figure
 
 __all__ = [
     "FAMILY_COLOURS",
@@ -39,6 +40,7 @@ __all__ = [
     "family_figure",
     "float32_figure",
     "growth_figure",
+    "list_bounded_regions",
     "make_cells",
     "make_curves",
     "new_figure",
@@ -47,6 +49,7 @@ __all__ = [
     "sweep_figure",
     "sweep_map_figure",
     "use_style",
+    "within_figure",
     "write_figure",
     "write_formats",
 ]

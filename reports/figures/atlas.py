@@ -241,7 +241,7 @@ def _split_by_kind(boundary: Mapping[str, Any], side: str, name: str) -> Iterato
         yield kinds[start], np.array(sorted([*line[start:stop], *(turn for turn in turns if first <= turn[0] <= last)]))
 
 
-def _draw_sides(axes: Axes, boundary: Mapping[str, Any], name: str, colour: str, width: float) -> None:
+def draw_sides(axes: Axes, boundary: Mapping[str, Any], name: str, colour: str, width: float) -> None:
     """Draw both sides of a region; what ends it at a single alpha, as on the plane, is a mark."""
     for side in ("start", "end"):
         for kind, line in _split_by_kind(boundary, side, name):
@@ -257,7 +257,7 @@ def _draw_boundaries(axes: Axes, document: Mapping[str, Any], family: int) -> No
     for boundary in document["stable"]:
         if boundary["family"] != family:
             continue
-        _draw_sides(axes, boundary, "rear_rate", INK, 0.8)
+        draw_sides(axes, boundary, "rear_rate", INK, 0.8)
         end = boundary["vanishing"]
         if end is not None:
             axes.plot(end["alpha"], end["rear_rate"], "*", color=INK, ms=8, mec="white", mew=0.6)
@@ -286,7 +286,7 @@ def _growth_legend(document: Mapping[str, Any]) -> Iterator[Any]:
     yield Patch(facecolor=STABLE, edgecolor="white", lw=0, hatch=_STABLE_HATCH, label="stable")
     yield Patch(facecolor="white", edgecolor=_ABSENT_INK, lw=0, hatch=_ABSENT_HATCH, label=_ABSENT)
     yield Patch(facecolor="white", edgecolor=INK, lw=0.6, hatch=_UNRIDDEN_HATCH, label=_NOT_RIDDEN)
-    yield from _kind_legend(document)
+    yield from list_kind_handles(document["stable"])
     yield Line2D([], [], ls="", marker="*", color=INK, ms=8, label="the stable section vanishes")
     yield Line2D([], [], ls="", marker="D", color="white", mec=INK, ms=5, label="two curves touch and exchange parts")
 
@@ -307,7 +307,7 @@ def _draw_region(axes: Axes, columns: Columns, boundary: Mapping[str, Any], name
         alphas, low, high = [*alphas, end["alpha"]], [*low, end[name]], [*high, end[name]]
         axes.plot(end["alpha"], end[name], "*", color=colour, ms=9, mec="white", mew=0.6, zorder=5)
     axes.fill_between(alphas, low, high, color=colour, alpha=0.25, lw=0)
-    _draw_sides(axes, boundary, name, colour, 1.4)
+    draw_sides(axes, boundary, name, colour, 1.4)
 
 
 def _draw_stable_hatching(
@@ -325,24 +325,24 @@ def _stable_legend(columns: Columns, document: Mapping[str, Any]) -> Iterator[An
     for boundary in document["stable"]:
         colour = FAMILY_COLOURS[boundary["family"]]
         yield Patch(facecolor=colour, alpha=0.4, label=f"family {boundary['family']}")
-    yield from _kind_legend(document)
+    yield from list_kind_handles(document["stable"])
     if np.any(columns["stable"] & ~columns["physical"]):
         yield Patch(facecolor="white", edgecolor=INK, lw=0.6, hatch=_UNRIDDEN_HATCH, label=_NOT_RIDDEN)
     yield Line2D([], [], ls="", marker="*", color=INK, ms=9, label="the stable section vanishes")
 
 
-def _kind_legend(document: Mapping[str, Any]) -> Iterator[Any]:
-    """Yield legend entries for what ends a section, along a line or at a single alpha."""
+def list_kind_handles(boundaries: Sequence[Mapping[str, Any]]) -> Iterator[Any]:
+    """Yield legend entries for what ends the sections of stable regions, along a line or at a single alpha."""
     pieces = [
         (kind, len(line))
-        for boundary in document["stable"]
+        for boundary in boundaries
         for side in ("start", "end")
         for kind, line in _split_by_kind(boundary, side, "lean")
     ]
     for kind in _KIND_LINES:
         if any(one == kind and length > 1 for one, length in pieces):
             yield Line2D([], [], color=INK, ls=_KIND_LINES[kind], label=f"end of stability: {KIND_LABELS[kind]}")
-    if any(boundary["bautin"] for boundary in document["stable"]):
+    if any(boundary["bautin"] for boundary in boundaries):
         yield Line2D([], [], **_BAUTIN, label="its criticality changes (Bautin point)")
     for kind in _KIND_LINES:
         if any(one == kind and length == 1 for one, length in pieces):

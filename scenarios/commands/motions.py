@@ -187,6 +187,10 @@ def atlas_command(
     size: Annotated[int, typer.Option(help="Number of motions, roughly.")] = 400_000,
     largest: Annotated[float, typer.Option(help="Largest alpha [1/m], at most 1.")] = 1.0,
     bicycle: BicycleOption = None,
+    within: Annotated[
+        bool,
+        typer.Option("--within", help="Search for the unstable orbits that bound stable motions, too: some minutes."),
+    ] = False,
     formats: FormatOption = None,
     columns: ColumnsOption = None,
     as_json: JsonOption = False,
@@ -210,6 +214,7 @@ def atlas_command(
             largest,
             lambda done: progress.watch("atlas", done * size, size, "motions"),
             figures,
+            within,
         )
     with ending_with(0):
         if as_json:

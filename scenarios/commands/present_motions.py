@@ -264,12 +264,16 @@ def show_atlas(console: Console, document: Mapping[str, Any], out: Path) -> None
 
 
 def _show_sides(console: Console, region: Mapping[str, Any]) -> None:
-    """Print what ends the stable sections of a region as alpha grows, and where that changes its criticality."""
+    """Print what ends the stable sections of a region as alpha grows, and within what their circles are stable."""
     for side in ("start", "end"):
         words = f"family {region['family']}, {side} of stable sections: {describe_kinds(region[side])}"
         turns = [point for point in region["bautin"] if point["side"] == side]
         places = [f"alpha {point['alpha']:.12f}, rear rate {point['rear_rate']:.6f} rad/s" for point in turns]
         print_words(console, "\n  Bautin point at ".join([words, *places]))
+    if region["within"] is not None:
+        known = [bound for row in region["within"] for bound in row["stable_within"] if bound is not None]
+        words = f"circles are stable within {min(known):.6f} to {max(known):.6f} rad" if known else "no bound is known"
+        print_words(console, f"family {region['family']}: {words}, in {len(region['within'])} bowls")
 
 
 def _format_end(region: Mapping[str, Any], largest: float) -> str:

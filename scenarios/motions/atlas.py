@@ -11,15 +11,21 @@ from typing import Any
 import numpy as np
 
 from ...reference.atlas import ATLAS_SIZE, SIDES, Atlas, Boundary, compute_atlas, spacing
+from ...reference.bicycle import Bicycle
 from ...reference.bifurcations.bautin import BautinPoint
 from ...reference.bifurcations.hopf import HopfPoint
+from ...reference.families import trace
 from ...reference.rideability import OBSTACLES
-from ...reference.sections import SectionEnd
+from ...reference.sections import SectionEnd, stable_sections
 from ...reference.stability import VARIABLES
+from ...reference.surface import Paraboloid
 from ..error import MissingMotionError, ScenarioError
 from ..files import DEFAULT_FIGURES, FigureOutput, make_folder, write_json, write_text
 from ..scenario import BicycleFile, name_bicycle
+from .bounds import BoundedSection, bound_stable_sections
 from .families import check_inertia, critical_entry
+
+BoundedShape = tuple[float, BoundedSection]  # alpha [1/m], and the stable section of a boundary there
 
 SMALLEST, LARGEST = 1000, 20_000_000  # number of motions; the largest atlas takes 3 GB
 UNITS = {
@@ -37,6 +43,7 @@ UNITS = {
     "growth_rate": "1/s",
     "required_friction": "1",
 }
+_SHAPES = 16  # bowls of a stable region in which orbits are searched for, five seconds each
 _PLACE = ("rear_rate", "front_rate", "lean", "steer")
 _NO_HOPF = {
     "energy": "a real eigenvalue is zero, as the energy is extreme along the family",
@@ -53,6 +60,7 @@ def make_atlas(
     largest: float = 1.0,
     progress: Callable[[float], None] = lambda _: None,
     figures: FigureOutput = DEFAULT_FIGURES,
+    within: bool = False,
 ) -> dict[str, Any]:
     """Compute the atlas and write ``atlas.parquet``, ``boundaries.json``, the page and the figures into a folder.
 
@@ -72,6 +80,8 @@ def make_atlas(
         Called with the fraction done.
     figures : FigureOutput
         How the figures are written.
+    within : bool
+        Search for the orbits that bound stable circles, in some bowls, and draw them too; this takes minutes.
 
     Returns
     -------
@@ -86,7 +96,7 @@ def make_atlas(
         If the size or the largest alpha is out of range, the bicycle's equations are singular, or the folder cannot be
         made.
     """
-    from ...reports.figures import growth_figure, stable_figure, write_formats
+    from ...reports.figures import growth_figure, list_bounded_regions, stable_figure, within_figure, write_formats
     from ...reports.page import make_atlas_page
 
     if not SMALLEST <= size <= LARGEST:
@@ -97,10 +107,12 @@ def make_atlas(
     make_folder(out)
     alphas, longest = spacing(size, largest)
     try:
-        found = compute_atlas(source.bicycle, alphas, longest, lambda fraction: progress(0.9 * fraction))
+        share = 0.2 if within else 0.9
+        found = compute_atlas(source.bicycle, alphas, longest, lambda fraction: progress(share * fraction))
     except ValueError as error:
         raise MissingMotionError(f"no atlas of {source.name}: {error}", "no-such-motion") from error
-    columns, document = atlas_columns(found), atlas_document(found, source.name)
+    bounds = bound_regions(found, lambda fraction: progress(0.2 + 0.7 * fraction)) if within else None
+    columns, document = atlas_columns(found), atlas_document(found, source.name, bounds)
     # Bit k of the column `obstacles` says whether a motion meets obstacle k.
     facts = {"longest_step": longest, "bicycle": asdict(found.bicycle), "obstacles": list(OBSTACLES)}
     write_atlas(columns, out / "atlas.parquet", facts)
@@ -108,6 +120,8 @@ def make_atlas(
     write_text(out / "atlas.html", make_atlas_page(document, libraries))
     for name, draw in (("growth", growth_figure), ("stable", stable_figure)):
         write_formats(out / name, partial(draw, columns, document), figures.formats, figures.columns)
+    if list_bounded_regions(document):
+        write_formats(out / "within", partial(within_figure, document), figures.formats, figures.columns)
     progress(1.0)
     return document
 
@@ -155,13 +169,74 @@ def write_atlas(columns: dict[str, np.ndarray], path: Path, facts: dict[str, Any
     )
 
 
-def atlas_document(found: Atlas, bicycle_name: str | None = None) -> dict[str, Any]:
-    """Return the document of the atlas: boundaries of the stable sections, critical points and absent families."""
+def bound_regions(found: Atlas, progress: Callable[[float], None] = lambda _: None) -> list[list[BoundedShape]]:
+    """Find the orbits that bound the stable circles of an atlas, in some bowls of each of its stable regions.
+
+    Parameters
+    ----------
+    found : Atlas
+    progress : callable
+        Called with the fraction done.
+
+    Returns
+    -------
+    list of list of BoundedShape
+        For each of its boundaries, by rising alpha; the plane, on which no orbits are known, is left out.
+    """
+    chosen = [_choose_shapes(boundary, found.alphas) for boundary in found.boundaries]
+    count, done = sum(map(len, chosen)), 0
+    bounds: list[list[BoundedShape]] = []
+    for boundary, places in zip(found.boundaries, chosen, strict=True):
+        bounds.append([])
+        for place in places:
+            bounds[-1].append((boundary.alpha[place], _bound_shape(found.bicycle, boundary, place)))
+            done += 1
+            progress(done / count)
+    return bounds
+
+
+def _choose_shapes(boundary: Boundary, alphas: np.ndarray) -> list[int]:
+    """Choose the indices of some bowls of a boundary, evenly, of those that have all the motions of an atlas."""
+    whole = [k for k, alpha in enumerate(boundary.alpha) if alpha > 0 and alpha in alphas]
+    count = min(_SHAPES, len(whole))
+    return [whole[k] for k in np.linspace(0, len(whole) - 1, count).round().astype(int)] if count else []
+
+
+def _bound_shape(bicycle: Bicycle, boundary: Boundary, place: int) -> BoundedSection:
+    """Find the orbits that bound the circles of a boundary's stable section at one of its shapes."""
+    family = trace(bicycle, Paraboloid(boundary.alpha[place]), boundary.family)
+    start = boundary.ends[place][0].motion
+    section = min(stable_sections(family), key=lambda ends: abs(ends[0].motion.lean - start.lean))
+    return bound_stable_sections(family, [section])[0]
+
+
+def atlas_document(
+    found: Atlas, bicycle_name: str | None = None, bounds: Sequence[Sequence[BoundedShape]] | None = None
+) -> dict[str, Any]:
+    """Return the document of the atlas: boundaries of the stable sections, critical points and absent families.
+
+    Parameters
+    ----------
+    found : Atlas
+    bicycle_name : str, optional
+        See `name_bicycle`.
+    bounds : sequence, optional
+        As `bound_regions` returns it.
+
+    Returns
+    -------
+    dict
+    """
+    rows: list[Any] = [None] * len(found.boundaries)
+    if bounds is not None:
+        rows = [[{"alpha": alpha} | section.as_json() for alpha, section in shapes] for shapes in bounds]
     return {
         **name_bicycle(found.bicycle, bicycle_name),
         "alphas": found.alphas.tolist(),
         "motions": found.size,
-        "stable": [_describe_boundary(boundary) for boundary in found.boundaries],
+        "stable": [
+            _describe_boundary(boundary) | {"within": row} for boundary, row in zip(found.boundaries, rows, strict=True)
+        ],
         "touching": [{"families": list(point.families)} | critical_entry(point) for point in found.reconnections],
         "absent": [asdict(absence) for absence in found.absent],
     }

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from tests.reports.figures.test_print import atlas_of_planes
+from tests.reports.figures.test_print import atlas_of_planes, bounded_atlas
 from velodrome.reports.figures.atlas import sheet, stable_figure
 from velodrome.reports.figures.style import use_style
+from velodrome.reports.figures.within import arrange_bounds, list_bounded_regions
 
 
 def test_where_a_curve_folds_the_least_growth_is_shown() -> None:
@@ -39,3 +40,16 @@ def test_lines_of_different_criticality_meet_in_the_degenerate_point() -> None:
     assert lines["Bautin point"][0].tolist() == [0.5]
     # The other side has no such point: its lines end at the shapes between which the criticality changes.
     assert lines["end: subcritical"][0].tolist() == [0.1, 0.4]
+
+
+def test_bounds_are_drawn_where_they_are_known() -> None:
+    document = bounded_atlas()
+    (region,) = list_bounded_regions(document)
+    none = {"alpha": 1.0, "rear_rate": [], "stable_within": []}  # a bowl in which no orbits are known
+    alpha, rate, bound = arrange_bounds([*region["within"], none])
+    assert alpha.tolist() == [[0.1, 0.1], [0.4, 0.4], [0.7, 0.7]]
+    assert rate.tolist() == [[9.0, 11.0]] * 3
+    assert np.array_equal(bound, [[0.01, 0.02], [0.015, 0.02], [np.nan, 0.02]], equal_nan=True)
+    unknown = [row | {"stable_within": [None, None]} for row in region["within"]]
+    for rows in (None, unknown, [none]):
+        assert list_bounded_regions(document | {"stable": [region | {"within": rows}]}) == []

@@ -29,6 +29,7 @@ from velodrome.reports.figures import (
     precision_figure,
     stable_figure,
     use_style,
+    within_figure,
     write_formats,
 )
 from velodrome.scenarios.motions import follow_families
@@ -109,6 +110,17 @@ def atlas_of_planes() -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     return columns, document | {"bicycle": find_document("benchmark")}
 
 
+def bounded_atlas() -> dict[str, Any]:
+    """The same with the bounds of two circles in each of three bowls, of which one is not known."""
+    _, document = atlas_of_planes()
+    rows = [
+        {"alpha": alpha, "rear_rate": [9.0, 11.0], "stable_within": [bound, 0.02]}
+        for alpha, bound in ((0.1, 0.01), (0.4, 0.015), (0.7, None))
+    ]
+    (region,) = document["stable"]
+    return document | {"stable": [region | {"within": rows}]}
+
+
 @cache
 def find_document(name: str) -> dict[str, Any]:
     return families("0.0")["bicycle"]
@@ -144,6 +156,7 @@ DRAWN: dict[str, Callable[[int], Figure]] = {
     "bifurcations": lambda columns: bifurcation_figure(stored_bifurcations(), columns),
     "growth": lambda columns: growth_figure(*atlas_of_planes(), columns),
     "stable": lambda columns: stable_figure(*atlas_of_planes(), columns),
+    "within": lambda columns: within_figure(bounded_atlas(), columns),
     "plane": draw_families("0.0"),
     "bowl": draw_families("0.005"),
     "sphere": draw_families("sphere:radius=20"),

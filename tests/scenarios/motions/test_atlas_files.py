@@ -10,7 +10,9 @@ import pytest
 from tests.sealing import contents
 from velodrome.engines.storage import METADATA_KEY
 from velodrome.reference.bicycle import Bicycle
+from velodrome.reference.surface import Paraboloid
 from velodrome.scenarios.error import ScenarioError
+from velodrome.scenarios.motions import follow_families
 from velodrome.scenarios.motions.atlas import UNITS, make_atlas
 from velodrome.scenarios.scenario import BicycleFile
 
@@ -65,6 +67,32 @@ def test_an_atlas_is_written_whole(tmp_path: Path) -> None:
     assert (degenerate[0], degenerate[1]["side"]) == (4, "end")
     assert degenerate[1]["alpha"] == pytest.approx(0.009106767627, abs=1e-11)
     assert page.count('title="Bautin point of family 4"') == 1
+
+
+@pytest.mark.slow
+def test_an_atlas_says_within_what_circles_are_stable(tmp_path: Path) -> None:
+    """Half-way in energy along family 2's section the bound is that of `velodrome families` there."""
+    document = make_atlas(BENCHMARK, tmp_path, {}, size=2000, largest=0.02, within=True)
+    assert (tmp_path / "within.png").stat().st_size > 10_000
+    for boundary in document["stable"]:
+        rows = boundary["within"]
+        assert [row["alpha"] for row in rows] == [
+            alpha for alpha in document["alphas"] if alpha in boundary["alpha"][1:]
+        ]
+        for row in rows:
+            assert all(0 < bound < 0.1 for bound in row["stable_within"])
+            at = boundary["alpha"].index(row["alpha"])
+            low, high = sorted([boundary["start"]["rear_rate"][at], boundary["end"]["rear_rate"][at]])
+            assert all(low < rate < high for rate in row["rear_rate"])
+    row = next(boundary for boundary in document["stable"] if boundary["family"] == 2)["within"][-1]
+    (curve,) = [
+        curve
+        for curve in follow_families(Bicycle(), Paraboloid(row["alpha"]), within=True).curves
+        if curve.numbers[:1] == (2,)
+    ]
+    assert curve.bounds is not None
+    known = curve.bounds[0].circles[4].stable_within
+    assert row["stable_within"][4] == pytest.approx(known, abs=1e-9)
 
 
 @pytest.mark.parametrize(
