@@ -135,6 +135,11 @@ def _direct(orbit: PeriodicOrbit, towards: np.ndarray) -> PeriodicOrbit:
     )
 
 
+def arc_length(first: PeriodicOrbit, second: PeriodicOrbit) -> float:
+    """Return the distance of an orbit from its neighbour, along that one's tangent."""
+    return float((arc_metric(first.unknowns) * first.tangent) @ (second.unknowns - first.unknowns))
+
+
 def solve_between(branch: OrbitBranch, place: int, function: Callable[[PeriodicOrbit], float]) -> PeriodicOrbit | None:
     """Solve function = 0 between an orbit of a branch and the next one, where it has opposite signs.
 
@@ -152,7 +157,7 @@ def solve_between(branch: OrbitBranch, place: int, function: Callable[[PeriodicO
         To round-off of the distance along the branch; None where an orbit between the two is not found.
     """
     first, second = branch.orbits[place : place + 2]
-    length = float((arc_metric(first.unknowns) * first.tangent) @ (second.unknowns - first.unknowns))
+    length = arc_length(first, second)
     flow, found = flow_near(branch.point).moved_to(first.state), {0.0: first, length: second}
 
     def value(distance: float) -> float:

@@ -106,7 +106,7 @@ def bound_circle(equations: Steady, motion: CircularMotion) -> BoundedCircle:
     place = next(k for k, point in enumerate(curve.points) if are_same_solution(point.unknowns, unknowns))
     around = [ends for ends in stable_sections(curve) if ends[0].place < place <= ends[1].place]
     reasons, orbits = [], []
-    for end in (end for ends in around for end in ends):
+    for end in (end for ends in around for end in ends if end.cause == "hopf"):
         try:
             orbits += _find_first_saddle(examine_end(curve, end), circle.energy)
         except ValueError as error:

@@ -7,6 +7,7 @@ import pytest
 
 from velodrome.reference.bifurcations.orbit_branch import OrbitBranch, follow_orbits
 from velodrome.reference.bifurcations.orbit_events import FOLD, TORUS, OrbitEvent, find_events
+from velodrome.reference.bifurcations.orbit_search import orbits_of_energy
 from velodrome.reference.bifurcations.small_orbits import flow_near
 
 from .test_hopf import hopf_points
@@ -50,6 +51,20 @@ def test_the_energy_is_extreme_at_the_fold_and_a_multiplier_is_one() -> None:
     assert fold.energy < min(orbit.energy for orbit in branch(2).orbits)
     # A multiplier passes 1 with the root of the distance to the fold: dE / ds is known to 1e-9 J.
     assert np.abs(fold.multipliers[2:] - 1).min() < 1e-6
+
+
+def test_both_orbits_next_to_a_fold_are_found_between_neighbours() -> None:
+    """At an energy that no two neighbours of the branch have between them; they differ by one unstable direction."""
+    fold = events(2)[FOLD]
+    nearest = min(orbit.energy for orbit in branch(2).orbits)
+    energy = fold.orbit.energy + 0.3 * (nearest - fold.orbit.energy)
+    found = orbits_of_energy(branch(2), energy)
+    assert len(found) == 2
+    assert [orbit.energy for orbit in found] == pytest.approx([energy] * 2, abs=1e-8)
+    assert found[0].period > fold.orbit.period > found[1].period  # it falls along this branch
+    outside = [int((np.abs(orbit.multipliers[2:]) > 1).sum()) for orbit in found]
+    assert abs(outside[0] - outside[1]) == 1
+    assert orbits_of_energy(branch(2), fold.orbit.energy - 0.1 * (nearest - fold.orbit.energy)) == []
 
 
 def test_a_complex_pair_crosses_the_unit_circle_where_orbits_lose_stability() -> None:

@@ -52,4 +52,4 @@ def test_bounds_are_drawn_where_they_are_known() -> None:
     assert np.array_equal(bound, [[0.01, 0.02], [0.015, 0.02], [np.nan, 0.02]], equal_nan=True)
     unknown = [row | {"stable_within": [None, None]} for row in region["within"]]
     for rows in (None, unknown, [none]):
-        assert list_bounded_regions(document | {"stable": [region | {"within": rows}]}) == []
+        assert list_bounded_regions({"stable": [{**region, "within": rows}]}) == []
