@@ -76,7 +76,8 @@ def eigenvalues_of_product(matrices: Sequence[np.ndarray] | np.ndarray) -> np.nd
     1770 (1992) 31-42.
     """
     size = len(matrices[0])
-    basis, first, triangles = np.eye(size), np.eye(size), []
+    basis, first = np.eye(size), np.eye(size)
+    triangles: list[np.ndarray] = []
     for _ in range(_SWEEPS):
         first, triangles = basis, []
         for matrix in matrices:

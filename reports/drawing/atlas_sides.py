@@ -15,7 +15,7 @@ KIND_LABELS = {
 }
 
 
-def list_kinds(side: Mapping[str, Any]) -> list[str]:
+def list_end_kinds(side: Mapping[str, Any]) -> list[str]:
     """Return what ends the sections of one side of a stable region: the criticality of a Hopf point, or the cause.
 
     ``hopf`` is a Hopf point whose criticality is not defined.
@@ -23,6 +23,6 @@ def list_kinds(side: Mapping[str, Any]) -> list[str]:
     return [kind or cause for kind, cause in zip(side["criticality"], side["cause"], strict=True)]
 
 
-def describe_kinds(side: Mapping[str, Any]) -> str:
+def describe_end_kinds(side: Mapping[str, Any]) -> str:
     """Return what ends the sections of one side as alpha grows, in a few words."""
-    return "; then ".join(KIND_LABELS.get(kind, kind) for kind, _ in groupby(list_kinds(side)))
+    return "; then ".join(KIND_LABELS.get(kind, kind) for kind, _ in groupby(list_end_kinds(side)))

@@ -19,7 +19,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from ...reference.families import FAMILIES
-from ..drawing.atlas_sides import KIND_LABELS, list_kinds
+from ..drawing.atlas_sides import KIND_LABELS, list_end_kinds
 from .labels import Badge, Label, name_other_bicycle, place_labels
 from .style import FAMILY_COLOURS, INK, WIDTHS, new_figure
 
@@ -34,7 +34,7 @@ _NORM = LogNorm(_SLOW, _FAST)
 _COLOURS = ListedColormap(colormaps["YlOrRd"](np.linspace(0.04, 0.82, 256)))
 _ABSENT_HATCH, _STABLE_HATCH, _UNRIDDEN_HATCH = "xxxx", "....", "////"
 _ABSENT_INK = "#a0a0a0"
-# Of what ends stability, `velodrome.reports.drawing.atlas_sides.list_kinds`. Subcritical branches are dashed.
+# Of what ends stability, `velodrome.reports.drawing.atlas_sides.list_end_kinds`. Subcritical branches are dashed.
 _KIND_LINES: dict[str, Any] = {
     "supercritical": "-",
     "subcritical": (0, (4, 1.6)),
@@ -230,7 +230,7 @@ def _split_by_kind(boundary: Mapping[str, Any], side: str, name: str) -> Iterato
     Lines of different criticality meet in the degenerate Hopf point between them.
     """
     line = list(zip(boundary["alpha"], boundary[side][name], strict=True))
-    kinds = list_kinds(boundary[side])
+    kinds = list_end_kinds(boundary[side])
     turns = [(point["alpha"], point[name]) for point in boundary["bautin"] if point["side"] == side]
     if boundary["vanishing"] is not None:
         line.append((boundary["vanishing"]["alpha"], boundary["vanishing"][name]))

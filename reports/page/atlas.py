@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..drawing.atlas_sides import describe_kinds
+from ..drawing.atlas_sides import describe_end_kinds
 from .curve_chart import draw_plane
 from .document import list_engine_styles, render_page
 from .tables import PageTable, TableColumn
@@ -116,7 +116,7 @@ def _make_table(regions: Mapping[str, Mapping[str, Any]], largest: float) -> Pag
                 "where, rear rate", "rad/s", ["–" if end is None else f"{end['rear_rate']:.6f}" for end in ends]
             ),
             *(
-                TableColumn(f"{side} of sections", "", [describe_kinds(row[side]) for row in rows], words=True)
+                TableColumn(f"{side} of sections", "", [describe_end_kinds(row[side]) for row in rows], words=True)
                 for side in ("start", "end")
             ),
         ],
