@@ -1,5 +1,6 @@
 """Drawings of the ground, the bicycle, the curves and the table of a run, for pages and recordings alike."""
 
+from .atlas_sides import END_LABELS, describe_end_kinds, list_end_kinds
 from .bicycle_shape import Mesh, ball, body_meshes
 from .ground import LINE_LIFT, STEEPEST, GroundMesh, ground_disc, lift_points, make_ground
 from .markdown import escape_markdown, make_printable
@@ -41,6 +42,7 @@ __all__ = [
     "CHANGE",
     "COLUMNS",
     "CONSTRAINTS",
+    "END_LABELS",
     "ENERGY",
     "ERROR",
     "FORCES",
@@ -62,6 +64,7 @@ __all__ = [
     "ball",
     "body_meshes",
     "choose_samples",
+    "describe_end_kinds",
     "describe_required_friction",
     "describe_stability",
     "drawable_values",
@@ -74,6 +77,7 @@ __all__ = [
     "group_remarks",
     "is_whole_ride",
     "lift_points",
+    "list_end_kinds",
     "make_ground",
     "make_printable",
     "make_remarks",

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from itertools import groupby
 from typing import Any
 
-KIND_LABELS = {
+END_LABELS = {
     "supercritical": "supercritical Hopf point",
     "subcritical": "subcritical Hopf point",
     "hopf": "Hopf point, criticality undefined",
@@ -25,4 +25,4 @@ def list_end_kinds(side: Mapping[str, Any]) -> list[str]:
 
 def describe_end_kinds(side: Mapping[str, Any]) -> str:
     """Return what ends the sections of one side as alpha grows, in a few words."""
-    return "; then ".join(KIND_LABELS.get(kind, kind) for kind, _ in groupby(list_end_kinds(side)))
+    return "; then ".join(END_LABELS.get(kind, kind) for kind, _ in groupby(list_end_kinds(side)))

@@ -19,7 +19,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from ...reference.families import FAMILIES
-from ..drawing.atlas_sides import KIND_LABELS, list_end_kinds
+from ..drawing import END_LABELS, list_end_kinds
 from .labels import Badge, Label, name_other_bicycle, place_labels
 from .style import FAMILY_COLOURS, INK, WIDTHS, new_figure
 
@@ -34,7 +34,7 @@ _NORM = LogNorm(_SLOW, _FAST)
 _COLOURS = ListedColormap(colormaps["YlOrRd"](np.linspace(0.04, 0.82, 256)))
 _ABSENT_HATCH, _STABLE_HATCH, _UNRIDDEN_HATCH = "xxxx", "....", "////"
 _ABSENT_INK = "#a0a0a0"
-# Of what ends stability, `velodrome.reports.drawing.atlas_sides.list_end_kinds`. Subcritical branches are dashed.
+# Of what ends stability, `velodrome.reports.drawing.list_end_kinds`. Subcritical branches are dashed.
 _KIND_LINES: dict[str, Any] = {
     "supercritical": "-",
     "subcritical": (0, (4, 1.6)),
@@ -341,10 +341,10 @@ def list_kind_handles(boundaries: Sequence[Mapping[str, Any]]) -> Iterator[Any]:
     ]
     for kind in _KIND_LINES:
         if any(one == kind and length > 1 for one, length in pieces):
-            yield Line2D([], [], color=INK, ls=_KIND_LINES[kind], label=f"end of stability: {KIND_LABELS[kind]}")
+            yield Line2D([], [], color=INK, ls=_KIND_LINES[kind], label=f"end of stability: {END_LABELS[kind]}")
     if any(boundary["bautin"] for boundary in boundaries):
         yield Line2D([], [], **_BAUTIN, label="its criticality changes (Bautin point)")
     for kind in _KIND_LINES:
         if any(one == kind and length == 1 for one, length in pieces):
             mark: dict[str, Any] = {"marker": "s", "color": "white", "mec": INK, "ms": 4, "ls": ""}
-            yield Line2D([], [], **mark, label=f"on the plane alone: {KIND_LABELS[kind]}")
+            yield Line2D([], [], **mark, label=f"on the plane alone: {END_LABELS[kind]}")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..drawing.atlas_sides import describe_end_kinds
+from ..drawing import describe_end_kinds
 from .curve_chart import draw_plane
 from .document import list_engine_styles, render_page
 from .tables import PageTable, TableColumn

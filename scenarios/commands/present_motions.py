@@ -13,7 +13,6 @@ from rich.table import Table
 from rich.text import Text
 
 from ...reference.stability import are_zero
-from ...reports.drawing.atlas_sides import describe_end_kinds
 from ..motions import NOT_SEARCHED
 from ..scenario import BENCHMARK
 from .tables import Column, print_table
@@ -265,6 +264,8 @@ def show_atlas(console: Console, document: Mapping[str, Any], out: Path) -> None
 
 def _show_sides(console: Console, region: Mapping[str, Any]) -> None:
     """Print what ends the stable sections of a region as alpha grows, and within what their circles are stable."""
+    from ...reports.drawing import describe_end_kinds  # other tables of motions do not need drawings
+
     for side in ("start", "end"):
         words = f"family {region['family']}, {side} of stable sections: {describe_end_kinds(region[side])}"
         turns = [point for point in region["bautin"] if point["side"] == side]
