@@ -279,10 +279,27 @@ def _close_boundary(
     except ValueError as error:
         absent.append(Absence(last.alpha, number, str(error)))
         return boundary
+    try:
+        _follow_to_vanishing(bicycle, boundaries, last, closing, absent)
+    except ValueError as error:
+        absent.append(Absence(last.alpha, number, f"its ends are not followed to alpha = {closing.alpha:.9g}: {error}"))
+    return replace(boundary, vanishing=closing)
+
+
+def _follow_to_vanishing(
+    bicycle: Bicycle, boundaries: list[Boundary], last: AtlasCurve, closing: CriticalPoint, absent: list[Absence]
+) -> None:
+    """Append shapes between the last one of a family's boundaries and the point where the last of them vanishes.
+
+    Raises
+    ------
+    ValueError
+        If the family cannot be followed there, or the ends' criticality is not the same where they meet.
+    """
     before: Ends = last.alpha, last.hopf
     for left in _LEFT:
         alpha = closing.alpha - left * (closing.alpha - last.alpha)
-        family = trace(bicycle, Paraboloid(alpha), number)
+        family = trace(bicycle, Paraboloid(alpha), last.family)
         sections = stable_sections(family)
         here: Ends = alpha, _examine_sections(family, sections)
         _add_bautin_points(bicycle, boundaries, before, here, absent)
@@ -291,10 +308,8 @@ def _close_boundary(
         before = here
         # Where the ends meet at a single pair of eigenvalues, their criticality is the same.
         if closing.kind != "tangency" or not any(a and b and changes_criticality(a, b) for a, b in here[1]):
-            return replace(boundary, vanishing=closing)
-    why = f"the criticality of both ends is not the same up to alpha = {before[0]:.9g}, where they meet"
-    absent.append(Absence(last.alpha, number, why))
-    return replace(boundary, vanishing=closing)
+            return
+    raise ValueError(f"their criticality is not the same at alpha = {before[0]:.9g}")
 
 
 def _add_bautin_points(

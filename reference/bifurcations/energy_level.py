@@ -63,15 +63,20 @@ class EnergyLevel:
         Returns
         -------
         rates : ndarray, shape (n, 6), complex
-            Time derivatives of the variables; nan if a point cannot be reached.
+            Time derivatives of the variables; nan if a point cannot be reached, or if the bicycle's nine coordinates
+            have a singular mass matrix, as where a wheel has no mass.
         rear_rate : ndarray, shape (n,), complex
             [rad/s].
         """
         y, level = np.ascontiguousarray(variables, complex), np.ascontiguousarray(energy, complex)
         rates, rear_rate = np.full(y.shape, np.nan, complex), np.full(len(y), np.nan, complex)
         surface, c = self.equations.surface, constants(self.equations.bicycle)
-        if not level_field(y, level, self.state, surface.function.complex, surface.parameters, c, rates, rear_rate):
-            rates[:] = np.nan
+        try:
+            found = level_field(y, level, self.state, surface.function.complex, surface.parameters, c, rates, rear_rate)
+        except ZeroDivisionError:  # see `velodrome.reference.circular.Steady.expand`
+            found = False
+        if not found:
+            rates[:] = complex(np.nan, np.nan)  # derivatives are taken of imaginary parts
         return rates, rear_rate
 
     def circle(self, energy: float) -> np.ndarray:

@@ -173,6 +173,9 @@ def examine_hopf(family: Family, motion: CircularMotion, frequency: float, ends_
         return level.field(variables, energy)[0]
 
     jacobian, _ = linearise_field(field, level.centre, level.energy)
+    if not np.all(np.isfinite(jacobian)):
+        why = "the mass matrix of all coordinates is singular, since a part of the bicycle has no inertia"
+        return replace(point, why_undefined=why)
     if are_zero(np.linalg.eigvals(jacobian)).any():
         return replace(point, why_undefined="the energy is extreme along the family")
     # Oscillations are measured by their angles, and by the position in units of the circle's radius, since nearly level

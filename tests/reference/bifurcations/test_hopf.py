@@ -1,5 +1,6 @@
 """Hopf points of the benchmark bicycle on the bowl of alpha = 1/200, where four stable sections' ends are."""
 
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 
@@ -147,3 +148,12 @@ def test_the_amplitude_is_undefined_on_the_plane_and_with_damping() -> None:
     assert "not conserved" in (found.why_undefined or "")
     assert found.energy == point.energy
     assert examine_hopf(level_curve, end.motion, end.eigenvalue.imag).amplitude_slope is None
+
+
+def test_a_bicycle_with_a_massless_wheel_has_no_normal_form_and_says_why() -> None:
+    """The field on level sets of energy needs the mass matrix of all coordinates, of which the wheel's angle is one."""
+    massless = replace(BICYCLE, rear_wheel_mass=0.0, rear_wheel_Ixx=0.0, rear_wheel_Iyy=0.0)
+    curve = trace(massless, BOWL, 2)
+    point = examine_hopf(curve, curve.equations.motion(curve.points[len(curve.points) // 2].unknowns), 2.0)
+    assert point.form is None
+    assert "a part of the bicycle has no inertia" in (point.why_undefined or "")
