@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 from altered import Altered, pressing_ctrl_c, raising
 from rich.console import Console
+from stored_documents import stored
 
 from tests.literature import published, rounds_to
 from tests.sealing import contents
@@ -137,16 +138,27 @@ def test_circular_tells_people_the_same(velodrome) -> None:
         assert words in result.stdout
 
 
-def test_circular_says_within_what_it_is_stable(velodrome) -> None:
-    """A circle of family 4; `tests/reference/bifurcations` compares it with its section's."""
+@pytest.mark.slow
+def test_circular_searches_within_what_it_is_stable(velodrome) -> None:
+    """A circle of family 4; `tests/reference/bifurcations` compares such with their section's."""
     where = ("--alpha", "0.005", "--rear-rate", "11.103300308685844", "--near", "0.4789,2.6150", "--within")
     found = velodrome("circular", *where, "--json").json()
     assert found["family"] == 4
     assert found["stable_within"] == pytest.approx(0.00397302, rel=1e-6)
     assert found["no_bound_because"] is None
-    words = io.StringIO()
-    show_circular(Console(file=words, width=120), found)
-    assert "Lyapunov stable, within 0.003973 rad (0.228 deg) of lean" in words.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("bound", "why", "words"),
+    [
+        (0.00397302, None, "Lyapunov stable, within 0.003973 rad (0.228 deg) of lean"),
+        (None, "no orbit", "small disturbances die out; it is not known how large they may be: no orbit"),
+    ],
+)
+def test_circular_says_within_what_it_is_stable(bound: float | None, why: str | None, words: str) -> None:
+    file = io.StringIO()
+    show_circular(Console(file=file, width=120), stored("circular") | {"stable_within": bound, "no_bound_because": why})
+    assert words in file.getvalue()
 
 
 def test_an_unstable_circle_has_no_bound(velodrome) -> None:
