@@ -17,7 +17,8 @@ from numba.core.compiler import Compiler
 from numba.core.dispatcher import _FunctionCompiler
 from numba.core.registry import CPUDispatcher
 
-from .loading import PartLibrary, find_environments
+from .callbacks import Callback
+from .loading import PartLibrary, connect_environments
 
 
 class _PartPipeline(Compiler):
@@ -96,22 +97,11 @@ class Kernel(CPUDispatcher):
         self._compiler = _Compiler(py_func, self.targetdescr, targetoptions, locals, Compiler)
         self.part = KernelPart(py_func, locals, targetoptions)
 
+    def typeof_pyval(self, val: Any) -> Any:
+        """Return the type of an argument that numba's compiled code does not know; that of a callback is kept."""
+        return val.numba_type if type(val) is Callback else super().typeof_pyval(val)
+
     @property
     def _numba_type_(self) -> Any:
         """Type that numba gives this kernel in functions that it compiles."""
         return self.part._numba_type_
-
-
-def connect_environments(result: Any) -> Any:
-    """Let machine code find the environments of the parts that it was linked from, which are in no other machine code.
-
-    Returns
-    -------
-    numba CompileResult
-        With these environments, so that they live as long.
-    """
-    result.library._ensure_finalized()
-    environments = find_environments(result)
-    for environment in environments:
-        result.library.codegen.set_env(environment.env_name, environment)
-    return result._replace(referenced_envs=environments)
