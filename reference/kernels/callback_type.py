@@ -14,7 +14,7 @@ from typing import Any
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.datamodel import models
-from numba.core.typing import signature
+from numba.core.typing.templates import signature
 from numba.extending import NativeValue, lower_builtin, register_model, unbox
 
 
