@@ -11,14 +11,16 @@ compiled to machine code when Python calls it, and to bitcode when another kerne
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 from numba.core.compiler import Compiler
 from numba.core.dispatcher import _FunctionCompiler
 from numba.core.registry import CPUDispatcher
 
+from .cache import KernelCache
 from .callbacks import Callback
-from .loading import PartLibrary, connect_environments
+from .loading import Part, PartLibrary, connect_environments
 
 
 class _PartPipeline(Compiler):
@@ -86,16 +88,19 @@ class Kernel(CPUDispatcher):
     targetoptions : dict
         As those of numba's dispatchers, which are unpickled with them.
 
-    Attributes
-    ----------
-    part : KernelPart
-        The kernel as other kernels call it.
     """
 
     def __init__(self, py_func: Callable[..., Any], locals: dict[str, Any], targetoptions: dict[str, Any]) -> None:
         super().__init__(py_func, locals, targetoptions)
         self._compiler = _Compiler(py_func, self.targetdescr, targetoptions, locals, Compiler)
-        self.part = KernelPart(py_func, locals, targetoptions)
+
+    @cached_property
+    def part(self) -> KernelPart:
+        """The kernel as other kernels call it; made when it is first compiled into one, which is mostly never."""
+        part = KernelPart(self.py_func, self.locals, self.targetoptions)
+        if isinstance(self._cache, KernelCache):
+            part._cache = KernelCache(self.py_func, Part)
+        return part
 
     def typeof_pyval(self, val: Any) -> Any:
         """Return the type of an argument that numba's compiled code does not know; that of a callback is kept."""

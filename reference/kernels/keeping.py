@@ -16,7 +16,7 @@ from numba.core import sigutils
 from .cache import KernelCache, is_cacheable
 from .callbacks import Callback
 from .dispatchers import Kernel
-from .loading import MachineCode, Part
+from .loading import MachineCode
 
 
 def declare_kept_kernel(function: Callable[..., Any], options: dict[str, Any]) -> Any:
@@ -32,7 +32,6 @@ def declare_kept_kernel(function: Callable[..., Any], options: dict[str, Any]) -
     kernel = Kernel(function, {}, {"nopython": True, **options})
     if is_cacheable(function):
         kernel._cache = KernelCache(function, MachineCode)
-        kernel.part._cache = KernelCache(function, Part)
     return kernel
 
 
