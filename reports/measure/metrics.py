@@ -86,13 +86,15 @@ def compute_metrics(
     result["not_finite"] = reported.not_finite()
     found = find_mismatches(reported, trajectory, reference, size, step_noise)
     result["inconsistent_reports"] = [mismatch.as_json() for mismatch in found if not mismatch.holds]
-    result |= _force_metrics(trajectory, trajectory if reference is None else reference, surface)
+    friction, least = _measure_forces(trajectory, trajectory if reference is None else reference, surface)
+    result |= friction
     result |= {
         "steps": trajectory.steps,
         "unconverged_steps": trajectory.unconverged_steps,
         "largest_residual": trajectory.largest_residual,
         "cpu_time": trajectory.cpu_time,
         "real_time_factor": simulated / trajectory.cpu_time if trajectory.cpu_time > 0 else None,
+        "min_normal_force": least,
         "fell_at": fall,
         "ended": None if trajectory.fall is not None else trajectory.ended,
     }
@@ -157,10 +159,12 @@ def rate_error(trajectory: Trajectory, reference: Trajectory) -> float | None:
     return float((difference / sizes[moving]).max()) if moving.any() else None
 
 
-def _force_metrics(trajectory: Trajectory, rolling: Trajectory, surface: Surface) -> dict[str, float | None]:
-    """Return the least normal force [N], negative where the ground would have to pull, which no contact can do.
+def _measure_forces(
+    trajectory: Trajectory, rolling: Trajectory, surface: Surface
+) -> tuple[dict[str, float | None], float | None]:
+    """Return the friction that rolling needs by the reference's forces, and when the engine first has too little.
 
-    Also the friction that rolling needs by the reference's forces, and when the engine first has too little.
+    Also the least normal force [N], negative where the ground would have to pull, which no contact can do.
     """
     result: dict[str, float | None] = dict.fromkeys(("required_friction", "friction", "friction_left_at"))
     result["friction"] = trajectory.friction
@@ -170,8 +174,7 @@ def _force_metrics(trajectory: Trajectory, rolling: Trajectory, surface: Surface
         result["required_friction"] = float(divide_forces(*needed).max())
         if trajectory.friction is not None:
             result["friction_left_at"] = cone_is_left(trajectory.friction, rolling, surface)
-    result["min_normal_force"] = None if own is None else float(own[0].min())
-    return result
+    return result, None if own is None else float(own[0].min())
 
 
 def find_horizon(trajectory: Trajectory, reference: Trajectory, growth_rate: float, size: float) -> float | None:
