@@ -261,7 +261,7 @@ class Trajectory:
     def not_finite(self) -> list[str]:
         """Return the names of the given fields that are not finite in some samples."""
         given = ((name, getattr(self, name)) for name in SHAPES)
-        return [name for name, value in given if value is not None and not np.all(np.isfinite(value))]
+        return [name for name, value in given if value is not None and not np.isfinite(value).all()]
 
 
 def _shorten(value: Any) -> str:

@@ -13,10 +13,43 @@ from .shooting import Flow
 _LOOKS = 64  # states over a period; forces change as smoothly as the lean does
 
 
+def ride_orbit(flow: Flow, orbit: PeriodicOrbit, samples: int) -> list[PreciseMotion]:
+    """Ride a period of an orbit with the reference, leg by leg, since a disturbance may grow large in a period.
+
+    Parameters
+    ----------
+    flow : Flow
+        Near the orbit, see `Flow.moved_to`.
+    orbit : PeriodicOrbit
+    samples : int
+        Number of intervals between samples in a period, at least.
+
+    Returns
+    -------
+    list of PreciseMotion
+        A ride for each leg, from yaw 0 to the start of the next one.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be ridden, with the reason.
+    """
+    bicycle, surface = flow.equations.bicycle, flow.equations.surface
+    looks, motions = -(-samples // len(orbit.states)) + 1, []
+    for start, duration in zip(orbit.states, orbit.durations, strict=True):
+        state = flow.moved_to(start).near
+        # A rim that lies inside the ground at the start is an error, too.
+        motion = simulate(bicycle, surface, state[:9], state[9:18], np.linspace(0.0, duration, looks))
+        if motion.ended is not None:
+            raise ValueError(motion.ended)
+        motions.append(motion)
+    return motions
+
+
 def explain_orbit(flow: Flow, orbit: PeriodicOrbit) -> tuple[str, ...]:
     """Explain why an orbit cannot be ridden: one text for each obstacle, none if it can.
 
-    The reference rides one period, leg by leg, since a disturbance may grow large in a period.
+    The reference rides one period.
 
     Parameters
     ----------
@@ -28,19 +61,11 @@ def explain_orbit(flow: Flow, orbit: PeriodicOrbit) -> tuple[str, ...]:
     -------
     tuple of str
     """
-    bicycle, surface = flow.equations.bicycle, flow.equations.surface
-    looks = -(-_LOOKS // len(orbit.states)) + 1
-    pushing = []
-    for start, duration in zip(orbit.states, orbit.durations, strict=True):
-        state = flow.moved_to(start).near
-        try:
-            motion = simulate(bicycle, surface, state[:9], state[9:18], np.linspace(0.0, duration, looks))
-        except ValueError as error:  # a rim lies inside the ground at the start
-            return (str(error),)
-        if motion.ended is not None:
-            return (motion.ended,)
-        pushing.append(_find_normal_forces(surface, motion))
-    least = np.concatenate(pushing).min(axis=0)
+    try:
+        motions = ride_orbit(flow, orbit, _LOOKS)
+    except ValueError as error:
+        return (str(error),)
+    least = np.concatenate([_find_normal_forces(flow.equations.surface, motion) for motion in motions]).min(axis=0)
     return tuple(
         f"the ground would have to pull the {wheel} wheel: {force:.3g} N"
         for wheel, force in zip(WHEELS, least, strict=True)

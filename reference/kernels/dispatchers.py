@@ -11,13 +11,16 @@ compiled to machine code when Python calls it, and to bitcode when another kerne
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 from numba.core.compiler import Compiler
 from numba.core.dispatcher import _FunctionCompiler
 from numba.core.registry import CPUDispatcher
 
-from .loading import PartLibrary, find_environments
+from .cache import KernelCache
+from .callbacks import Callback
+from .loading import Part, PartLibrary, connect_environments
 
 
 class _PartPipeline(Compiler):
@@ -85,33 +88,25 @@ class Kernel(CPUDispatcher):
     targetoptions : dict
         As those of numba's dispatchers, which are unpickled with them.
 
-    Attributes
-    ----------
-    part : KernelPart
-        The kernel as other kernels call it.
     """
 
     def __init__(self, py_func: Callable[..., Any], locals: dict[str, Any], targetoptions: dict[str, Any]) -> None:
         super().__init__(py_func, locals, targetoptions)
         self._compiler = _Compiler(py_func, self.targetdescr, targetoptions, locals, Compiler)
-        self.part = KernelPart(py_func, locals, targetoptions)
+
+    @cached_property
+    def part(self) -> KernelPart:
+        """The kernel as other kernels call it; made when it is first compiled into one, which is mostly never."""
+        part = KernelPart(self.py_func, self.locals, self.targetoptions)
+        if isinstance(self._cache, KernelCache):
+            part._cache = KernelCache(self.py_func, Part)
+        return part
+
+    def typeof_pyval(self, val: Any) -> Any:
+        """Return the type of an argument that numba's compiled code does not know; that of a callback is kept."""
+        return val.numba_type if type(val) is Callback else super().typeof_pyval(val)
 
     @property
     def _numba_type_(self) -> Any:
         """Type that numba gives this kernel in functions that it compiles."""
         return self.part._numba_type_
-
-
-def connect_environments(result: Any) -> Any:
-    """Let machine code find the environments of the parts that it was linked from, which are in no other machine code.
-
-    Returns
-    -------
-    numba CompileResult
-        With these environments, so that they live as long.
-    """
-    result.library._ensure_finalized()
-    environments = find_environments(result)
-    for environment in environments:
-        result.library.codegen.set_env(environment.env_name, environment)
-    return result._replace(referenced_envs=environments)

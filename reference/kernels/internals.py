@@ -31,6 +31,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
         "Dispatcher.compile",
         "Dispatcher.get_call_template",
         "Dispatcher.get_overload",
+        "Dispatcher.typeof_pyval",
     ),
     "numba.core.registry": ("CPUDispatcher._numba_type_",),
     "numba.core.runtime": ("_nrt_python.c_helpers",),
@@ -45,6 +46,7 @@ _PARAMETERS: dict[str, dict[str, tuple[str, ...]]] = {
     "numba.core.cpu": {"CPUContext.get_executable": ("self", "library", "fndesc", "env")},
     "numba.core.dispatcher": {
         "Dispatcher.__init__": ("self", "py_func", "locals", "targetoptions", "pipeline_class"),
+        "Dispatcher.typeof_pyval": ("self", "val"),
         "_FunctionCompiler.__init__": ("self", "py_func", "targetdescr", "targetoptions", "locals", "pipeline_class"),
         "_FunctionCompiler._compile_core": ("self", "args", "return_type"),
         "_FunctionCompiler._customize_flags": ("self", "flags"),

@@ -9,16 +9,14 @@ Only for a numba that has all `internals`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
-from numba.core import sigutils, types
-from numba.core.ccallback import CFunc
-from numba.extending import typeof_impl
+from numba.core import sigutils
 
 from .cache import KernelCache, is_cacheable
-from .dispatchers import Kernel, connect_environments
-from .loading import MachineCode, Part
+from .callbacks import Callback
+from .dispatchers import Kernel
+from .loading import MachineCode
 
 
 def declare_kept_kernel(function: Callable[..., Any], options: dict[str, Any]) -> Any:
@@ -34,32 +32,14 @@ def declare_kept_kernel(function: Callable[..., Any], options: dict[str, Any]) -
     kernel = Kernel(function, {}, {"nopython": True, **options})
     if is_cacheable(function):
         kernel._cache = KernelCache(function, MachineCode)
-        kernel.part._cache = KernelCache(function, Part)
     return kernel
-
-
-class _Callback(CFunc):
-    """A C callback that keeps its type as an argument of kernels, which numba would make anew for every call."""
-
-    def _compile_uncached(self) -> Any:
-        return connect_environments(super()._compile_uncached())
-
-    @cached_property
-    def numba_type(self) -> types.FunctionType:
-        """Type of the callback as a first-class function."""
-        return types.FunctionType(self._sig)
-
-
-@typeof_impl.register(_Callback)
-def _typeof_callback(callback: _Callback, context: Any) -> types.FunctionType:
-    return callback.numba_type
 
 
 def compile_kept_callback(
     function: Callable[..., Any], signature: Any, cache: bool, options: dict[str, Any]
-) -> _Callback:
+) -> Callback:
     """Compile a function to a C callback; for the parameters see `compilation.compile_callback`."""
-    callback = _Callback(function, sigutils.normalize_signature(signature), locals={}, options=options)
+    callback = Callback(function, sigutils.normalize_signature(signature), locals={}, options=options)
     if cache and is_cacheable(function):
         callback._cache = KernelCache(function, MachineCode)
     try:

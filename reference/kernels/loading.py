@@ -162,6 +162,21 @@ def find_environments(result: Any) -> tuple[Any, ...]:
     return tuple(env for env in result._find_referenced_environments() if mentions[env.env_name] > 1)
 
 
+def connect_environments(result: Any) -> Any:
+    """Let machine code find the environments of the parts that it was linked from, which are in no other machine code.
+
+    Returns
+    -------
+    numba CompileResult
+        With these environments, so that they live as long.
+    """
+    result.library._ensure_finalized()
+    environments = find_environments(result)
+    for environment in environments:
+        result.library.codegen.set_env(environment.env_name, environment)
+    return result._replace(referenced_envs=environments)
+
+
 def _take_common(result: Any) -> _Common:
     # For the compilation only, and not always possible to write to a file.
     result.fndesc.typemap = result.fndesc.calltypes = None

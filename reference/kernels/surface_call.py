@@ -1,8 +1,9 @@
 """Calls of a surface's compiled function.
 
-numba calls a function that is passed as an argument through a check for a Python object in its place, and counts
-a reference to the array of parameters before and after each call, atomically. The functions of
-surfaces are C callbacks (`compilation.compile_callback`) and borrow their parameters, so neither is needed.
+It is a C callback (`compilation.compile_callback`), which numba calls directly if its type is the suite's own
+(`callback_type`). Where numba keeps the compiled code, or a kernel has the function from a struct, it is a first-class
+function. That is called through a check for a Python object in its place, with a reference to the array of parameters
+counted before and after each call, atomically. Surfaces borrow their parameters, so neither is needed.
 """
 
 # numba fills its types in at run time.

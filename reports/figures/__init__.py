@@ -5,6 +5,7 @@ from .bifurcations import bifurcation_figure, drawn_sections
 from .eigenvalues import eigenvalue_figure
 from .families import family_figure
 from .float32 import float32_figure
+from .orbit_tracks import drawn_orbits, orbit_track_figure
 from .precision import precision_figure
 from .solution_curve import make_curves
 from .style import (
@@ -35,6 +36,7 @@ __all__ = [
     "SweepRuns",
     "average_cells",
     "bifurcation_figure",
+    "drawn_orbits",
     "drawn_sections",
     "eigenvalue_figure",
     "family_figure",
@@ -44,6 +46,7 @@ __all__ = [
     "make_cells",
     "make_curves",
     "new_figure",
+    "orbit_track_figure",
     "precision_figure",
     "stable_figure",
     "sweep_figure",

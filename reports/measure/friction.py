@@ -11,11 +11,11 @@ from .kernels.forces import split_forces
 
 def normal_force(trajectory: Trajectory, surface: Surface) -> np.ndarray | None:
     """Return the contact forces along the surface's upward normal, shape (n, 2) [N]; None where they are not given."""
-    parts = _split_forces(trajectory, surface)
+    parts = separate_forces(trajectory, surface)
     return None if parts is None else parts[0]
 
 
-def _split_forces(trajectory: Trajectory, surface: Surface) -> tuple[np.ndarray, np.ndarray] | None:
+def separate_forces(trajectory: Trajectory, surface: Surface) -> tuple[np.ndarray, np.ndarray] | None:
     """Return the contact forces along the surface's upward normal and across it, each of shape (n, 2) [N]."""
     if trajectory.contact_force is None or trajectory.contact_point is None:
         return None
@@ -44,10 +44,14 @@ def required_friction(trajectory: Trajectory, surface: Surface) -> np.ndarray:
     ValueError
         If the trajectory has no contact points or forces.
     """
-    parts = _split_forces(trajectory, surface)
+    parts = separate_forces(trajectory, surface)
     if parts is None:
         raise ValueError(f"{trajectory.engine} gives no contact forces")
-    pressure, tangential = parts
+    return divide_forces(*parts)
+
+
+def divide_forces(pressure: np.ndarray, tangential: np.ndarray) -> np.ndarray:
+    """Return the coefficients of friction that forces need, all of shape (n, 2); see `required_friction`."""
     # A wheel in the air needs no friction.
     ratio = np.divide(tangential, pressure, out=np.full(pressure.shape, np.inf), where=pressure > 0)
     return np.where((pressure == 0) & (tangential == 0), 0.0, ratio)

@@ -21,7 +21,7 @@ from ...reference.surface import Surface
 from .balance import measure_work
 from .consistency import evaluate_ride, find_mismatches, largest_speed
 from .fall import fell_at, until_fall
-from .friction import cone_is_left, normal_force, required_friction
+from .friction import cone_is_left, divide_forces, separate_forces
 from .limits import ROUND_OFF
 from .quantities import QUANTITIES
 
@@ -86,14 +86,15 @@ def compute_metrics(
     result["not_finite"] = reported.not_finite()
     found = find_mismatches(reported, trajectory, reference, size, step_noise)
     result["inconsistent_reports"] = [mismatch.as_json() for mismatch in found if not mismatch.holds]
-    result |= _friction_metrics(trajectory, trajectory if reference is None else reference, surface)
+    friction, least = _measure_forces(trajectory, trajectory if reference is None else reference, surface)
+    result |= friction
     result |= {
         "steps": trajectory.steps,
         "unconverged_steps": trajectory.unconverged_steps,
         "largest_residual": trajectory.largest_residual,
         "cpu_time": trajectory.cpu_time,
         "real_time_factor": simulated / trajectory.cpu_time if trajectory.cpu_time > 0 else None,
-        "min_normal_force": least_normal_force(trajectory, surface),
+        "min_normal_force": least,
         "fell_at": fall,
         "ended": None if trajectory.fall is not None else trajectory.ended,
     }
@@ -158,21 +159,22 @@ def rate_error(trajectory: Trajectory, reference: Trajectory) -> float | None:
     return float((difference / sizes[moving]).max()) if moving.any() else None
 
 
-def _friction_metrics(trajectory: Trajectory, rolling: Trajectory, surface: Surface) -> dict[str, float | None]:
-    """Return the friction that rolling needs by the reference's forces, and when the engine first has too little."""
+def _measure_forces(
+    trajectory: Trajectory, rolling: Trajectory, surface: Surface
+) -> tuple[dict[str, float | None], float | None]:
+    """Return the friction that rolling needs by the reference's forces, and when the engine first has too little.
+
+    Also the least normal force [N], negative where the ground would have to pull, which no contact can do.
+    """
     result: dict[str, float | None] = dict.fromkeys(("required_friction", "friction", "friction_left_at"))
     result["friction"] = trajectory.friction
-    if rolling.contact_force is not None and rolling.contact_point is not None:
-        result["required_friction"] = float(required_friction(rolling, surface).max())
+    own = separate_forces(trajectory, surface)
+    needed = own if rolling is trajectory else separate_forces(rolling, surface)
+    if needed is not None:
+        result["required_friction"] = float(divide_forces(*needed).max())
         if trajectory.friction is not None:
             result["friction_left_at"] = cone_is_left(trajectory.friction, rolling, surface)
-    return result
-
-
-def least_normal_force(trajectory: Trajectory, surface: Surface) -> float | None:
-    """Return the least normal contact force [N]; negative where the ground would have to pull, which no contact can."""
-    normal = normal_force(trajectory, surface)
-    return None if normal is None else float(normal.min())
+    return result, None if own is None else float(own[0].min())
 
 
 def find_horizon(trajectory: Trajectory, reference: Trajectory, growth_rate: float, size: float) -> float | None:

@@ -148,7 +148,7 @@ def bifurcations_command(
     surface: GroundOption = None,
     family: Annotated[int | None, typer.Option(min=1, max=4, help="Only curves with this family, 1 to 4.")] = None,
     bicycle: BicycleOption = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for bifurcations.json and the figure bifurcations.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for bifurcations.json and the figures.")] = None,
     formats: FormatOption = None,
     columns: ColumnsOption = None,
     as_json: JsonOption = False,

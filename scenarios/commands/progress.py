@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import os
-import sys
 import threading
 import time
 from collections.abc import Sequence
 from types import TracebackType
+from typing import TYPE_CHECKING
 
-from rich import progress as bars
-from rich.console import Group, RenderableType
-from rich.live import Live
-from rich.spinner import Spinner
-from rich.text import Text
-
+from .compilation import describe_compilation
 from .terminal import make_console
+
+if TYPE_CHECKING:
+    from rich.text import Text
 
 LOADING = "loading the libraries"
 COMPUTING = "computing the motion"
@@ -25,9 +23,6 @@ SILENCE = "VELODROME_PROGRESS"  # environment variable: off for no progress
 # Where stderr is no terminal, the first line comes after so many seconds: a command that is quick, or complains about
 # its input, writes nothing but its result. Then the time doubles until a line comes a minute.
 _FIRST_LINE, _LONGEST_PAUSE = 5.0, 60.0
-_WIDEST_BAR, _NARROWEST_BAR = 40, 5
-# Loaded by commands that need it. It is looked up here because its import, with numba's, takes half a second.
-_COMPILATION = f"{__name__.partition('.scenarios.')[0]}.reference.kernels.compilation"
 
 
 class ProgressBars:
@@ -46,34 +41,27 @@ class ProgressBars:
     def __init__(self, doing: str = LOADING) -> None:
         self._console = make_console(stderr=True)
         wanted = os.environ.get(SILENCE) != "off"
-        self._animated = wanted and self._console.is_terminal and not self._console.is_dumb_terminal
         self._doing: str | None = doing
         self._latest: str | None = None  # what was counted last
         self._since = time.monotonic()
-        self._spinner = Spinner("dots", Text())
-        self._tasks: dict[str, bars.TaskID] = {}
-        self._below: Sequence[Text] = ()
-        self._bars = bars.Progress(
-            bars.TextColumn("{task.description}", markup=False),
-            bars.BarColumn(bar_width=None),
-            bars.TextColumn("{task.fields[count]}", markup=False),
-            bars.TimeRemainingColumn(compact=True),
-            console=self._console,
-        )
-        self._live = Live(console=self._console, transient=True, get_renderable=self._make_picture)
+        self._animation = None
+        if wanted and self._console.is_terminal and not self._console.is_dumb_terminal:
+            from .animation import Animation  # imported here: it takes as long as a motion's computation
+
+            self._animation = Animation(self._console, lambda: self._doing)
         self._ended = threading.Event()
         self._speaker = threading.Thread(target=self._write_lines, name="progress", daemon=True) if wanted else None
 
     def __enter__(self) -> ProgressBars:
-        if self._animated:
-            self._live.start(refresh=True)
+        if self._animation is not None:
+            self._animation.start()
         elif self._speaker is not None:
             self._speaker.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        if self._animated:
-            self._live.stop()
+        if self._animation is not None:
+            self._animation.stop()
         elif self._speaker is not None:
             self._ended.set()
             self._speaker.join()
@@ -97,9 +85,8 @@ class ProgressBars:
         # Parts of a second, or of another number with decimals; pieces are counted as a whole.
         shown = f"{done:.1f}" if unit in ("s", "1/m") else f"{done:.0f}"
         count = f"{shown}{'' if total is None else f' of {total:g}'} {unit}"
-        if name not in self._tasks:
-            self._tasks[name] = self._bars.add_task(name, total=total, count=count)
-        self._bars.update(self._tasks[name], completed=done, total=total, count=count)
+        if self._animation is not None:
+            self._animation.move_bar(name, done, total, count)
         self._latest = f"{name} {count}"
         self._doing = None
 
@@ -109,28 +96,8 @@ class ProgressBars:
 
     def show_below(self, lines: Sequence[Text]) -> None:
         """Show lines below the bars, on a terminal only, in place of those before."""
-        self._below = lines
-
-    def _make_picture(self) -> RenderableType:
-        """Return what a terminal shows now."""
-        rows: list[RenderableType] = []
-        compiling = describe_compilation()
-        doing = compiling or self._doing
-        if doing is not None:
-            self._spinner.update(text=Text(f"{doing} ({time.monotonic() - self._since:.0f} s)"))
-            rows.append(self._spinner)
-        if self._tasks:
-            table = self._bars.make_tasks_table(self._bars.tasks)
-            # As wide as its texts, with a bar that takes what they leave.
-            table.width = min(self._console.width, self._measure_texts() + _WIDEST_BAR)
-            rows.append(table)
-        return Group(*rows, *self._below)
-
-    def _measure_texts(self) -> int:
-        """Return the width of the bars' texts and of the gaps between the columns."""
-        tasks = self._bars.tasks
-        words = max(len(task.description) for task in tasks) + max(len(task.fields["count"]) for task in tasks)
-        return words + len("00:00") + 3
+        if self._animation is not None:
+            self._animation.below = lines
 
     def _write_lines(self) -> None:
         """Write plain lines until the command has ended."""
@@ -144,14 +111,3 @@ class ProgressBars:
         # Something that is said is done before or after what the bars count, so that only one of both goes on.
         now = self._latest if self._doing is None else self._doing
         return "; ".join(part for part in (describe_compilation(), now) if part is not None)
-
-
-def describe_compilation() -> str | None:
-    """Say how many kernels have been compiled; None if none is being compiled."""
-    # The module may be there and still be at its imports.
-    find_compilation = getattr(sys.modules.get(_COMPILATION), "find_compilation", None)
-    found = None if find_compilation is None else find_compilation()
-    if found is None:
-        return None
-    compiled, most = found
-    return f"compiling kernels, once on this machine: {compiled} of at most {most}"

@@ -3,8 +3,9 @@
 Names are imported when they are first used: one motion needs a third of what families and the atlas need.
 """
 
-from importlib import import_module as _import_module
 from typing import TYPE_CHECKING
+
+from ..lazy import import_when_used as _import_when_used
 
 if TYPE_CHECKING:
     from .atlas import make_atlas as make_atlas
@@ -43,24 +44,22 @@ __all__ = [
     "write_families",
 ]
 
-_HOME = {
-    "make_atlas": ".atlas",
-    "Bifurcations": ".bifurcations",
-    "find_bifurcations": ".bifurcations",
-    "write_bifurcations": ".bifurcations",
-    "NOT_SEARCHED": ".circular",
-    "CircularSolution": ".circular",
-    "search_bound": ".circular",
-    "solve_circular": ".circular",
-}
-
-
 if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
-
-    def __getattr__(name: str) -> object:
-        """Import a name of the room when it is first used."""
-        if name not in __all__:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        value = getattr(_import_module(_HOME.get(name, ".families"), __name__), name)
-        globals()[name] = value
-        return value
+    __getattr__ = _import_when_used(
+        __name__,
+        {
+            ".atlas": ("make_atlas",),
+            ".bifurcations": ("Bifurcations", "find_bifurcations", "write_bifurcations"),
+            ".circular": ("NOT_SEARCHED", "CircularSolution", "search_bound", "solve_circular"),
+            ".families": (
+                "MERGING",
+                "CriticalShapes",
+                "FamilyCurve",
+                "SolutionFamilies",
+                "families_document",
+                "find_critical_shapes",
+                "follow_families",
+                "write_families",
+            ),
+        },
+    )

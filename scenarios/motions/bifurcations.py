@@ -13,6 +13,7 @@ from ...reference.bifurcations.hopf import HopfPoint, find_hopf_points
 from ...reference.bifurcations.orbit_branch import OrbitBranch
 from ...reference.bifurcations.orbit_events import OrbitEvent, find_events
 from ...reference.bifurcations.orbit_search import find_largest_orbit, orbits_of_amplitude
+from ...reference.bifurcations.orbit_track import OrbitTrack, track_orbit
 from ...reference.bifurcations.orbits import PeriodicOrbit
 from ...reference.bifurcations.ridden import explain_orbit
 from ...reference.bifurcations.small_orbits import flow_near
@@ -33,18 +34,22 @@ LISTED_AMPLITUDES = (0.001, 0.005, 0.02)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ListedOrbit:
-    """A periodic orbit with the reasons why it cannot be ridden, none if it can."""
+    """A periodic orbit with the reasons why it cannot be ridden, none if it can, and its wheel tracks."""
 
     orbit: PeriodicOrbit
     unphysical_because: tuple[str, ...]
+    track: OrbitTrack | None
 
     def as_json(self) -> dict[str, Any]:
         """Return this orbit's part of the document."""
+        track = self.track
         return {
             **_describe_orbit(self.orbit),
             "state": self.orbit.state.tolist(),
             "physical": not self.unphysical_because,
             "unphysical_because": list(self.unphysical_because),
+            "yaw_advance": None if track is None else track.yaw_advance,
+            "track": None if track is None else {"rear": track.rear.tolist(), "front": track.front.tolist()},
         }
 
 
@@ -214,7 +219,10 @@ def _examine(curve: Family, point: HopfPoint) -> Bifurcation:
     except ValueError as error:
         return replace(found, why_no_orbits=str(error))
     flow = flow_near(point)
-    orbits = [ListedOrbit(orbit=orbit, unphysical_because=explain_orbit(flow, orbit)) for orbit in _list_orbits(branch)]
+    orbits = [
+        ListedOrbit(orbit=orbit, unphysical_because=explain_orbit(flow, orbit), track=track_orbit(flow, orbit))
+        for orbit in _list_orbits(branch)
+    ]
     return replace(found, orbits=tuple(orbits), events=tuple(find_events(branch)), branch=branch)
 
 
@@ -226,7 +234,7 @@ def _list_orbits(branch: OrbitBranch) -> Sequence[PeriodicOrbit]:
 
 
 def write_bifurcations(document: Mapping[str, Any], out: Path, output: FigureOutput = DEFAULT_FIGURES) -> list[Path]:
-    """Write the document and its figure into a folder, which is made if it does not exist.
+    """Write the document and its figures into a folder, which is made if it does not exist.
 
     Parameters
     ----------
@@ -234,24 +242,34 @@ def write_bifurcations(document: Mapping[str, Any], out: Path, output: FigureOut
         As `Bifurcations.as_json` returns it.
     out : Path
     output : FigureOutput
-        How the figure is written.
+        How the figures are written.
 
     Returns
     -------
     list of Path
-        What is written; without stable circles there is no figure.
+        What is written; without stable circles there is no figure of branches, and without orbits none of tracks.
 
     Raises
     ------
     ScenarioError
         If the folder cannot be made.
     """
-    from ...reports.figures import bifurcation_figure, drawn_sections, write_formats
+    from ...reports.figures import (
+        bifurcation_figure,
+        drawn_orbits,
+        drawn_sections,
+        orbit_track_figure,
+        write_formats,
+    )
 
     make_folder(out)
     path = out / "bifurcations.json"
     write_json(path, document)
-    if not drawn_sections(document):
-        return [path]
-    draw = partial(bifurcation_figure, document)
-    return [path, *write_formats(out / "bifurcations", draw, output.formats, output.columns)]
+    written = [path]
+    for name, drawn, draw in (
+        ("bifurcations", drawn_sections(document), bifurcation_figure),
+        ("orbit-tracks", drawn_orbits(document), orbit_track_figure),
+    ):
+        if drawn:
+            written += write_formats(out / name, partial(draw, document), output.formats, output.columns)
+    return written

@@ -22,8 +22,9 @@ from ...reference.stability import growth_rate, growth_rates, linearise, sorted_
 from ...reference.starts import StartRequest, StartState, compute_starts
 from ...reference.surface import Plane, Surface, evaluate, is_level, is_of_revolution
 from ...reference.wheel_overlap import require_separate_wheels
-from ..error import MissingMotionError, ScenarioError
+from ..error import ScenarioError
 from .circular_motions import MotionKey, find_alike_motions, find_kept_motion, make_motion_key
+from .missing_motion import describe_missing_motion
 from .schema import CircularTable, Perturbation, Scenario, Simulation, UprightTable
 
 _NO_PERTURBATION = Perturbation()
@@ -241,12 +242,6 @@ def _make_doubtful_start(scenario: Scenario, start: _Prepared) -> Start:
         require_clear_rims(bicycle, surface, q)
         require_separate_wheels(bicycle, q)
     return _assemble_start(scenario, start, undisturbed, (q, qd), rate)
-
-
-def describe_missing_motion(error: NoSuchMotion | SearchFailed, place: str = "") -> MissingMotionError:
-    """Return the error for users of a search without a result; ``place`` precedes its message."""
-    message = f"{place}{error}"
-    return MissingMotionError(message, "no-such-motion" if isinstance(error, NoSuchMotion) else "search-failed")
 
 
 def output_times(simulation: Simulation) -> np.ndarray:

@@ -3,8 +3,9 @@
 Names are imported when they are first used: a worker needs a third of what the command does.
 """
 
-from importlib import import_module as _import_module
 from typing import TYPE_CHECKING
+
+from ..lazy import import_when_used as _import_when_used
 
 if TYPE_CHECKING:
     from .cluster import on_cluster as on_cluster
@@ -57,27 +58,19 @@ __all__ = [
     "write_sweep_page",
 ]
 
-_HOMES = {
-    ".cluster": ("on_cluster",),
-    ".figure": ("SweepPlot", "check_plots", "parse_plots", "read_sweep_folder", "write_sweep_figures"),
-    ".file": ("SweepFile",),
-    ".page": ("PAGE", "write_sweep_page"),
-    ".plan": ("Task", "plan_sweep"),
-    ".pool": ("Done",),
-    ".rows": ("BROKEN", "COMPUTED", "REFUSED", "STATUSES"),
-    ".run": ("Work", "locally", "run_sweep"),
-    ".store": ("RESULTS",),
-    ".summary": ("resume_command", "status_of", "summarise_sweep"),
-}
-_HOME = {name: home for home, names in _HOMES.items() for name in names}
-
-
 if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
-
-    def __getattr__(name: str) -> object:
-        """Import a name of the room when it is first used."""
-        if name not in _HOME:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        value = getattr(_import_module(_HOME[name], __name__), name)
-        globals()[name] = value
-        return value
+    __getattr__ = _import_when_used(
+        __name__,
+        {
+            ".cluster": ("on_cluster",),
+            ".figure": ("SweepPlot", "check_plots", "parse_plots", "read_sweep_folder", "write_sweep_figures"),
+            ".file": ("SweepFile",),
+            ".page": ("PAGE", "write_sweep_page"),
+            ".plan": ("Task", "plan_sweep"),
+            ".pool": ("Done",),
+            ".rows": ("BROKEN", "COMPUTED", "REFUSED", "STATUSES"),
+            ".run": ("Work", "locally", "run_sweep"),
+            ".store": ("RESULTS",),
+            ".summary": ("resume_command", "status_of", "summarise_sweep"),
+        },
+    )

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from velodrome.reference.bifurcations.hopf import HopfPoint, find_hopf_points
+from velodrome.reference.bifurcations.orbit_track import track_orbit
 from velodrome.reference.bifurcations.orbits import PeriodicOrbit, amplitude_condition, solve_orbit
 from velodrome.reference.bifurcations.ridden import explain_orbit
 from velodrome.reference.bifurcations.small_orbits import (
@@ -79,6 +80,12 @@ def test_the_reference_rides_every_leg_to_the_start_of_the_next() -> None:
         end = independent(motion.q, motion.qd)[-1]
         assert np.abs(end - after).max() < 1e-11 * growth * (1 + np.abs(after).max())
     assert explain_orbit(flow_near(point), orbit) != ()
+    track = track_orbit(flow_near(point), orbit)
+    assert track is not None
+    cosine, sine = np.cos(track.yaw_advance), np.sin(track.yaw_advance)
+    turn = np.array([[cosine, -sine], [sine, cosine]])
+    for own in (track.rear, track.front):  # it goes on where it began, turned
+        assert own[-1] == pytest.approx(turn @ own[0], abs=1e-11 * growth * 10)
 
 
 def test_orbits_do_not_depend_on_the_number_of_legs() -> None:

@@ -22,10 +22,12 @@ from velodrome.reference.inputs import Inputs
 from velodrome.reference.surface import Paraboloid
 from velodrome.reports.figures import (
     bifurcation_figure,
+    drawn_orbits,
     eigenvalue_figure,
     family_figure,
     float32_figure,
     growth_figure,
+    orbit_track_figure,
     precision_figure,
     stable_figure,
     use_style,
@@ -154,6 +156,7 @@ DRAWN: dict[str, Callable[[int], Figure]] = {
     "float32": partial(float32_figure, FLOAT32),
     "eigenvalues": eigenvalues,
     "bifurcations": lambda columns: bifurcation_figure(stored_bifurcations(), columns),
+    "orbit tracks": lambda columns: orbit_track_figure(stored_bifurcations(), columns),
     "growth": lambda columns: growth_figure(*atlas_of_planes(), columns),
     "stable": lambda columns: stable_figure(*atlas_of_planes(), columns),
     "within": lambda columns: within_figure(bounded_atlas(), columns),
@@ -280,6 +283,23 @@ def test_the_ground_is_told_with_its_units() -> None:
     assert find_unit("motion.rear_rate") == "rad/s"
     assert find_unit("bicycle.rear_frame_mass") == "kg"
     assert find_unit("title") is find_unit("no.such.field") is None
+
+
+def test_tracks_are_drawn_until_they_have_gone_around() -> None:
+    document = stored_bifurcations()
+    with use_style():
+        figure = orbit_track_figure(document)
+    drawn = drawn_orbits(document)
+    assert [point["family"] for point, _ in drawn] == [2, 4]  # the third Hopf point ends no stable section
+    for axes, (_, orbit) in zip(figure.axes, drawn, strict=True):
+        (rear,) = (line for line in axes.lines if line.get_gid() == "rear track")
+        x, y = np.asarray(rear.get_xdata()), np.asarray(rear.get_ydata())
+        periods = len(x) / len(orbit["track"]["rear"])
+        precession = abs(np.angle(np.exp(1j * orbit["yaw_advance"])))
+        assert (periods - 1) * precession < 2 * np.pi <= periods * precession
+        # Every period begins where the one before it ends.
+        seams = np.arange(1, int(periods)) * len(orbit["track"]["rear"])
+        assert np.hypot(x[seams] - x[seams - 1], y[seams] - y[seams - 1]) == pytest.approx(0, abs=1e-5)
 
 
 def test_orbits_are_drawn_stable_from_the_supercritical_end_to_the_torus_bifurcation() -> None:

@@ -23,7 +23,6 @@ from velodrome.reports.measure.fall import fell_at, until_fall
 from velodrome.reports.measure.metrics import (
     compute_metrics,
     find_horizon,
-    least_normal_force,
     orientation_errors,
     position_errors,
 )
@@ -213,10 +212,10 @@ def test_least_normal_force_sees_a_ground_that_pulls() -> None:
     force = EXACT.contact_force.copy()
     touching = replace(EXACT, contact_point=seen.point, contact_force=force)
     expected = np.einsum("nwi,nwi->nw", force, seen.normal).min()
-    assert least_normal_force(touching, BOWL) == pytest.approx(expected, rel=1e-12)
+    assert measure(touching)["min_normal_force"] == pytest.approx(expected, rel=1e-12)
     force[3, 1] = -2 * seen.normal[3, 1]
-    assert least_normal_force(replace(touching, contact_force=force), BOWL) == pytest.approx(-2.0, rel=1e-12)
-    assert least_normal_force(replace(touching, contact_point=None), BOWL) is None
+    assert measure(replace(touching, contact_force=force))["min_normal_force"] == pytest.approx(-2.0, rel=1e-12)
+    assert measure(replace(touching, contact_force=None))["min_normal_force"] is None
 
 
 @pytest.mark.parametrize("rate", [0.0, -0.4])

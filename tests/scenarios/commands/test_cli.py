@@ -559,7 +559,8 @@ def test_bifurcations_of_a_family(velodrome, tmp_path: Path) -> None:
     assert result.status == 0
     document = result.json()
     assert document == json.loads((tmp_path / "found" / "bifurcations.json").read_text())
-    assert (tmp_path / "found" / "bifurcations.png").stat().st_size > 10_000
+    for name in ("bifurcations.png", "orbit-tracks.png"):
+        assert (tmp_path / "found" / name).stat().st_size > 10_000
     ends = [point for point in document["hopf"] if point["ends_stable_section"]]
     assert [point["criticality"] for point in ends] == ["subcritical", "supercritical"]
     assert document["hopf"][:2] == ends
