@@ -189,6 +189,11 @@ def solve_orbit(
     )
 
 
+def find_monodromy(flow: Flow, orbit: PeriodicOrbit) -> np.ndarray:
+    """Return the derivative (7, 7) of the state after a period of an orbit by that at its start."""
+    return flow.ride_legs(orbit.state, orbit.unknowns[7:], _halves(orbit.steps)).start_derivatives[1]
+
+
 def _halves(steps: int) -> np.ndarray:
     return np.array([steps // 2, steps // 2])
 

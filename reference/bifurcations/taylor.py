@@ -95,3 +95,36 @@ def choose_radius(compute: Callable[[float], complex], radii: Sequence[float]) -
         raise ValueError("the function has no value on circles of any radius")
     best = int(np.nanargmin(errors))
     return Estimate(complex(values[best + 1]), float(errors[best]), radii[best + 1])
+
+
+def expand_on_circle(function: Callable[[np.ndarray], np.ndarray], radius: float) -> np.ndarray:
+    """Compute Taylor coefficients of a function of one complex variable about zero.
+
+    Parameters
+    ----------
+    function : callable
+        Maps complex arguments (n,) to values (n, d), n = `SAMPLES`.
+    radius : float
+        Of the circle on which the arguments lie.
+
+    Returns
+    -------
+    ndarray, shape (n, d), complex
+        The coefficients of ascending orders, useful well below n.
+    """
+    values = function(radius * np.exp(2j * np.pi * np.arange(SAMPLES) / SAMPLES))
+    return np.fft.fft(values, axis=0) / SAMPLES * (radius ** -np.arange(float(SAMPLES)))[:, None]
+
+
+def differentiate(function: Callable[[float], np.ndarray], size: float) -> np.ndarray:
+    """Return the derivative at zero of a function of a real variable by the central stencil of sixth order.
+
+    Parameters
+    ----------
+    function : callable
+        Maps a number to an array.
+    size : float
+        Distance of the stencil's points; the error is size^6 / 140 times the seventh derivative.
+    """
+    near, middle, far = (function(k * size) - function(-k * size) for k in (1, 2, 3))
+    return (45 * near - 9 * middle + far) / (60 * size)
