@@ -17,6 +17,7 @@ from velodrome.reference.bifurcations.small_orbits import flow_near, small_orbit
 from velodrome.reference.bifurcations.step_shift import eigenvalue_slope
 from velodrome.reference.families import trace
 from velodrome.reference.surface import Paraboloid
+from velodrome.reports.measure.convergence import observed_orders
 from velodrome.reports.measure.orbit_following import follow_orbit, predict_differences
 from velodrome.reports.measure.own_circle import OwnCircle, measure_at_start, measure_own_circle
 from velodrome.reports.measure.stability_boundary import circle_problem, locate_boundary
@@ -24,8 +25,10 @@ from velodrome.reports.measure.step_laws import predict_shift, second_order_meth
 
 BICYCLE, BOWL = Bicycle(), Paraboloid(1 / 200)
 FASTEST = 20.0  # of the wheels and weaves at these circles [rad/s]
-SETTLED = (1.0, 0.2)  # window after gaps have decayed by e^-20, shorter than half a weave [s]
+# Windows shorter than half a weave [s]: after gaps have decayed by e^-20, and generalized alpha's own oscillations by
+# 0.8^50 at steps up to 10 ms.
 REFERENCE, EXUDYN, MULTIPLIERS = "reference", "exudyn", "mujoco-multipliers"
+WINDOWS = {MULTIPLIERS: (1.0, 0.2), EXUDYN: (0.5, 0.2)}
 OWN: dict[str, dict[str, Any]] = {
     REFERENCE: {"integrator": "modified-euler"},
     EXUDYN: {"newton_relative_tolerance": 1e-12},
@@ -47,7 +50,7 @@ def own_circle(name: str, step: float, start: Problem, frequency: float) -> OwnC
     engine, settings = engine_at(name, step)
     if name == REFERENCE:  # its constraints drift from the start on
         return measure_at_start(engine, settings, start, 1j * frequency, step)
-    return measure_own_circle(engine, settings, start, 1j * frequency, SETTLED)
+    return measure_own_circle(engine, settings, start, 1j * frequency, WINDOWS[name])
 
 
 def eigenvalue_deviation(name: str, step: float, hopf: HopfPoint) -> float:
@@ -134,35 +137,38 @@ def differences(name: str, kind: str, steps: int, periods: int) -> tuple[np.ndar
     return found, predict_differences(found, find_monodromy(flow, orbit), settled=2)
 
 
+def check_order(levels: list[np.ndarray], order: int) -> None:
+    """Check that differences at halved steps, divided by h^p, converge to others than zero: with a power of the step.
+
+    The power is the first at least: the next one of the method, or what is quadratic in the differences.
+    """
+    scaled = [found[1:] * 2.0 ** (order * level) for level, found in enumerate(levels)]
+    assert observed_orders(scaled)[0] > 0.85
+    assert np.abs(scaled[-1] - scaled[-2]).max() < 0.25 * np.abs(scaled[-1]).max()
+
+
 def check_orbits(name: str, kind: str, coarse: int, order: int, periods: int) -> None:
-    rides = [differences(name, kind, steps, periods) for steps in (coarse, 2 * coarse)]
-    errors = [np.abs(found).max(axis=1) for found, _ in rides]
-    step = ORBITS_PERIOD[kind] / coarse
-    # The next power of the step, relative, changes the order by its logarithm.
-    assert np.log2(errors[0][1:] / errors[1][1:]) == pytest.approx(order, abs=np.log2(1 + FASTEST * step))
-    found, predicted = rides[1]
+    rides = [differences(name, kind, steps, periods) for steps in (coarse, 2 * coarse, 4 * coarse)]
+    check_order([found for found, _ in rides], order)
+    found, predicted = rides[-1]
     # What is quadratic in the differences, over amplitudes, and grows with the number of periods.
-    assert np.abs(predicted - found)[-1].max() < 0.05 * errors[1][-1]
+    assert np.abs(predicted - found)[-1].max() < 0.05 * np.abs(found[-1]).max()
 
 
-ORBITS_PERIOD = {"unstable": 2.80, "stable": 0.83}
-
-
-@pytest.mark.parametrize(("kind", "coarse"), [("unstable", 512), ("stable", 128)])
+@pytest.mark.parametrize(("kind", "coarse"), [("unstable", 256), ("stable", 64)])
 def test_multipliers_follow_orbits_with_order_four(kind: str, coarse: int) -> None:
     check_orbits(MULTIPLIERS, kind, coarse, order=4, periods=12)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "coarse"), [("unstable", 1024), ("stable", 512)])
+@pytest.mark.parametrize(("kind", "coarse"), [("unstable", 512), ("stable", 256)])
 def test_exudyn_follows_orbits_with_order_two(kind: str, coarse: int) -> None:
     check_orbits(EXUDYN, kind, coarse, order=2, periods=12)
 
 
 def test_the_papers_method_follows_orbits_with_order_two() -> None:
     """Its error in a period grows with its constraints' drift, so that multipliers do not predict it."""
-    errors = [np.abs(differences(REFERENCE, "stable", steps, 12)[0]).max(axis=1)[1:] for steps in (512, 1024)]
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(2, abs=np.log2(1 + FASTEST * ORBITS_PERIOD["stable"] / 512))
+    check_order([differences(REFERENCE, "stable", 256 * 2**level, 12)[0] for level in range(3)], order=2)
 
 
 _LOOKS = 32  # samples in a period: extremes are missed by (pi / 32)^2 / 2, 5e-3
@@ -201,7 +207,8 @@ def test_engines_see_the_criticality(name: str, side: Any) -> None:
     offset, change = orbit.state - hopf.level.circle(orbit.energy), orbit.energy - hopf.energy
     ride = (orbit.period, periods)
     inside = amplitudes(name, hopf, steps[name], orbit.energy, 0.8 * offset, ride)
-    outside = amplitudes(name, hopf, steps[name], orbit.energy, 1.1 * offset, ride)
+    # From beyond an unstable orbit the bicycle falls before the other rides end.
+    outside = amplitudes(name, hopf, steps[name], orbit.energy, 1.1 * offset, (orbit.period, periods // 2))
     beyond = amplitudes(name, hopf, steps[name], hopf.energy - change / 4, 0.1 * offset, ride)
     if hopf.criticality == SUBCRITICAL:
         assert inside[-1] < 0.8 * inside[3] < 0.7 * amplitude
