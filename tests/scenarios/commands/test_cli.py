@@ -542,6 +542,12 @@ def test_bifurcations_on_the_plane_say_why_they_are_undefined(velodrome) -> None
     assert first["orbits"] == []
 
 
+def test_bifurcations_refuse_a_step_of_no_engine(velodrome) -> None:
+    result = velodrome("bifurcations", "--alpha", "0.005", "--step", "0.01")
+    assert (result.status, result.stdout) == (2, "")
+    assert "--engine" in result.stderr
+
+
 def test_bifurcations_of_a_family_that_is_not_there(velodrome) -> None:
     result = velodrome("bifurcations", "--alpha", "0.005", "--family", "7")
     assert (result.status, result.stdout) == (2, "")
