@@ -170,7 +170,7 @@ def bifurcations_command(
         from ..error import ScenarioError
         from ..motions import find_bifurcations, write_bifurcations
         from ..scenario import make_bowl
-        from ..studies.engine_ends import configure_steps, measure_engine_ends
+        from ..studies import configure_steps, measure_engine_ends
         from .present_bifurcations import show_bifurcations
 
         ground, source = parse_ground(alpha, surface), load_bicycle(bicycle)

@@ -10,9 +10,13 @@ from typing import Any
 from ...engines.engine import REFERENCE, Engine, Settings, why_failed
 from ...engines.guard import call_engine
 from ...reference.bifurcations.hopf import HopfPoint
-from ...reports.measure.own_circle import measure_at_start, measure_own_circle
-from ...reports.measure.stability_boundary import StabilityBoundary, locate_boundary
-from ...reports.measure.step_laws import predict_shift
+from ...reports.measure import (
+    StabilityBoundary,
+    locate_boundary,
+    measure_at_start,
+    measure_own_circle,
+    predict_shift,
+)
 from ..error import ScenarioError
 from ..run import RunWatch, Trace
 from ..scenario import choose_engines, configure_engine, join_complaints

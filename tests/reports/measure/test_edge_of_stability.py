@@ -53,6 +53,21 @@ def own_circle(name: str, step: float, start: Problem, frequency: float) -> OwnC
     return measure_own_circle(engine, settings, start, 1j * frequency, WINDOWS[name])
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "settings"), [(EXUDYN, {"spectral_radius": 0.6}), (MULTIPLIERS, {"stabilisation": 60.0})]
+)
+def test_the_law_knows_the_methods_parameters(name: str, settings: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(OWN, name, OWN[name] | settings)
+    coarse, fine = (eigenvalue_deviation(name, step, point(2, 1)) for step in (0.005, 0.0025))
+    if name == EXUDYN:  # the next power of the step, relative
+        assert 0 < fine < FASTEST * 0.0025
+        assert fine / coarse == pytest.approx(0.5, abs=0.1)
+    else:  # all powers; a stencil's noise of 1e-11 in the eigenvalue, over a change of 1e3 h^4
+        assert coarse < 1e-3
+        assert fine < 1e-3 + 1e-11 / (1e3 * 0.0025**4)
+
+
 def eigenvalue_deviation(name: str, step: float, hopf: HopfPoint) -> float:
     """Return by how much the change of the weave's eigenvalue deviates from its law, relative to the law."""
     law = predict_shift(hopf, engine_at(name, step)[1])
