@@ -38,7 +38,9 @@ def step_runge_kutta(flow: Flow, state: np.ndarray, step: float, stabilisation: 
     q, qd = np.zeros(9, complex), state[len(_KEPT) :]
     q[_KEPT] = state[: len(_KEPT)]
     rotation, velocities = _rotation(q), _tree_velocities(q, qd)
-    turns, moving, changing = [], [], []
+    turns: list[np.ndarray] = []
+    moving: list[np.ndarray] = []
+    changing: list[np.ndarray] = []
     turn, stage_q, stage_velocities = np.zeros(3, complex), q, velocities
     for share in _STAGES:
         if share:
