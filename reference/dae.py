@@ -89,13 +89,13 @@ def _solve_bordered(
     Bodies without inertia make that matrix singular. The whole system is regular where every motion that the
     constraints allow has inertia, see `velodrome.reference.regularity.require_inertia`.
     """
-    mass, bias, rows, gamma = _bordered_parts(bicycle, surface, q, qd, p, inputs)
+    mass, bias, rows, gamma = bordered_parts(bicycle, surface, q, qd, p, inputs)
     system = np.block([[mass, -rows.T], [rows, np.zeros((6, 6))]])
     solution = np.linalg.solve(system, np.concatenate([-bias, -gamma]))
     return solution[:9], solution[9:]
 
 
-def _bordered_parts(
+def bordered_parts(
     bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndarray, p: np.ndarray, inputs: Inputs = NO_INPUTS
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return M (9, 9), h (9,) less the inputs, J (6, 9), gamma (6,) of M qdd + h = J^T F, J qdd + gamma = 0."""
@@ -123,7 +123,7 @@ def steady_forces(bicycle: Bicycle, surface: Surface, q: np.ndarray, qd: np.ndar
     ndarray, shape (2, 3)
         Forces of the ground on the rear and the front wheel in inertial axes [N].
     """
-    _, bias, rows, _ = _bordered_parts(bicycle, surface, q, qd, p)
+    _, bias, rows, _ = bordered_parts(bicycle, surface, q, qd, p)
     # Nine equations for six forces, which are consistent where the accelerations are zero.
     return np.linalg.lstsq(rows.T, bias, rcond=None)[0].reshape(2, 3)
 

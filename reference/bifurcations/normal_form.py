@@ -179,7 +179,8 @@ def expand_hopf(field: Field, centre: np.ndarray, energy: float, frequency: floa
             oscillating = np.outer(s, q) + np.outer(conjugate, q.conj())
             return field(centre + oscillating + np.outer(t, moved), energy + t).reshape(len(x), len(turns), -1)
 
-        mixed = np.fft.fft(expand_on_circle(along_family, radius, 2), axis=0)[1] / len(turns)
+        (quadratic,) = expand_on_circle(along_family, radius, [2])
+        mixed = np.fft.fft(quadratic, axis=0)[1] / len(turns)
         return complex(p @ mixed / unit)
 
     third, change = choose_radius(cubic, _RADII), choose_radius(growth, _RADII)

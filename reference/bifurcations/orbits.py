@@ -220,6 +220,17 @@ def solve_orbit(
     )
 
 
+def find_monodromy(flow: Flow, orbit: PeriodicOrbit) -> np.ndarray:
+    """Return the derivative (7, 7) of the state after a period of an orbit by that at its start.
+
+    A product of the legs' derivatives: what is small beside its largest entry is round-off.
+    """
+    states = orbit.states
+    flows = [flow.moved_to(state) for state in states]
+    legs = ride_legs(flows, states, orbit.durations, _steps_of_leg(orbit.steps, len(states)))
+    return np.linalg.multi_dot(legs.start_derivatives[::-1])
+
+
 def _residual(flows: Sequence[Flow], unknowns: np.ndarray, steps: int) -> float:
     states, durations = _split(unknowns)
     number, ends = np.array([_steps_of_leg(steps, len(states))]), np.empty(states.shape)

@@ -58,7 +58,8 @@ class Flow:
     near: np.ndarray
 
     @cached_property
-    def _ground(self) -> tuple:
+    def ground(self) -> tuple:
+        """Arguments of compiled kernels: the state near by, the surface for complex numbers, and the bicycle."""
         surface, c = self.equations.surface, constants(self.equations.bicycle, self.equations.inputs)
         return self.near, surface.function.complex, surface.parameters, c, aligned(c)
 
@@ -85,7 +86,7 @@ class Flow:
             If the start cannot be placed on the ground, or the ride is not finite.
         """
         ends = np.empty((len(durations), VARIABLES), complex)
-        energy, placed = kernel.flow_legs(start.astype(complex), durations.astype(complex), steps, *self._ground, ends)
+        energy, placed = kernel.flow_legs(start.astype(complex), durations.astype(complex), steps, *self.ground, ends)
         if not placed or not np.all(np.isfinite(ends)):
             raise ValueError("the bicycle does not ride from there")
         return ends, energy
@@ -102,7 +103,7 @@ class Flow:
     def rates(self, start: np.ndarray) -> np.ndarray:
         """Return the time derivatives (7,) of the independent variables."""
         out = np.full(VARIABLES, np.nan)
-        kernel.variable_rates(start.astype(complex), *self._ground, out)
+        kernel.variable_rates(start.astype(complex), *self.ground, out)
         return out
 
 

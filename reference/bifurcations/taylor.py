@@ -46,8 +46,10 @@ class Estimate:
     radius: float
 
 
-def expand_on_circle(function: Callable[[np.ndarray], np.ndarray], radius: float, order: int) -> np.ndarray:
-    """Compute the Taylor coefficient of an order of functions of a complex variable, about zero.
+def expand_on_circle(
+    function: Callable[[np.ndarray], np.ndarray], radius: float, orders: Sequence[int]
+) -> list[np.ndarray]:
+    """Compute the Taylor coefficients of some orders of functions of a complex variable, about zero.
 
     Parameters
     ----------
@@ -55,17 +57,21 @@ def expand_on_circle(function: Callable[[np.ndarray], np.ndarray], radius: float
         Maps complex numbers (m,) to values (m, ...), real for real numbers.
     radius : float
         Of the circle.
-    order : int
+    orders : sequence of int
         Well below `SAMPLES`.
 
     Returns
     -------
-    ndarray, shape (...)
+    list of ndarray, shape (...)
+        One for each order.
     """
     turns = np.exp(2j * np.pi * np.arange(SAMPLES // 2 + 1) / SAMPLES)
-    weights = turns**-order
-    weights[1:-1] *= 2  # with those of the lower half, which are conjugate
-    return np.real(np.tensordot(weights, function(radius * turns), axes=1)) / (SAMPLES * radius**order)
+    values = function(radius * turns)
+    counts = np.full(len(turns), 2.0)  # those of the lower half are conjugate
+    counts[[0, -1]] = 1
+    return [
+        np.real(np.tensordot(counts * turns**-order, values, axes=1)) / (SAMPLES * radius**order) for order in orders
+    ]
 
 
 def expand_conjugate(function: Callable[[np.ndarray, np.ndarray], np.ndarray], radius: float, order: int) -> np.ndarray:
@@ -94,7 +100,7 @@ def expand_conjugate(function: Callable[[np.ndarray, np.ndarray], np.ndarray], r
         s, t = np.outer(x, turns), np.outer(x, turns.conj())
         return function(s.ravel(), t.ravel()).reshape(*s.shape, -1)
 
-    rays = expand_on_circle(evaluate_rays, radius, order)
+    (rays,) = expand_on_circle(evaluate_rays, radius, [order])
     return np.fft.ifft(rays * (turns**-order)[:, None], axis=0)
 
 
@@ -132,3 +138,17 @@ def choose_radius(compute: Callable[[float], complex], radii: Sequence[float]) -
         raise ValueError("the function has no value on circles of any radius")
     best = int(np.nanargmin(errors))
     return Estimate(complex(values[best + 1]), float(errors[best]), radii[best + 1])
+
+
+def differentiate(function: Callable[[float], np.ndarray], size: float) -> np.ndarray:
+    """Return the derivative at zero of a function of a real variable by the central stencil of sixth order.
+
+    Parameters
+    ----------
+    function : callable
+        Maps a number to an array.
+    size : float
+        Distance of the stencil's points; the error is size^6 / 140 times the seventh derivative.
+    """
+    near, middle, far = (function(k * size) - function(-k * size) for k in (1, 2, 3))
+    return (45 * near - 9 * middle + far) / (60 * size)

@@ -1,4 +1,10 @@
-"""Measure rides: errors, drift, falls, friction, modes, orders, and the differences that round-off allows."""
+"""Measure rides: errors, drift, falls, friction, modes, orders, and the differences that round-off allows.
+
+What needs the room of bifurcations is imported when it is first used: rides are measured without.
+"""
+
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING
 
 from .balance import InputWork, conserved_energy, measure_work
 from .consistency import (
@@ -40,6 +46,17 @@ from .precision import (
 from .quantities import QUANTITIES, Quantity
 from .steady import steady_trajectory
 
+if TYPE_CHECKING:
+    from .orbit_following import follow_orbit as follow_orbit
+    from .orbit_following import predict_differences as predict_differences
+    from .own_circle import OwnCircle as OwnCircle
+    from .own_circle import measure_at_start as measure_at_start
+    from .own_circle import measure_own_circle as measure_own_circle
+    from .stability_boundary import StabilityBoundary as StabilityBoundary
+    from .stability_boundary import locate_boundary as locate_boundary
+    from .step_laws import StepLaw as StepLaw
+    from .step_laws import predict_shift as predict_shift
+
 __all__ = [
     "DISTURBANCES",
     "IDENTIFY_LEVELS",
@@ -58,9 +75,12 @@ __all__ = [
     "Mismatch",
     "Mode",
     "Modes",
+    "OwnCircle",
     "Quantity",
     "Scale",
     "Sensitivity",
+    "StabilityBoundary",
+    "StepLaw",
     "carry_errors",
     "compared_time",
     "comparison_horizon",
@@ -82,10 +102,14 @@ __all__ = [
     "find_mismatches",
     "find_modes",
     "flatten_metrics",
+    "follow_orbit",
     "identify",
     "interval_of",
     "jacobian_at",
+    "locate_boundary",
+    "measure_at_start",
     "measure_creep",
+    "measure_own_circle",
     "measure_sensitivity",
     "measure_step_errors",
     "measure_work",
@@ -94,6 +118,8 @@ __all__ = [
     "observed_orders",
     "order_limit",
     "position_errors",
+    "predict_differences",
+    "predict_shift",
     "relative_differences",
     "required_friction",
     "ride_limits",
@@ -104,3 +130,26 @@ __all__ = [
     "to_number",
     "until_fall",
 ]
+
+_HOME = {
+    "follow_orbit": ".orbit_following",
+    "predict_differences": ".orbit_following",
+    "OwnCircle": ".own_circle",
+    "measure_at_start": ".own_circle",
+    "measure_own_circle": ".own_circle",
+    "StabilityBoundary": ".stability_boundary",
+    "locate_boundary": ".stability_boundary",
+    "StepLaw": ".step_laws",
+    "predict_shift": ".step_laws",
+}
+
+
+if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
+
+    def __getattr__(name: str) -> object:
+        """Import a name of the room when it is first used."""
+        if name not in _HOME:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = getattr(_import_module(_HOME[name], __name__), name)
+        globals()[name] = value
+        return value

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
@@ -114,36 +115,86 @@ def jacobian_at(
     problem: Problem,
     interval: float,
     progress: Callable[[float], None] = lambda _: None,
+    begin: float | None = None,
+    disturbances: np.ndarray = DISTURBANCES,
 ) -> np.ndarray:
-    """Return an engine's reduced Jacobian (7, 7) at the settings' own step from ``interval`` [s]; see `identify`."""
+    """Return an engine's reduced Jacobian (7, 7) at the settings' own step.
+
+    Parameters
+    ----------
+    engine, settings, problem, progress
+        See `identify`.
+    interval : float
+        T, over which the flow is taken: a number of steps [s].
+    begin : float, optional
+        When it begins, a number of steps or zero; without it T/2, then T is an even number of steps [s].
+    disturbances : ndarray, shape (7,)
+        Of the independent variables.
+    """
     # Imported here because it takes a tenth of a second, and every run imports this module.
     from scipy.linalg import logm
 
-    flow = np.zeros((2, 7, 7))
+    window = (interval / 2 if begin is None else begin, interval)
+    flow, variables = np.zeros((2, 7, 7)), independent(problem.q, problem.qd)
     for j in range(7):
         for i, (multiple, weight) in enumerate(_STENCIL):
-            size = multiple * DISTURBANCES[j]
-            flow[:, :, j] += weight / DISTURBANCES[j] * _ride_disturbed(engine, settings, problem, interval, j, size)
+            disturbed = variables + multiple * disturbances[j] * np.eye(7)[j]
+            flow[:, :, j] += weight / disturbances[j] * ride_window(engine, settings, problem, window, disturbed)
             progress((j * len(_STENCIL) + i + 1) / (7 * len(_STENCIL)))
     propagator = flow[1] @ np.linalg.inv(flow[0])
     return np.real(logm(propagator)) / interval
 
 
-def _ride_disturbed(
-    engine: Engine, settings: Settings, problem: Problem, interval: float, variable: int, size: float
+def ride_window(
+    engine: Engine, settings: Settings, problem: Problem, window: tuple[float, float], variables: np.ndarray
 ) -> np.ndarray:
-    """Return a disturbed ride's independent variables after half an interval and one interval later, shape (2, 7)."""
-    v = independent(problem.q, problem.qd)
-    v[variable] += size
+    """Return the independent variables (2, 7) at the begin and the end of a window of a ride.
+
+    Parameters
+    ----------
+    engine : Engine
+    settings : Settings
+    problem : Problem
+        Its start gives the yaw, and the height and pitch near which the ride starts; its times are not used.
+    window : tuple of float
+        When it begins, zero or a number of steps, and how long it is, a number of steps [s].
+    variables : ndarray, shape (7,)
+        The independent variables `velodrome.reference.stability.VARIABLES` from which it starts.
+
+    Raises
+    ------
+    EngineError
+        If the engine does not ride through the window.
+    ValueError
+        If there is no such state, or the engine refuses the settings.
+    """
+    begin, interval = window
+    # Engines sample at equal times, which the begin and the interval are multiples of.
+    unit = _common_unit(begin, interval)
+    count = round((begin + interval) / unit)
+    started = start_from(problem, variables, unit * np.arange(count + 1))
+    engine.check(started, settings)
+    trajectory = ride_engine(engine, started, settings, lambda _: None)
+    if len(trajectory.time) <= count:
+        raise EngineError(f"{engine.name} did not ride through {begin + interval:g} s: {trajectory.ended}")
+    samples = [count - round(interval / unit), count]
+    return independent(trajectory.q[samples], trajectory.qd[samples])
+
+
+def _common_unit(begin: float, interval: float) -> float:
+    """Return the longest time of which both are multiples, at least a thousandth of the interval."""
+    if begin == 0:
+        return interval
+    share = Fraction(begin / interval).limit_denominator(1000)
+    return interval / share.denominator
+
+
+def start_from(problem: Problem, variables: np.ndarray, times: np.ndarray) -> Problem:
+    """Return a problem with other independent variables (7,) and times, at the same yaw and near the same height."""
+    x, y, lean, steer, lean_rate, steer_rate, rear_rate = variables.tolist()
     yaw = float(problem.q[YAW])
-    position = np.cos(yaw) * v[0] - np.sin(yaw) * v[1], np.sin(yaw) * v[0] + np.cos(yaw) * v[1]
+    position = np.cos(yaw) * x - np.sin(yaw) * y, np.sin(yaw) * x + np.cos(yaw) * y
     guess = float(problem.q[2]), float(problem.q[PITCH])
-    rates = float(v[4]), float(v[5]), float(v[6])
-    state = consistent_state(problem.bicycle, problem.surface, position, v[2], v[3], rates, yaw, guess)
-    times = 0.5 * interval * np.arange(4)
-    disturbed = Problem(problem.bicycle, problem.surface, *state, times, problem.inputs, problem.beyond_fall)
-    engine.check(disturbed, settings)
-    trajectory = ride_engine(engine, disturbed, settings, lambda _: None)
-    if len(trajectory.time) < 4:
-        raise EngineError(f"{engine.name} did not ride through {1.5 * interval:g} s: {trajectory.ended}")
-    return independent(trajectory.q[[1, 3]], trajectory.qd[[1, 3]])
+    rates = lean_rate, steer_rate, rear_rate
+    state = consistent_state(problem.bicycle, problem.surface, position, lean, steer, rates, yaw, guess)
+    return Problem(problem.bicycle, problem.surface, *state, times, problem.inputs, problem.beyond_fall)

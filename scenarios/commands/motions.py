@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from .completion import complete_engine
 from .options import (
     AlphaOption,
     BicycleOption,
@@ -28,6 +29,8 @@ from .options import (
     print_json,
     show_written,
 )
+
+_STEPS = (0.01, 0.005)  # at which engines' stable sections are measured [s]
 
 
 def circular_command(
@@ -148,6 +151,18 @@ def bifurcations_command(
     surface: GroundOption = None,
     family: Annotated[int | None, typer.Option(min=1, max=4, help="Only curves with this family, 1 to 4.")] = None,
     bicycle: BicycleOption = None,
+    engine: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Measure where these engines' own stable sections end, beside the paper's method: a name, a pattern, "
+            "or all; may be given several times.",
+            autocompletion=complete_engine,
+        ),
+    ] = None,
+    step: Annotated[
+        list[float] | None,
+        typer.Option(help="Step of the engines [s]; may be given several times. Without it 0.01 and 0.005."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for bifurcations.json and the figures.")] = None,
     formats: FormatOption = None,
     columns: ColumnsOption = None,
@@ -159,18 +174,26 @@ def bifurcations_command(
 
     figures = parse_figure_output(formats, columns, None if out is not None else "--out")
     with answering_missing_motion(as_json), ProgressBars() as progress:
+        from ..error import ScenarioError
         from ..motions import find_bifurcations, write_bifurcations
         from ..scenario import make_bowl
+        from ..studies import configure_steps, measure_engine_ends
         from .present_bifurcations import show_bifurcations
 
         ground, source = parse_ground(alpha, surface), load_bicycle(bicycle)
         progress.say("following the curves of circular motions")
-        document = find_bifurcations(
+        if step and not engine:
+            raise ScenarioError("--step is the step of engines; --engine NAME says of which")
+        riders = configure_steps(engine, step or _STEPS) if engine else {}
+        found = find_bifurcations(
             source.bicycle,
             make_bowl(ground),
             family,
             lambda done, points: progress.watch("orbits", done, points, "Hopf points"),
-        ).as_json(source.name)
+        )
+        points = [one.point for one in found.found]
+        ends = measure_engine_ends(points, riders, progress.watch)
+        document = {**found.as_json(source.name), "engines": [end.as_json() for end in ends]}
         written = [] if out is None else write_bifurcations(document, out, figures)
     with ending_with(0):
         if as_json:

@@ -38,6 +38,7 @@ def show_bifurcations(console: Console, document: Mapping[str, Any]) -> None:
         console.print("no Hopf point", markup=False)
     for section in document["stable_sections"]:
         _show_section(console, section)
+    _show_engines(console, document.get("engines", []))
     for number, reason in document["absent"].items():
         print_words(console, f"family {number}: no curve: {reason}", "yellow")
 
@@ -79,6 +80,29 @@ def _show_section(console: Console, section: Mapping[str, Any]) -> None:
     """Print the circles of a stable section with the amplitude within which they are stable."""
     name = "a curve without a number" if section["family"] is None else f"family {section['family']}"
     show_bounds(console, f"stable section of {name}", section)
+
+
+def _show_engines(console: Console, ends: Sequence[Mapping[str, Any]]) -> None:
+    """Print where engines' own stable sections end."""
+    if not ends:
+        return
+    print_words(console, "where engines' own stable sections end, from the reference's Hopf point", "bold")
+    found = [end for end in ends if end["failed_because"] is None]
+    if found:
+        columns = [
+            Column("engine", [end["engine"] for end in found], right=False),
+            Column("Hopf point", [f"H{end['hopf'] + 1}" for end in found], right=False),
+            Column("step", [f"{end['step']:.6f}" for end in found], "s"),
+            Column("rear rate", [f"{end['rear_rate']:.9f}" for end in found], "rad/s"),
+            Column("shift", [f"{end['shift']:z.4e}" for end in found], "rad/s"),
+            Column("law", ["" if end["law"] is None else f"{end['law']:z.4e}" for end in found], "rad/s"),
+            Column("shift / law", ["" if end["law"] is None else f"{end['shift'] / end['law']:.4f}" for end in found]),
+        ]
+        print_table(console, columns, keys=3)
+    for end in ends:
+        if end["failed_because"] is not None:
+            where = f"{end['engine']}, H{end['hopf'] + 1}, {end['step']:g} s"
+            print_words(console, f"{where}: {end['failed_because']}", "yellow")
 
 
 _END_WORDS = {

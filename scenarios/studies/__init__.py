@@ -1,4 +1,10 @@
-"""Studies of a bicycle, of the precision of engines, of all engines side by side, and of single precision."""
+"""Studies of a bicycle, of the precision of engines, of all engines side by side, and of single precision.
+
+What needs the room of bifurcations is imported when it is first used.
+"""
+
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING
 
 from .bicycle import BicycleStudy, study_bicycle, write_bicycle
 from .float32 import all_rode_float32, study_float32, write_float32
@@ -13,15 +19,23 @@ from .league import (
 from .league_settings import LeagueSettings, read_league_settings
 from .precision import all_ran, study_precision, write_precision
 
+if TYPE_CHECKING:
+    from .engine_ends import EngineEnd as EngineEnd
+    from .engine_ends import configure_steps as configure_steps
+    from .engine_ends import measure_engine_ends as measure_engine_ends
+
 __all__ = [
     "LEAGUE_LEVELS",
     "LEAGUE_SCENARIOS",
     "BicycleStudy",
+    "EngineEnd",
     "LeagueFolder",
     "LeagueSettings",
     "all_ran",
     "all_rode",
     "all_rode_float32",
+    "configure_steps",
+    "measure_engine_ends",
     "plan_league",
     "read_league_settings",
     "run_league",
@@ -32,3 +46,20 @@ __all__ = [
     "write_float32",
     "write_precision",
 ]
+
+_HOME = {
+    "EngineEnd": ".engine_ends",
+    "configure_steps": ".engine_ends",
+    "measure_engine_ends": ".engine_ends",
+}
+
+
+if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
+
+    def __getattr__(name: str) -> object:
+        """Import a name of the room when it is first used."""
+        if name not in _HOME:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = getattr(_import_module(_HOME[name], __name__), name)
+        globals()[name] = value
+        return value

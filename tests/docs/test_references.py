@@ -141,7 +141,7 @@ DOCUMENTS = {
     "history": ["history wheelmill==1.0,1.1 circle.toml --cache cache --out history --json"],
     "sweep": ["sweep sweep.toml --json"],
     "critical": ["critical --json"],
-    "bifurcations": ["bifurcations --alpha 0.005 --family 4 --json"],
+    "bifurcations": ["bifurcations --alpha 0.005 --family 4 --engine reference --step 0.01 --json"],
     "atlas": ["atlas --size 2000 --json"],
     "paper": ["paper --json"],
 }

@@ -218,7 +218,7 @@ def test_a_callback_of_the_wrong_signature_is_the_callers_error() -> None:
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"scenario": "q9"}, "no scenario 'q9' in the library (there are forward-left"),
+        ({"scenario": "q9"}, "no scenario 'q9' in the library (there are edge"),
         ({"engines": ["warp"]}, "engine 'warp' is not installed (there are reference"),
         ({"duration": -1}, "simulation.duration"),
         ({"changes": {"motion.warp": 1}}, "unknown key 'warp'"),

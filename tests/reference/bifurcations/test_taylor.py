@@ -1,7 +1,9 @@
+import math
+
 import numpy as np
 import pytest
 
-from velodrome.reference.bifurcations.taylor import choose_radius, expand_conjugate, expand_on_circle
+from velodrome.reference.bifurcations.taylor import choose_radius, differentiate, expand_conjugate, expand_on_circle
 
 RADII = [0.4 / 2**k for k in range(8)]
 
@@ -22,11 +24,6 @@ def test_coefficients_of_an_exponential() -> None:
             assert value == pytest.approx(expected, abs=2e-15 / 0.1**order)
 
 
-def test_coefficients_of_several_functions_of_one_variable() -> None:
-    found = expand_on_circle(lambda x: np.stack([np.exp(x), np.sin(x)], axis=-1), 0.1, 3)
-    np.testing.assert_allclose(found, [1 / 6, -1 / 6], atol=1e-12)
-
-
 def test_the_chosen_radius_has_the_error_that_is_estimated() -> None:
     """With poles at s, t = 1 the coefficient of s^2 t is 18, and large radii leave terms out."""
 
@@ -42,3 +39,17 @@ def test_the_chosen_radius_has_the_error_that_is_estimated() -> None:
 def test_no_radius_with_values_is_an_error() -> None:
     with pytest.raises(ValueError, match="no value"):
         choose_radius(lambda _: complex(np.nan), RADII)
+
+
+def test_coefficients_of_several_functions_of_one_variable() -> None:
+    found = expand_on_circle(lambda t: np.exp(2 * t)[:, None] * np.array([1.0, 3.0]), 0.1, range(6))
+    for order, values in enumerate(found):
+        # The terms left out are those of order 16 more, times 0.1^16; round-off is eps / 0.1^order.
+        expected = 2.0**order / math.factorial(order) * np.array([1.0, 3.0])
+        assert np.abs(values - expected).max() < 1e-15 * 10**order * 3
+
+
+def test_the_stencil_is_of_sixth_order() -> None:
+    errors = [abs(float(differentiate(lambda t: np.sin(1 + t), size)) - np.cos(1)) for size in (0.2, 0.1)]
+    assert errors[0] == pytest.approx(0.2**6 / 140 * np.cos(1), rel=0.02)  # the next term is of order size^2
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(6, abs=0.05)

@@ -209,7 +209,7 @@ def test_run_shows_a_table_and_where_things_are(velodrome, tmp_path: Path) -> No
 
 def test_run_by_tag_takes_all_that_have_it(velodrome) -> None:
     result = velodrome("run", "--tag", "stable", "--engine", "mujoco-native", *SHORT, "--json")
-    names = ["other-bicycle", "plane-circle", "q2", "q2-minus", "q2-plus", "sphere"]
+    names = ["edge", "other-bicycle", "plane-circle", "q2", "q2-minus", "q2-plus", "sphere"]
     assert [entry["scenario"] for entry in result.json()["runs"]] == names
     assert result.status == 0
 
@@ -583,6 +583,12 @@ def test_bifurcations_on_the_plane_say_why_they_are_undefined(velodrome) -> None
     assert first["criticality"] is first["amplitude_slope"] is first["amplitude_slope_error"] is None
     assert "circle's centre is free" in first["undefined_because"]
     assert first["orbits"] == []
+
+
+def test_bifurcations_refuse_a_step_of_no_engine(velodrome) -> None:
+    result = velodrome("bifurcations", "--alpha", "0.005", "--step", "0.01")
+    assert (result.status, result.stdout) == (2, "")
+    assert "--engine" in result.stderr
 
 
 def test_bifurcations_of_a_family_that_is_not_there(velodrome) -> None:
