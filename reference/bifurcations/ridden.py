@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..kinematics import WHEELS
+from ..normal_force import normal_forces
 from ..simulate import simulate
-from ..surface import evaluate
 from .orbits import PeriodicOrbit
 from .shooting import Flow
 
@@ -36,11 +36,7 @@ def explain_orbit(flow: Flow, orbit: PeriodicOrbit) -> tuple[str, ...]:
         return (str(error),)
     if motion.ended is not None:
         return (motion.ended,)
-    places = motion.contact[:, :, :2]
-    slopes = evaluate(surface, places[..., 0], places[..., 1])[..., 1:3]
-    normal = np.concatenate([-slopes, np.ones((*slopes.shape[:2], 1))], axis=-1)
-    pushing = np.einsum("nki,nki->nk", motion.force, normal) / np.linalg.norm(normal, axis=-1)
-    least = pushing.min(axis=0)
+    least = normal_forces(surface, motion.contact, motion.force).min(axis=0)
     return tuple(
         f"the ground would have to pull the {wheel} wheel: {force:.3g} N"
         for wheel, force in zip(WHEELS, least, strict=True)
