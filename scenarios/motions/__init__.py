@@ -8,6 +8,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .atlas import make_atlas as make_atlas
+    from .basin import Basin as Basin
+    from .basin import BasinRequest as BasinRequest
+    from .basin import find_basin as find_basin
+    from .basin import write_basin as write_basin
     from .bifurcations import Bifurcations as Bifurcations
     from .bifurcations import find_bifurcations as find_bifurcations
     from .bifurcations import write_bifurcations as write_bifurcations
@@ -24,23 +28,31 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MERGING",
+    "Basin",
+    "BasinRequest",
     "Bifurcations",
     "CircularSolution",
     "CriticalShapes",
     "FamilyCurve",
     "SolutionFamilies",
     "families_document",
+    "find_basin",
     "find_bifurcations",
     "find_critical_shapes",
     "follow_families",
     "make_atlas",
     "solve_circular",
+    "write_basin",
     "write_bifurcations",
     "write_families",
 ]
 
 _HOME = {
     "make_atlas": ".atlas",
+    "Basin": ".basin",
+    "BasinRequest": ".basin",
+    "find_basin": ".basin",
+    "write_basin": ".basin",
     "Bifurcations": ".bifurcations",
     "find_bifurcations": ".bifurcations",
     "write_bifurcations": ".bifurcations",
