@@ -38,6 +38,22 @@ _STILL = 1e-5  # lean amplitude below which the edge's state is a circle [rad]
 
 
 @dataclass(frozen=True, eq=False)
+class PassedCircle:
+    """An unstable circle of the edge's energy, by which rides that start near the edge pass.
+
+    Attributes
+    ----------
+    variables : ndarray, shape (7,)
+        Its independent variables.
+    growth : complex
+        The eigenvalue of the fastest growth, of imaginary part >= 0 [1/s].
+    """
+
+    variables: np.ndarray
+    growth: complex
+
+
+@dataclass(frozen=True, eq=False)
 class EdgeState:
     """What rides on the edge tend to.
 
@@ -55,6 +71,8 @@ class EdgeState:
         Whether the ride repeats itself, or stands still in the heading frame.
     orbit : PeriodicOrbit or None
         The periodic orbit, solved for from the ride; None where it does not repeat itself or Newton's method fails.
+    passed : PassedCircle or None
+        The unstable circle next to the middle of the first part of the rides, before they separate.
     """
 
     time: float
@@ -63,6 +81,7 @@ class EdgeState:
     period: float
     settled: bool
     orbit: PeriodicOrbit | None
+    passed: PassedCircle | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +126,7 @@ def follow_edge(
     step = min(2 * np.pi / turn / _LOOKS if turn else np.inf, patience.interval)
     times = np.arange(round(_SEGMENT / step) + 1) * step
     flow, elapsed, swings = neighbours.flow, 0.0, []
+    passed = None
     starts: list[RideStart] | None = [inside.start, outside.start]
     while starts is not None and elapsed < longest and not _is_settled(swings):
         motions = [motion for motion in simulate_many(starts, times, precise.tolerance, threads) if _rides(motion)]
@@ -118,6 +138,8 @@ def follow_edge(
         last = int(apart[0]) if len(apart) else count - 1
         if last == 0:
             break
+        if elapsed == 0:
+            passed = _find_passed(neighbours, both[0, : last + 1], inside.outcome.energy)
         swings += _find_swings(both[0, : last + 1], elapsed, step)
         elapsed += last * step
         flow = flow.moved_to(both[0, last])
@@ -128,7 +150,17 @@ def follow_edge(
     settled = _is_settled(swings)
     energy = inside.outcome.energy
     orbit = _solve(flow, energy, first, final) if settled and final.amplitude > _STILL else None
-    return EdgeState(elapsed, energy, final.amplitude, final.time - first.time, settled, orbit)
+    return EdgeState(elapsed, energy, final.amplitude, final.time - first.time, settled, orbit, passed)
+
+
+def _find_passed(neighbours: StableNeighbours, variables: np.ndarray, energy: float) -> PassedCircle | None:
+    """Return the unstable circle next to the mean of the second half of variables (n, 7); None if there is none."""
+    try:
+        circle = neighbours.solve_circle(variables[len(variables) // 2 :].mean(axis=0), energy)
+        growth = neighbours.linearise_circle(circle).slowest
+    except ValueError:
+        return None
+    return PassedCircle(circle, growth) if growth.real > 0 else None
 
 
 def _rides(motion: PreciseMotion | ValueError) -> TypeGuard[PreciseMotion]:

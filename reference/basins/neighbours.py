@@ -131,6 +131,25 @@ class StableNeighbours:
     def _curve(self) -> Any:
         return _interpolate(self.energies, self.circles)
 
+    def solve_circle(self, variables: np.ndarray, energy: float) -> np.ndarray:
+        """Solve for a circle of an energy [J], stable or not, from independent variables (7,) near it.
+
+        Raises
+        ------
+        ValueError
+            If Newton's method does not converge.
+        """
+        state = self.flow.moved_to(variables).near
+        near = EnergyLevel(self.equations, state, variables[:-1], float(variables[-1]), energy)
+        try:
+            return near.circle(energy)
+        except np.linalg.LinAlgError as error:  # the energy is extreme there
+            raise ValueError(f"no circular motion is found: {error}") from error
+
+    def linearise_circle(self, circle: np.ndarray) -> ModalSize:
+        """Return how deviations from a circle (7,) are measured, and its slowest mode."""
+        return _measure_circle(self.level, circle)
+
     def are_inside(self, energies: np.ndarray) -> np.ndarray:
         """Return which energies (n,) are those of stable circles of the section."""
         return (energies > self.limits[0]) & (energies < self.limits[1])
@@ -231,11 +250,7 @@ def _describe_section(
     between = 0.5 * (energies[1:] + energies[:-1])
     exact = np.array([_solve_circle(levels, hand, energy) for energy in between])
     error = float(np.abs(_interpolate(energies, circles)(between) - exact).max())
-    flow = Flow(own.equations, own.state)
-    modes = []
-    for circle in circles:
-        state = flow.moved_to(circle).near
-        modes.append(measure_modes(own.equations.bicycle, own.equations.surface, state[:9], state[9:18]))
+    modes = [_measure_circle(own, circle) for circle in circles]
     branches = tuple(_follow_branches(family, section))
     orbits = [find_bounding_orbit(branch, own.energy) for branch in branches]
     return StableNeighbours(
@@ -261,6 +276,12 @@ def _solve_circle(levels: Sequence[EnergyLevel], hand: int, energy: float) -> np
     nearest = min(range(len(levels)), key=lambda k: abs(levels[k].energy - energy))
     circle = levels[nearest].circle(float(energy))
     return circle if nearest == 0 or hand == 1 else MIRROR * circle
+
+
+def _measure_circle(level: EnergyLevel, circle: np.ndarray) -> ModalSize:
+    """Return how deviations from a circle (7,) are measured."""
+    equations, state = level.equations, Flow(level.equations, level.state).moved_to(circle).near
+    return measure_modes(equations.bicycle, equations.surface, state[:9], state[9:18])
 
 
 def _follow_branches(family: Family, section: tuple[SectionEnd, SectionEnd]) -> Iterator[OrbitBranch]:
@@ -302,8 +323,7 @@ def _measure_orbit(equations: Steady, branch: OrbitBranch, circle: np.ndarray, o
     flow = Flow(equations, branch.point.level.state).moved_to(orbit.state)
     durations, steps = np.full(_LOOKS, orbit.period / _LOOKS), np.full(_LOOKS, max(orbit.steps // _LOOKS, 2))
     points = np.real(flow.ride(orbit.state, durations, steps)[0])
-    state = flow.moved_to(circle).near
-    forms = measure_modes(equations.bicycle, equations.surface, state[:9], state[9:18]).forms
+    forms = _measure_circle(branch.point.level, circle).forms
     sizes = deviation_sizes(forms[None], (points - circle)[None])[0, 1]
     return float(np.sqrt(np.mean(sizes**2)))
 

@@ -19,13 +19,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..bifurcations.energy_level import EnergyLevel
 from ..kinematics import LEAN, WHEELS
 from ..normal_force import normal_forces
 from ..simulate import PreciseMotion
 from ..stability import independent
 from ..surface import Surface
-from .modal_size import deviation_sizes, measure_modes
+from .modal_size import deviation_sizes
 from .neighbours import StableNeighbours
 from .outcome import ORBIT, RETURNED
 
@@ -149,14 +148,11 @@ def settles_elsewhere(neighbours: StableNeighbours, motion: PreciseMotion, energ
 
     The circle is solved for from the ride's last state.
     """
-    equations, variables = neighbours.equations, independent(motion.q, motion.qd)
+    variables = independent(motion.q, motion.qd)
     try:
-        state = neighbours.flow.moved_to(variables[-1]).near
-        level = EnergyLevel(equations, state, variables[-1, :-1], float(variables[-1, -1]), energy)
-        circle = level.circle(energy)
-        at = neighbours.flow.moved_to(circle).near
-        modes = measure_modes(equations.bicycle, equations.surface, at[:9], at[9:18])
-    except (ValueError, np.linalg.LinAlgError):
+        circle = neighbours.solve_circle(variables[-1], energy)
+        modes = neighbours.linearise_circle(circle)
+    except ValueError:
         return False
     if not modes.slowest.real < 0:
         return False

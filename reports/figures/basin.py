@@ -20,7 +20,7 @@ _COLOURS = {
     "returned": "#0072B2",
     "orbit": "#009E73",
     "elsewhere": "#CC79A7",
-    "lost-contact": "#F0E442",
+    "lost-contact": "#F5E6A3",
     "touched": "#D55E00",
     "fell": "#E69F00",
     "broke-off": "#6b6b6b",
@@ -135,7 +135,7 @@ def edge_rides_figure(document: Mapping[str, Any], columns: int = 2) -> Figure:
         if k >= len(edges) - across:
             axes.set_xlabel("time [s]")
     figure.suptitle(_title(document), x=0.01, ha="left", fontsize=8.5, parse_math=False)
-    figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=4 if columns == 2 else 2)
+    figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=3 if columns == 2 else 2)
     return figure
 
 
@@ -161,6 +161,9 @@ def _draw_edge(axes: Axes, edge: Mapping[str, Any], lean: float, limits: tuple[f
         shown = slice(int(left[0]) + 1 if len(left) else None)
         axes.fill_between(time[shown], least[shown], greatest[shown], color=colour, alpha=0.55, lw=0.8, gid=name)
         handles[name] = Patch(color=colour, alpha=0.55, label=f"{name} the edge")
+    if state is not None and state["passed_circle"] is not None:
+        axes.axhline(state["passed_circle"]["lean"], color=INK, lw=0.8, dashes=(1, 1.6))
+        handles["passed"] = Line2D([], [], color=INK, lw=0.8, dashes=(1, 1.6), label="unstable circle of its energy")
     if state is not None and state["orbit"] is not None:
         axes.axhspan(*state["lean_range"], facecolor="none", edgecolor=INK, lw=0.6, hatch="////", alpha=0.35)
         handles["orbit"] = Patch(

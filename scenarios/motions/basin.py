@@ -12,7 +12,7 @@ import numpy as np
 
 from ...reference.basins.disturbance import disturb, disturb_on_level
 from ...reference.basins.edge import Edge, Shot, find_edge, make_shoot
-from ...reference.basins.edge_state import EdgeState, follow_edge
+from ...reference.basins.edge_state import EdgeState, PassedCircle, follow_edge
 from ...reference.basins.neighbours import StableNeighbours, find_stable_neighbours
 from ...reference.basins.outcome import KINDS, RideOutcome
 from ...reference.basins.riding import Patience, choose_patience
@@ -150,9 +150,15 @@ def _describe_state(state: EdgeState, known: PeriodicOrbit | None) -> dict[str, 
         "period": state.period,
         "lean_range": None if orbit is None else _find_leans(orbit),
         "orbit": None if orbit is None else _describe_orbit(orbit),
+        "passed_circle": None if state.passed is None else _describe_passed(state.passed),
         "known_orbit": None if known is None else _describe_orbit(known),
         "is_known": None if orbit is None or known is None else _are_same(orbit, known),
     }
+
+
+def _describe_passed(passed: PassedCircle) -> dict[str, Any]:
+    values = {name: float(passed.variables[VARIABLES.index(name)]) for name in ("rear_rate", "lean", "steer")}
+    return {**values, "growth": [passed.growth.real, passed.growth.imag]}
 
 
 def _find_leans(orbit: PeriodicOrbit) -> list[float]:
