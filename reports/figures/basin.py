@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -36,8 +37,9 @@ def _label_axis(key: str) -> str:
     return f"change of {key.replace('_', ' ')} [{_UNITS.get(key, 'rad/s')}]"
 
 
-def _title(document: Mapping[str, Any]) -> str:
-    return " - ".join(part for part in (document["title"], name_other_bicycle(document)) if part)
+def _title(document: Mapping[str, Any], columns: int) -> str:
+    title = ", ".join(part for part in (document["title"], name_other_bicycle(document)) if part)
+    return fill(title, 100 if columns == 2 else 44)
 
 
 def basin_map_figure(document: Mapping[str, Any], columns: int = 2) -> Figure:
@@ -75,7 +77,7 @@ def basin_map_figure(document: Mapping[str, Any], columns: int = 2) -> Figure:
         handles.append(Line2D([], [], color=INK, lw=0.7, label="edge of the basin"))
     handles += _mark_edges(axes, document)
     axes.set(xlabel=_label_axis(found["x"]["key"]), ylabel=_label_axis(found["y"]["key"]))
-    axes.set_title(_title(document), loc="left", parse_math=False)
+    axes.set_title(_title(document, columns), loc="left", parse_math=False)
     figure.legend(handles=handles, loc="outside lower center", ncols=4 if columns == 2 else 2)
     return figure
 
@@ -134,7 +136,7 @@ def edge_rides_figure(document: Mapping[str, Any], columns: int = 2) -> Figure:
             axes.set_ylabel("lean [rad]")
         if k >= len(edges) - across:
             axes.set_xlabel("time [s]")
-    figure.suptitle(_title(document), x=0.01, ha="left", fontsize=8.5, parse_math=False)
+    figure.suptitle(_title(document, columns), x=0.01, ha="left", fontsize=8.5, parse_math=False)
     figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=3 if columns == 2 else 2)
     return figure
 
