@@ -94,7 +94,7 @@ def _mark_edges(axes: Axes, document: Mapping[str, Any]) -> list[Line2D]:
         return []
     style: dict[str, Any] = {"ls": "", "marker": "o", "ms": 4.2, "mfc": "white", "mec": INK, "zorder": 6}
     axes.plot(*np.array(points).T, **style, clip_on=False)
-    return [Line2D([], [], **style, label="edge along an axis, by bisection")]
+    return [Line2D([], [], **style, label="edge by bisection")]
 
 
 def drawn_edges(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
