@@ -35,6 +35,8 @@ SETTLED = 1e-3  # of the bounding orbit: what is not linear is a millionth of wh
 SETTLED_ALONE = 1e-6  # the same where no orbit is known [rad]
 _DECAY, _INSIDE = 0.75, 0.5
 _NEAR = 0.25
+# Relative difference below which two solutions are one circle: one is interpolated, with an error of some 1e-7.
+_SAME_CIRCLE = 1e-4
 # The greatest lean of a period is missed by 1 - cos(pi / 16) at most.
 _RESOLVED = 0.02
 
@@ -143,6 +145,15 @@ def _have_decayed(first: np.ndarray, second: np.ndarray, decay: np.ndarray, time
     return np.all(second <= first * np.exp(-_DECAY * decay * span)[:, None], axis=1)
 
 
+def _is_predicted(neighbours: StableNeighbours, circle: np.ndarray, energy: float) -> bool:
+    """Return whether a circle (7,) of an energy [J] is the section's, to which a ride may be about to return."""
+    level = np.array([energy])
+    if not neighbours.are_inside(level)[0]:
+        return False
+    apart = np.abs(circle - neighbours.interpolate_circles(level)[0])
+    return bool(np.all(apart <= _SAME_CIRCLE * (1 + np.abs(circle))))
+
+
 def settles_elsewhere(neighbours: StableNeighbours, motion: PreciseMotion, energy: float) -> bool:
     """Return whether a ride returns to a stable circle of its energy [J] that is none of the section's.
 
@@ -154,7 +165,7 @@ def settles_elsewhere(neighbours: StableNeighbours, motion: PreciseMotion, energ
         modes = neighbours.linearise_circle(circle)
     except ValueError:
         return False
-    if not modes.slowest.real < 0:
+    if not modes.slowest.real < 0 or _is_predicted(neighbours, circle, energy):
         return False
     first, second = _mean_sizes(modes.forms[None], (variables - circle)[None])
     decay = np.array([-modes.slowest.real])

@@ -177,6 +177,20 @@ def test_rides_that_have_not_left_the_edge_are_undecided() -> None:
     assert not outcome.lost
 
 
+def test_a_ride_on_its_way_back_that_is_left_too_early_is_undecided_and_not_elsewhere() -> None:
+    """Half of the orbit's size is not reached yet after one stretch, though the deviation decays."""
+    found = q2()
+    assert found.orbit is not None
+    circle = independent(*found.motion.state())
+    state = found.flow.moved_to(circle + 0.75 * (found.orbit.state - circle)).near
+    start = RideStart(BICYCLE, BOWL, state[:9], state[9:18], until_fall=True)
+    patience = choose_patience(found, 1e-2)
+    (early,) = ride_out(found, [start], replace(patience, longest=1.0))
+    (late,) = ride_out(found, [start], patience)
+    assert [early.kind, late.kind] == [UNDECIDED, RETURNED]
+    assert late.time > 2 * patience.stretch
+
+
 def test_disturbances_at_a_fixed_energy_keep_it() -> None:
     found = q2()
     changes = np.array([[0, 0, 0.02, 0, 0.1, -0.2, 0], [0, 0, 0, 0.03, 0, 0, 0], [0, 0, 0, 0, 1e3, 0, 0]], float)
