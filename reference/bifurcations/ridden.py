@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..kinematics import WHEELS
+from ..normal_force import normal_forces
 from ..simulate import PreciseMotion, simulate
-from ..surface import Surface, evaluate
 from .orbits import PeriodicOrbit
 from .shooting import Flow
 
@@ -65,17 +65,11 @@ def explain_orbit(flow: Flow, orbit: PeriodicOrbit) -> tuple[str, ...]:
         motions = ride_orbit(flow, orbit, _LOOKS)
     except ValueError as error:
         return (str(error),)
-    least = np.concatenate([_find_normal_forces(flow.equations.surface, motion) for motion in motions]).min(axis=0)
+    surface = flow.equations.surface
+    forces = [normal_forces(surface, motion.contact, motion.force) for motion in motions]
+    least = np.concatenate(forces).min(axis=0)
     return tuple(
         f"the ground would have to pull the {wheel} wheel: {force:.3g} N"
         for wheel, force in zip(WHEELS, least, strict=True)
         if not force > 0
     )
-
-
-def _find_normal_forces(surface: Surface, motion: PreciseMotion) -> np.ndarray:
-    """Return the forces (n, 2) along the ground's normals on the rear and the front wheel of a ride."""
-    places = motion.contact[:, :, :2]
-    slopes = evaluate(surface, places[..., 0], places[..., 1])[..., 1:3]
-    normal = np.concatenate([-slopes, np.ones((*slopes.shape[:2], 1))], axis=-1)
-    return np.einsum("nki,nki->nk", motion.force, normal) / np.linalg.norm(normal, axis=-1)

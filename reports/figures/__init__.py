@@ -1,6 +1,7 @@
-"""Figures for print: solution families, the atlas, eigenvalues, orbits, work-precision, single precision, sweeps."""
+"""Figures for print: solution families, the atlas, eigenvalues, orbits, basins, precision of engines, sweeps."""
 
 from .atlas import growth_figure, stable_figure
+from .basin import basin_map_figure, drawn_edges, edge_rides_figure
 from .bifurcations import bifurcation_figure, drawn_sections
 from .eigenvalues import eigenvalue_figure
 from .families import family_figure
@@ -35,9 +36,12 @@ __all__ = [
     "SweepMap",
     "SweepRuns",
     "average_cells",
+    "basin_map_figure",
     "bifurcation_figure",
+    "drawn_edges",
     "drawn_orbits",
     "drawn_sections",
+    "edge_rides_figure",
     "eigenvalue_figure",
     "family_figure",
     "float32_figure",

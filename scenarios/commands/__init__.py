@@ -1,5 +1,6 @@
 """The commands of `velodrome`. Each command imports its libraries when it runs, which keeps the others fast."""
 
+from .basin import basin_command
 from .bicycle import bicycle_command
 from .check import check_command
 from .float32 import float32_command
@@ -17,6 +18,7 @@ from .warm_up import warm_up_command
 
 __all__ = [
     "atlas_command",
+    "basin_command",
     "bicycle_command",
     "bifurcations_command",
     "check_command",

@@ -9,6 +9,10 @@ from ..lazy import import_when_used as _import_when_used
 
 if TYPE_CHECKING:
     from .atlas import make_atlas as make_atlas
+    from .basin import Basin as Basin
+    from .basin import BasinRequest as BasinRequest
+    from .basin import find_basin as find_basin
+    from .basin import write_basin as write_basin
     from .bifurcations import Bifurcations as Bifurcations
     from .bifurcations import find_bifurcations as find_bifurcations
     from .bifurcations import write_bifurcations as write_bifurcations
@@ -28,18 +32,22 @@ if TYPE_CHECKING:
 __all__ = [
     "MERGING",
     "NOT_SEARCHED",
+    "Basin",
+    "BasinRequest",
     "Bifurcations",
     "CircularSolution",
     "CriticalShapes",
     "FamilyCurve",
     "SolutionFamilies",
     "families_document",
+    "find_basin",
     "find_bifurcations",
     "find_critical_shapes",
     "follow_families",
     "make_atlas",
     "search_bound",
     "solve_circular",
+    "write_basin",
     "write_bifurcations",
     "write_families",
 ]
@@ -49,6 +57,7 @@ if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
         __name__,
         {
             ".atlas": ("make_atlas",),
+            ".basin": ("Basin", "BasinRequest", "find_basin", "write_basin"),
             ".bifurcations": ("Bifurcations", "find_bifurcations", "write_bifurcations"),
             ".circular": ("NOT_SEARCHED", "CircularSolution", "search_bound", "solve_circular"),
             ".families": (

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .schema import OF_THE_MOTION as OF_THE_MOTION
     from .schema import CircularTable as CircularTable
     from .schema import Gate as Gate
+    from .schema import Perturbation as Perturbation
     from .schema import Scenario as Scenario
     from .schema import Simulation as Simulation
     from .schema import library_names as library_names
@@ -61,6 +62,7 @@ __all__ = [
     "CircularTable",
     "EngineChoice",
     "Gate",
+    "Perturbation",
     "Scenario",
     "ScenarioTemplate",
     "Simulation",
@@ -128,6 +130,7 @@ if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
                 "OF_THE_MOTION",
                 "CircularTable",
                 "Gate",
+                "Perturbation",
                 "Scenario",
                 "Simulation",
                 "library_names",

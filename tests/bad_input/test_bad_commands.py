@@ -127,6 +127,10 @@ LINES = st.one_of(
     st.tuples(option("--alpha", st.sampled_from(["nan", "-1", "x"])), family).map(
         lambda parts: ["bifurcations", *chain.from_iterable(parts)]
     ),
+    st.tuples(
+        option("--along", text) | option("--map", st.sampled_from(NEAR)) | option("--reach", st.sampled_from(NEAR)),
+        st.sampled_from(["q2", "q1", "iftomm-1"]),
+    ).map(lambda parts: ["basin", parts[1], *parts[0]]),
     line("precision", plain, source, change, duration, engine, option("--levels", number)),
     line("atlas", plain, option("--largest", number), option("--out", text)).map(lambda line: [*line, "--size", "1"]),
     line("check", plain, engine, option("--reason", text)).map(lambda line: [*line, "none.toml"]),

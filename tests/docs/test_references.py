@@ -142,6 +142,7 @@ DOCUMENTS = {
     "sweep": ["sweep sweep.toml --json"],
     "critical": ["critical --json"],
     "bifurcations": ["bifurcations --alpha 0.005 --family 4 --engine reference --step 0.01 --json"],
+    "basin": ["basin q2 --along lean_rate --map lean_rate,steer_rate --rides 9 --sample 8 --json"],
     "atlas": ["atlas --size 2000 --json"],
     "paper": ["paper --json"],
 }

@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
@@ -21,8 +22,10 @@ from PIL import Image
 from velodrome.reference.inputs import Inputs
 from velodrome.reference.surface import Paraboloid
 from velodrome.reports.figures import (
+    basin_map_figure,
     bifurcation_figure,
     drawn_orbits,
+    edge_rides_figure,
     eigenvalue_figure,
     family_figure,
     float32_figure,
@@ -135,9 +138,13 @@ def families(ground: str, steer_torque: float = 0.0) -> dict[str, Any]:
     return follow_families(bicycle.bicycle, surface, Inputs(steer_torque)).as_json(bicycle.name)
 
 
-def stored_bifurcations() -> dict[str, Any]:
-    path = Path(__file__).parents[2] / "scenarios" / "commands" / "stored" / "bifurcations.json"
+def stored_document(name: str) -> dict[str, Any]:
+    path = Path(__file__).parents[2] / "scenarios" / "commands" / "stored" / f"{name}.json"
     return json.loads(path.read_text(encoding="utf-8"))
+
+
+def stored_bifurcations() -> dict[str, Any]:
+    return stored_document("bifurcations")
 
 
 def eigenvalues(columns: int) -> Figure:
@@ -157,6 +164,8 @@ DRAWN: dict[str, Callable[[int], Figure]] = {
     "eigenvalues": eigenvalues,
     "bifurcations": lambda columns: bifurcation_figure(stored_bifurcations(), columns),
     "orbit tracks": lambda columns: orbit_track_figure(stored_bifurcations(), columns),
+    "basin map": lambda columns: basin_map_figure(stored_document("basin"), columns),
+    "basin edges": lambda columns: edge_rides_figure(stored_document("basin"), columns),
     "growth": lambda columns: growth_figure(*atlas_of_planes(), columns),
     "stable": lambda columns: stable_figure(*atlas_of_planes(), columns),
     "within": lambda columns: within_figure(bounded_atlas(), columns),
@@ -312,3 +321,23 @@ def test_orbits_are_drawn_stable_from_the_supercritical_end_to_the_torus_bifurca
     end = float(np.asarray(torus.get_xdata())[0])
     # The stored branch comes from the subcritical end: it is stable beyond the torus bifurcation.
     assert min(part.min() for part in energies) == pytest.approx(end, abs=1e-6)
+
+
+def test_a_basin_is_drawn_with_its_edge_and_both_rides_of_each_direction() -> None:
+    document = stored_document("basin")
+    with use_style():
+        seen = basin_map_figure(document)
+        rides = edge_rides_figure(document)
+    (axes,) = seen.axes
+    (mesh,) = [part for part in axes.collections if isinstance(part, QuadMesh)]
+    survived = np.array([[letter in "ro" for letter in row] for row in document["map"]["rows"]])
+    colours = np.asarray(mesh.get_array()).reshape(survived.shape)
+    assert survived.any()
+    assert len(np.unique(colours[survived])) + len(np.unique(colours[~survived])) == len(document["map"]["outcomes"])
+    edges = [edge for edge in document["edges"] if set(edge["along"]) <= {"lean_rate", "steer_rate"}]
+    (points,) = [line for line in axes.lines if line.get_marker() == "o"]
+    assert len(np.asarray(points.get_xdata())) == len(edges)
+    panels = [axes for axes in rides.axes if axes.get_visible()]
+    assert len(panels) == len(document["edges"])
+    for axes in panels:
+        assert {part.get_gid() for part in axes.collections if part.get_gid()} == {"inside", "outside"}

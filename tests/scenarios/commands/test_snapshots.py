@@ -19,6 +19,7 @@ import pytest
 from rich.console import Console
 from stored_documents import HERE, show_stored_run, stored
 
+from velodrome.scenarios.commands.present_basin import show_basin
 from velodrome.scenarios.commands.present_bifurcations import show_bifurcations
 from velodrome.scenarios.commands.present_diff import show_diff
 from velodrome.scenarios.commands.present_gate import show_verdicts
@@ -81,6 +82,7 @@ SHOWN: dict[str, Show] = {
     "paper": show_paper,
     "critical": lambda console: show_critical(console, stored("critical")),
     "bifurcations": lambda console: show_bifurcations(console, stored("bifurcations")),
+    "basin": lambda console: show_basin(console, stored("basin")),
 }
 ENGINES: dict[str, Any] = {
     "run": stored("run")["metrics"],
