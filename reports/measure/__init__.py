@@ -3,9 +3,9 @@
 What needs the room of bifurcations is imported when it is first used: rides are measured without.
 """
 
-from importlib import import_module as _import_module
 from typing import TYPE_CHECKING
 
+from ...engines.lazy import import_when_used as _import_when_used
 from .balance import InputWork, conserved_energy, measure_work
 from .consistency import (
     LARGEST_NOISE,
@@ -131,25 +131,13 @@ __all__ = [
     "until_fall",
 ]
 
-_HOME = {
-    "follow_orbit": ".orbit_following",
-    "predict_differences": ".orbit_following",
-    "OwnCircle": ".own_circle",
-    "measure_at_start": ".own_circle",
-    "measure_own_circle": ".own_circle",
-    "StabilityBoundary": ".stability_boundary",
-    "locate_boundary": ".stability_boundary",
-    "StepLaw": ".step_laws",
-    "predict_shift": ".step_laws",
-}
-
-
 if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
-
-    def __getattr__(name: str) -> object:
-        """Import a name of the room when it is first used."""
-        if name not in _HOME:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        value = getattr(_import_module(_HOME[name], __name__), name)
-        globals()[name] = value
-        return value
+    __getattr__ = _import_when_used(
+        __name__,
+        {
+            ".orbit_following": ("follow_orbit", "predict_differences"),
+            ".own_circle": ("OwnCircle", "measure_at_start", "measure_own_circle"),
+            ".stability_boundary": ("StabilityBoundary", "locate_boundary"),
+            ".step_laws": ("StepLaw", "predict_shift"),
+        },
+    )

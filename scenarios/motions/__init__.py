@@ -5,7 +5,7 @@ Names are imported when they are first used: one motion needs a third of what fa
 
 from typing import TYPE_CHECKING
 
-from ..lazy import import_when_used as _import_when_used
+from ...engines.lazy import import_when_used as _import_when_used
 
 if TYPE_CHECKING:
     from .atlas import make_atlas as make_atlas

@@ -5,7 +5,7 @@ Names are imported when they are first used: a single motion needs a third of wh
 
 from typing import TYPE_CHECKING
 
-from ..lazy import import_when_used as _import_when_used
+from ...engines.lazy import import_when_used as _import_when_used
 
 if TYPE_CHECKING:
     from .bicycle_file import BicycleFile as BicycleFile

@@ -3,9 +3,9 @@
 What needs the room of bifurcations is imported when it is first used.
 """
 
-from importlib import import_module as _import_module
 from typing import TYPE_CHECKING
 
+from ...engines.lazy import import_when_used as _import_when_used
 from .bicycle import BicycleStudy, study_bicycle, write_bicycle
 from .float32 import all_rode_float32, study_float32, write_float32
 from .league import (
@@ -47,19 +47,10 @@ __all__ = [
     "write_precision",
 ]
 
-_HOME = {
-    "EngineEnd": ".engine_ends",
-    "configure_steps": ".engine_ends",
-    "measure_engine_ends": ".engine_ends",
-}
-
-
 if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
-
-    def __getattr__(name: str) -> object:
-        """Import a name of the room when it is first used."""
-        if name not in _HOME:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        value = getattr(_import_module(_HOME[name], __name__), name)
-        globals()[name] = value
-        return value
+    __getattr__ = _import_when_used(
+        __name__,
+        {
+            ".engine_ends": ("EngineEnd", "configure_steps", "measure_engine_ends"),
+        },
+    )
