@@ -33,7 +33,7 @@ Shoot = Callable[[np.ndarray], list[Shot]]
 
 
 @dataclass(frozen=True, eq=False)
-class BasinEdge:
+class EdgeBracket:
     """The edge along a direction.
 
     Attributes
@@ -94,7 +94,7 @@ def make_shoot(
     return shoot
 
 
-def find_edge(shoot: Shoot, direction: np.ndarray, sizes: Sequence[float] | np.ndarray, relative: float) -> BasinEdge:
+def find_edge(shoot: Shoot, direction: np.ndarray, sizes: Sequence[float] | np.ndarray, relative: float) -> EdgeBracket:
     """Find the edge of the basin along a direction.
 
     Parameters
@@ -110,17 +110,17 @@ def find_edge(shoot: Shoot, direction: np.ndarray, sizes: Sequence[float] | np.n
 
     Returns
     -------
-    BasinEdge
+    EdgeBracket
     """
     scan = shoot(np.asarray(sizes, float))
     first = next((k for k, shot in enumerate(scan) if shot.outcome.lost), None)
     if first is None:
-        return BasinEdge(direction, scan, scan[-1], None)
+        return EdgeBracket(direction, scan, scan[-1], None)
     before = [shot for shot in scan[:first] if shot.outcome.survived]
     if not before:
-        return BasinEdge(direction, scan, None, scan[first])
+        return EdgeBracket(direction, scan, None, scan[first])
     inside, outside = narrow(shoot, before[-1], scan[first], relative * scan[first].size)
-    return BasinEdge(direction, scan, inside, outside)
+    return EdgeBracket(direction, scan, inside, outside)
 
 
 def narrow(shoot: Shoot, inside: Shot, outside: Shot, width: float) -> tuple[Shot, Shot]:

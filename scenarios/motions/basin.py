@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...reference.basins.disturbance import disturb, disturb_on_level
-from ...reference.basins.edge import BasinEdge, Shot, find_edge, make_shoot
+from ...reference.basins.edge import EdgeBracket, Shot, find_edge, make_shoot
 from ...reference.basins.edge_state import EdgeState, PassedCircle, follow_edge
 from ...reference.basins.neighbours import StableNeighbours, find_stable_neighbours
 from ...reference.basins.outcome import KINDS, RideOutcome
@@ -109,7 +109,7 @@ class BasinEdge:
     ----------
     along : dict
         Changes of the variables for a size of 1.
-    edge : BasinEdge
+    edge : EdgeBracket
     inside, outside : SideOfEdge or None
     state : EdgeState or None
         What rides on the edge tend to, where it was followed.
@@ -118,7 +118,7 @@ class BasinEdge:
     """
 
     along: dict[str, float]
-    edge: BasinEdge
+    edge: EdgeBracket
     inside: SideOfEdge | None
     outside: SideOfEdge | None
     state: EdgeState | None = None
