@@ -86,16 +86,16 @@ class EdgeState:
 
 @dataclass(frozen=True, eq=False)
 class _Swing:
-    """A period of the lean: time and variables (7,) at its greatest, the time of the next least, and that lean."""
+    """A period of the lean: times and variables (7,) at its greatest and at the next least."""
 
     time: float
     variables: np.ndarray
     least_time: float
-    least: float
+    least: np.ndarray
 
     @property
     def amplitude(self) -> float:
-        return 0.5 * float(self.variables[_LEAN] - self.least)
+        return 0.5 * float(self.variables[_LEAN] - self.least[_LEAN])
 
 
 def follow_edge(
@@ -186,7 +186,7 @@ def _find_swings(variables: np.ndarray, offset: float, step: float) -> Iterator[
         if len(following):
             at, there = _solve_extreme(variables, int(k))
             low, below = _solve_extreme(variables, int(following[0]))
-            yield _Swing(offset + at * step, there, offset + low * step, float(below[_LEAN]))
+            yield _Swing(offset + at * step, there, offset + low * step, below)
 
 
 def _solve_extreme(variables: np.ndarray, k: int) -> tuple[float, np.ndarray]:
@@ -229,7 +229,7 @@ def _search_between(
 def _solve(flow: Flow, energy: float, first: _Swing, final: _Swing) -> PeriodicOrbit | None:
     """Solve for the periodic orbit next to a ride; None where Newton's method does not converge."""
     down, whole = first.least_time - first.time, final.time - first.time
-    guess = np.concatenate([first.variables, [down, whole - down]])
+    guess = np.concatenate([first.variables, first.least, [down, whole - down]])
     try:
         orbit = solve_orbit(flow, guess, energy_condition(energy))
     except ValueError:
