@@ -74,7 +74,7 @@ _COMMANDS: dict[Callable[..., None], str] = {
     families_command: "The four families of circular motions",
     critical_command: "The critical shapes of the bowl",
     bifurcations_command: "What happens where stable circles end",
-    basin_command: "Which disturbances a stable circle survives",
+    basin_command: "What a stable circle survives",
     atlas_command: "Stability over alpha and rear rate",
     bicycle_command: "A bicycle by itself: eigenvalues, speeds",
     paper_command: "The paper's figures and numbers, computed",

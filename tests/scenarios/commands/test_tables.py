@@ -115,9 +115,16 @@ def show_critical_shapes(console: Console) -> None:
 
 
 def show_regions(console: Console) -> None:
+    hopf = {"criticality": ["subcritical", "supercritical"], "cause": ["hopf", "hopf"]}
+    other = {"criticality": [None, None], "cause": ["energy", "hopf"]}
+    turn = {"side": "start", "alpha": 0.0310557504719, "rear_rate": 13.180289}
+    bounds = [{"stable_within": [0.0123456, None]}, {"stable_within": [0.0354]}]
+    vanishing = {"alpha": 0.0333487046243, "rear_rate": 13.8896236}
     regions = [
-        {"family": 2, "alpha": [0.000123456, 1], "vanishing": {"alpha": 0.0333487046243, "rear_rate": 13.8896236}},
-        {"family": 12, "alpha": [0.0001, 1], "vanishing": None},
+        {"family": 2, "alpha": [0.000123456, 1], "vanishing": vanishing}
+        | {"start": hopf, "end": other, "bautin": [turn], "within": bounds},
+        {"family": 12, "alpha": [0.0001, 1], "vanishing": None}
+        | {"start": other, "end": hopf, "bautin": [], "within": None},
     ]
     document = {**name_bicycle(Bicycle()), "alphas": [0.0, 1.0], "absent": [], "stable": regions, "motions": 400000}
     show_atlas(console, document, Path("atlas"))
