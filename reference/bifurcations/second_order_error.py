@@ -37,9 +37,8 @@ from .taylor import differentiate, expand_on_circle
 # Circle of complex times on which a ride is expanded [s]: at 19 rad/s, of the fastest wheel, the terms left out are
 # (0.04 x 19)^16 / 16! = 1e-15, and round-off of a fourth derivative of positions of 20 m is 24 x 20 eps / 0.04^4.
 _RADIUS, _FLOW_STEPS = 0.04, 8
-_AHEAD = (
-    0.01  # between looks at slip along the ride [s]: the stencil's error is (0.01 x 7)^6 / 140 at the fastest weave
-)
+# Between looks at slip along the ride [s]: the stencil's error is (0.01 x 7)^6 / 140 at the fastest weave.
+_AHEAD = 0.01
 _FRAMES = [0, 1, 0, 1]  # the frame of each body, in the order of `BODIES`
 
 

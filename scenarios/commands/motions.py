@@ -18,6 +18,7 @@ from .options import (
     RearTorqueOption,
     SteerDampingOption,
     SteerTorqueOption,
+    TracebackOption,
     WithinOption,
     answering_missing_motion,
     ending_with,
@@ -27,7 +28,9 @@ from .options import (
     parse_figure_output,
     parse_ground,
     print_json,
+    print_traceback,
     show_written,
+    showing_traceback,
 )
 
 _STEPS = (0.01, 0.005)  # at which engines' stable sections are measured [s]
@@ -166,6 +169,7 @@ def bifurcations_command(
     out: Annotated[Path | None, typer.Option(help="Folder for bifurcations.json and the figures.")] = None,
     formats: FormatOption = None,
     columns: ColumnsOption = None,
+    traceback: TracebackOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Where stable circles end: Hopf points, their criticality, and the periodic orbits born there."""
@@ -173,8 +177,9 @@ def bifurcations_command(
     from .terminal import make_console
 
     figures = parse_figure_output(formats, columns, None if out is not None else "--out")
-    with answering_missing_motion(as_json), ProgressBars() as progress:
+    with answering_missing_motion(as_json), showing_traceback(traceback), ProgressBars() as progress:
         from ..error import ScenarioError
+        from ..files import make_folder
         from ..motions import find_bifurcations, write_bifurcations
         from ..scenario import make_bowl
         from ..studies import configure_steps, measure_engine_ends
@@ -185,6 +190,8 @@ def bifurcations_command(
         if step and not engine:
             raise ScenarioError("--step is the step of engines; --engine NAME says of which")
         riders = configure_steps(engine, step or _STEPS) if engine else {}
+        if out is not None:
+            make_folder(out)  # first, so that no work is lost if it fails
         found = find_bifurcations(
             source.bicycle,
             make_bowl(ground),
@@ -192,8 +199,10 @@ def bifurcations_command(
             lambda done, points: progress.watch("orbits", done, points, "Hopf points"),
         )
         points = [one.point for one in found.found]
-        ends = measure_engine_ends(points, riders, progress.watch)
-        document = {**found.as_json(source.name), "engines": [end.as_json() for end in ends]}
+        ends = measure_engine_ends(points, riders, progress.watch, print_traceback if traceback else None)
+        why_none = "no Hopf point here ends a stable section" if engine and not ends else None
+        measured = {"engines": [end.as_json() for end in ends], "no_engines_because": why_none}
+        document = {**found.as_json(source.name), **measured}
         written = [] if out is None else write_bifurcations(document, out, figures)
     with ending_with(0):
         if as_json:

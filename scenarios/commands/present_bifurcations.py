@@ -38,7 +38,9 @@ def show_bifurcations(console: Console, document: Mapping[str, Any]) -> None:
         console.print("no Hopf point", markup=False)
     for section in document["stable_sections"]:
         _show_section(console, section)
-    _show_engines(console, document.get("engines", []))
+    if document["no_engines_because"] is not None:
+        print_words(console, f"no ends of engines are measured: {document['no_engines_because']}", "yellow")
+    _show_engines(console, document["engines"])
     for number, reason in document["absent"].items():
         print_words(console, f"family {number}: no curve: {reason}", "yellow")
 
@@ -93,8 +95,9 @@ def _show_engines(console: Console, ends: Sequence[Mapping[str, Any]]) -> None:
             Column("engine", [end["engine"] for end in found], right=False),
             Column("Hopf point", [f"H{end['hopf'] + 1}" for end in found], right=False),
             Column("step", [f"{end['step']:.6f}" for end in found], "s"),
-            Column("rear rate", [f"{end['rear_rate']:.9f}" for end in found], "rad/s"),
+            Column("rear rate", [f"{end['rear_rate']:.6f}" for end in found], "rad/s"),
             Column("shift", [f"{end['shift']:z.4e}" for end in found], "rad/s"),
+            Column("its error", [f"{end['error']:.0e}" for end in found], "rad/s"),
             Column("law", ["" if end["law"] is None else f"{end['law']:z.4e}" for end in found], "rad/s"),
             Column("shift / law", ["" if end["law"] is None else f"{end['shift'] / end['law']:.4f}" for end in found]),
         ]

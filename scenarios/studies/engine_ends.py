@@ -50,8 +50,8 @@ class EngineEnd:
         Of the weave there [rad/s].
     shift : float or None
         Of the rear rate from the reference's [rad/s].
-    last_step : float or None
-        Size of the search's last step; the error is smaller, but for the engine's noise [rad/s].
+    error : float or None
+        Estimate of the error of the search for it [rad/s].
     law : float or None
         The shift that follows from the method and the equations of motion; None where no law is known [rad/s].
     order : int or None
@@ -66,7 +66,7 @@ class EngineEnd:
     rear_rate: float | None = None
     frequency: float | None = None
     shift: float | None = None
-    last_step: float | None = None
+    error: float | None = None
     law: float | None = None
     order: int | None = None
     failed_because: str | None = None
@@ -111,7 +111,7 @@ def measure_engine_ends(
     Parameters
     ----------
     points : sequence of HopfPoint
-        Those that end no stable section, or have no normal form, are left out.
+        Those that end no stable section are left out.
     riders : mapping
         As `configure_steps` returns it.
     watch : callable
@@ -124,7 +124,7 @@ def measure_engine_ends(
     list of EngineEnd
         Engine by engine, point by point, in the order of the steps.
     """
-    places = [place for place, point in enumerate(points) if point.ends_section and point.form is not None]
+    places = [place for place, point in enumerate(points) if point.ends_section]
     ends = []
     for name, steps in riders.items():
         rides = [(place, engine, settings) for place in places for engine, settings in steps]
@@ -137,21 +137,23 @@ def measure_engine_ends(
 
 def _measure_end(engine: Engine, settings: Any, point: HopfPoint, place: int, trace: Trace | None) -> EngineEnd:
     end = EngineEnd(engine=engine.name, hopf=place, step=settings.step)
+    if point.form is None:
+        return replace(end, failed_because=f"the reference has no end to compare with: {point.why_undefined}")
     try:
         found = call_engine(_locate, engine, settings, point, end.step)
+        law = predict_shift(point, settings)
     except (ArithmeticError, ValueError) as error:  # the circle or a disturbed state may not exist
         return replace(end, failed_because=" ".join(str(error).split()))
     except Exception as error:
         if trace is not None:
             trace(engine.name, error)
         return replace(end, failed_because=why_failed(error))
-    law = predict_shift(point, settings)
     return replace(
         end,
         rear_rate=found.rear_rate,
         frequency=found.frequency,
         shift=found.rear_rate - point.motion.rear_rate,
-        last_step=found.last_step,
+        error=found.error,
         law=None if law is None else law.rear_rate,
         order=None if law is None else law.order,
     )
@@ -162,5 +164,5 @@ def _locate(engine: Engine, settings: Settings, point: HopfPoint, step: float) -
     if engine.name == REFERENCE:  # its constraints drift from the start on
         return locate_boundary(point, lambda start: measure_at_start(engine, settings, start, weave, step))
     window = max(1, int(min(_WINDOW, _SHARE * pi / point.frequency) / step + 1e-9)) * step
-    begin = ceil(_SETTLING / window) * window
+    begin = ceil(_SETTLING / window - 1e-9) * window
     return locate_boundary(point, lambda start: measure_own_circle(engine, settings, start, weave, (begin, window)))

@@ -96,7 +96,7 @@ def boundary_ratio(name: str, step: float, hopf: HopfPoint) -> float:
     law = predict_shift(hopf, engine_at(name, step)[1])
     assert law is not None
     found = locate_boundary(hopf, lambda start: own_circle(name, step, start, hopf.frequency))
-    assert found.last_step < 1e-2 * abs(law.rear_rate)
+    assert found.error < 1e-2 * abs(law.rear_rate)
     return (found.rear_rate - hopf.motion.rear_rate) / law.rear_rate
 
 
