@@ -125,7 +125,8 @@ def follow_edge(
     turn = neighbours.own_modes.slowest.imag
     step = min(2 * np.pi / turn / _LOOKS if turn else np.inf, patience.interval)
     times = np.arange(round(_SEGMENT / step) + 1) * step
-    flow, elapsed, swings = neighbours.flow, 0.0, []
+    flow, elapsed = neighbours.flow, 0.0
+    swings: list[_Swing] = []
     passed = None
     starts: list[RideStart] | None = [inside.start, outside.start]
     while starts is not None and elapsed < longest and not _is_settled(swings):

@@ -191,18 +191,18 @@ def _look_at_ends(
     # Beyond the end of every one of them.
     times = np.arange(round((_LAST_LOOK + 2 * patience.interval) / _FINE) + 1) * _FINE
     closer = simulate_many(starts, times, patience.tolerance, threads) if starts else []
-    for (ride, _), start, offset, motion in zip(ended, starts, offsets, closer, strict=True):
-        if isinstance(motion, ValueError):
-            outcomes[ride.index] = RideOutcome(TOUCHED, offset, ride.energy, detail=str(motion))
+    for (ride, _), start, offset, seen in zip(ended, starts, offsets, closer, strict=True):
+        if isinstance(seen, ValueError):
+            outcomes[ride.index] = RideOutcome(TOUCHED, offset, ride.energy, detail=str(seen))
             continue
-        lost = find_lost_contact(start.surface, motion)
+        lost = find_lost_contact(start.surface, seen)
         if lost is not None:
             when, wheel = lost
             outcomes[ride.index] = RideOutcome(LOST_CONTACT, offset + when, ride.energy, detail=wheel)
         else:
-            kind = FELL if motion.fall is not None else TOUCHED if _find_wheel(motion) else BROKE_OFF
-            when = offset + float(motion.fall.time[0] if motion.fall is not None else motion.time[-1])
-            outcomes[ride.index] = RideOutcome(kind, when, ride.energy, detail=_find_wheel(motion))
+            kind = FELL if seen.fall is not None else TOUCHED if _find_wheel(seen) else BROKE_OFF
+            when = offset + float(seen.fall.time[0] if seen.fall is not None else seen.time[-1])
+            outcomes[ride.index] = RideOutcome(kind, when, ride.energy, detail=_find_wheel(seen))
 
 
 def _find_wheel(motion: PreciseMotion) -> str:

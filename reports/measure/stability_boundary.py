@@ -66,7 +66,8 @@ def locate_boundary(point: HopfPoint, measure: Callable[[Problem], OwnCircle]) -
     """
     flow, (q, qd) = flow_near(point), point.motion.state()
     slope = eigenvalue_slope(flow, q, qd, 1j * point.frequency)
-    rate, circles, before = point.motion.rear_rate, [], np.inf
+    rate, before = point.motion.rear_rate, np.inf
+    circles: list[OwnCircle] = []
     for _ in range(_MOST):
         try:
             start = circle_problem(point, rate)
