@@ -315,7 +315,7 @@ ODD = {
     "a million g": {"bicycle": {"gravity": 1e6}},
     "10 km/s": {"motion": {"kind": "upright", "speed": 1e4}},
     "nearly at rest": {"motion": {"kind": "upright", "speed": 1e-12}},
-    "one wheel behind the other": {"bicycle": {"wheelbase": 1e-6}},
+    "one wheel close behind the other": {"bicycle": {"wheelbase": 0.66}},
 }
 
 
